@@ -1,0 +1,143 @@
+//! `experiment.toml`: the specimen, the rig, the model and, for synthetic recordings, the camera.
+//!
+//! Unknown keys are an error that names the key and the nearest known one.
+
+mod model;
+mod render;
+mod rig;
+mod specimen;
+
+use std::path::Path;
+
+use serde::Deserialize;
+
+pub use model::{Effects, Hysteresis, Model, SupportMotion};
+pub use render::{Codec, Distractor, Lens, Render};
+pub use rig::{MarkColour, Rig};
+pub use specimen::{Inertia, Link, Reflectivity, Specimen};
+
+use crate::error::{Error, Result};
+
+/// A whole experiment file. Every table is optional.
+#[derive(Debug, Clone, Default, PartialEq, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct Experiment {
+    /// What swings.
+    pub specimen: Specimen,
+    /// How it hangs and is seen.
+    pub rig: Rig,
+    /// Start values and settings of the forward model.
+    pub model: Model,
+    /// How a synthetic recording is made.
+    pub render: Render,
+}
+
+impl Experiment {
+    /// Reads and checks a file.
+    ///
+    /// # Errors
+    /// [`Error::Unreadable`], or [`Error::Config`] with the line and, for an unknown key, the nearest known one.
+    pub fn read(path: &Path) -> Result<Self> {
+        let text = std::fs::read_to_string(path).map_err(|e| Error::unreadable(path, e))?;
+        Self::parse(&text, path)
+    }
+
+    /// Parses the text of a file; `path` only appears in errors.
+    ///
+    /// # Errors
+    /// [`Error::Config`].
+    pub fn parse(text: &str, path: &Path) -> Result<Self> {
+        let experiment: Self = toml::from_str(text).map_err(|e| Error::Config {
+            path: path.to_owned(),
+            line: e.span().map(|s| text[..s.start.min(text.len())].matches('\n').count() + 1),
+            message: with_nearest_key(e.message()),
+        })?;
+        let invalid = |message: String| Error::Config { path: path.to_owned(), line: None, message };
+        experiment.specimen.validate().map_err(invalid)?;
+        experiment.rig.validate().map_err(invalid)?;
+        experiment.model.validate().map_err(invalid)?;
+        experiment.render.validate().map_err(invalid)?;
+        Ok(experiment)
+    }
+}
+
+/// Turns serde's "unknown field `a`, expected one of `b`, `c`" into a line that proposes the nearest key.
+fn with_nearest_key(message: &str) -> String {
+    let message = message.lines().next().unwrap_or_default();
+    let Some(rest) = message.strip_prefix("unknown field ") else {
+        return message.to_owned();
+    };
+    let names: Vec<&str> = rest.split('`').skip(1).step_by(2).collect();
+    let Some((unknown, known)) = names.split_first() else {
+        return message.to_owned();
+    };
+    let nearest = known.iter().map(|k| (strsim::jaro_winkler(unknown, k), k)).max_by(|a, b| a.0.total_cmp(&b.0));
+    match nearest {
+        Some((_, key)) => format!("unknown key `{unknown}`; the nearest known one is `{key}`"),
+        None => format!("unknown key `{unknown}`; this table takes no keys"),
+    }
+}
+
+/// `value` must be finite and positive.
+fn positive(key: &str, value: f64) -> std::result::Result<(), String> {
+    if value.is_finite() && value > 0.0 { Ok(()) } else { Err(format!("{key} = {value}: must be a positive number")) }
+}
+
+/// `value` must be finite and not negative.
+fn not_negative(key: &str, value: f64) -> std::result::Result<(), String> {
+    if value.is_finite() && value >= 0.0 {
+        Ok(())
+    } else {
+        Err(format!("{key} = {value}: must be zero or a positive number"))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn an_unknown_key_is_named_with_its_nearest_neighbour_and_line() {
+        let text = "[rig]\ngravity_m_s2 = 9.81\nmirored = true\n";
+        let error = Experiment::parse(text, Path::new("e.toml")).unwrap_err().to_string();
+        assert_eq!(error, "e.toml:3: unknown key `mirored`; the nearest known one is `mirrored`");
+    }
+
+    #[test]
+    fn the_documented_file_is_accepted() {
+        let text = r#"
+[specimen]
+name = "Kapton 1 mil"
+mass_kg = 0.3606e-3
+length_m = 0.20
+width_m = 0.05
+thickness_m = 25.4e-6
+density_kg_m3 = 1420
+young_modulus_pa = 2.5e9
+reflectivity = { specular = 0.60, diffuse = 0.26, absorbed = 0.14 }
+link_lengths_m = [0.10, 0.10]
+inertia = "rods"
+[rig]
+gravity_m_s2 = 9.80665
+mirrored = false
+pivot_px = [497.0, 508.0]
+marks = ["red", "red", "red"]
+[model]
+k_eq_n_m_per_rad = 2.0e-4
+c_eq_n_m_s_per_rad = 2.0e-6
+release_rad = [0.5, 0.6]
+[model.effects]
+hinge_coulomb = 1.0e-7
+"#;
+        let e = Experiment::parse(text, Path::new("e.toml")).unwrap();
+        assert_eq!(e.specimen.link_lengths_m, vec![0.1, 0.1]);
+        assert_eq!(e.rig.pivot_px, Some([497.0, 508.0]));
+        assert_eq!(e.model.effects.hinge_coulomb, Some(1.0e-7));
+    }
+
+    #[test]
+    fn a_mass_of_zero_is_refused() {
+        let error = Experiment::parse("[specimen]\nmass_kg = 0.0\n", Path::new("e.toml")).unwrap_err();
+        assert_eq!(error.to_string(), "e.toml: specimen.mass_kg = 0: must be a positive number");
+    }
+}

@@ -1,0 +1,104 @@
+//! `[model]`: start values and settings of the forward model.
+
+use serde::Deserialize;
+
+use super::not_negative;
+
+/// Bouc–Wen hysteresis of the joint.
+#[derive(Debug, Clone, Copy, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Hysteresis {
+    /// Largest hysteretic torque.
+    pub torque_n_m: f64,
+    /// Angle at which it yields.
+    pub yield_rad: f64,
+}
+
+/// Sinusoidal sideways motion of the pivot.
+#[derive(Debug, Clone, Copy, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct SupportMotion {
+    /// Amplitude.
+    pub amplitude_m: f64,
+    /// Frequency.
+    pub frequency_hz: f64,
+    /// Phase at t = 0.
+    #[serde(default)]
+    pub phase_rad: f64,
+}
+
+/// The physics beyond springs, dampers and gravity, by identifier. Absent means off.
+#[derive(Debug, Clone, Default, PartialEq, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct Effects {
+    /// −c θ̇₁ (N·m·s/rad).
+    pub hinge_viscous: Option<f64>,
+    /// −τ sgn θ̇₁ (N·m).
+    pub hinge_coulomb: Option<f64>,
+    /// −k θ₁ (N·m/rad).
+    pub hinge_stiffness: Option<f64>,
+    /// k₃ Δ³ (N·m/rad³).
+    pub joint_cubic_stiffness: Option<f64>,
+    /// Loss independent of frequency.
+    pub joint_hysteretic: Option<Hysteresis>,
+    /// The joint's spring rests at this angle (rad).
+    pub rest_curl: Option<f64>,
+    /// Force per length −c v_n (N·s/m²).
+    pub air_linear: Option<f64>,
+    /// Force per length −c |v_n| v_n (kg/m²).
+    pub air_quadratic: Option<f64>,
+    /// Inertia per length across the strip (kg/m).
+    pub added_mass: Option<f64>,
+    /// Steady sideways acceleration (m/s²).
+    pub side_force: Option<f64>,
+    /// Sideways motion of the pivot.
+    pub support_motion: Option<SupportMotion>,
+    /// Bending stiffness EI (N·m²) of a chain of many links.
+    pub distributed_flexibility: Option<f64>,
+    /// True time = (1+ε) × stated time (1).
+    pub time_base: Option<f64>,
+    /// Frames missing at one instant (s).
+    pub dropped_frames: Option<f64>,
+    /// Common offset of both angles (rad).
+    pub camera_tilt: Option<f64>,
+    /// Common gain of both angles (1).
+    pub angle_gain: Option<f64>,
+    /// θ₂ sampled later than θ₁ (s).
+    pub differential_lag: Option<f64>,
+}
+
+/// Start values and settings of the forward model.
+#[derive(Debug, Clone, PartialEq, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct Model {
+    /// Stiffness of the joint.
+    pub k_eq_n_m_per_rad: f64,
+    /// Damping of the joint.
+    pub c_eq_n_m_s_per_rad: f64,
+    /// Angles at release, at rest.
+    pub release_rad: Vec<f64>,
+    /// Physics beyond the base model.
+    pub effects: Effects,
+}
+
+impl Default for Model {
+    fn default() -> Self {
+        Self {
+            k_eq_n_m_per_rad: 2.0e-4,
+            c_eq_n_m_s_per_rad: 2.0e-6,
+            release_rad: vec![0.5, 0.6],
+            effects: Effects::default(),
+        }
+    }
+}
+
+impl Model {
+    pub(super) fn validate(&self) -> Result<(), String> {
+        not_negative("model.k_eq_n_m_per_rad", self.k_eq_n_m_per_rad)?;
+        not_negative("model.c_eq_n_m_s_per_rad", self.c_eq_n_m_s_per_rad)?;
+        if self.release_rad.is_empty() || self.release_rad.iter().any(|a| !a.is_finite()) {
+            return Err("model.release_rad: needs one finite angle a link".to_owned());
+        }
+        Ok(())
+    }
+}

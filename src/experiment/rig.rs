@@ -1,0 +1,114 @@
+//! `[rig]`: how the specimen hangs and is seen.
+
+use std::path::PathBuf;
+use std::str::FromStr;
+
+use serde::Deserialize;
+
+use super::positive;
+
+/// The colour of a mark: a name or `#rrggbb`.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct MarkColour {
+    /// As the user wrote it.
+    pub name: String,
+    /// Red, green, blue.
+    pub rgb: [u8; 3],
+}
+
+impl MarkColour {
+    const NAMES: [(&'static str, [u8; 3]); 8] = [
+        ("red", [255, 0, 0]),
+        ("green", [0, 160, 0]),
+        ("blue", [0, 0, 255]),
+        ("yellow", [255, 255, 0]),
+        ("orange", [255, 128, 0]),
+        ("magenta", [255, 0, 255]),
+        ("cyan", [0, 255, 255]),
+        ("violet", [128, 0, 255]),
+    ];
+
+    /// The paper's marks.
+    pub fn red() -> Self {
+        Self { name: "red".to_owned(), rgb: [255, 0, 0] }
+    }
+}
+
+impl FromStr for MarkColour {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        let lower = text.trim().to_ascii_lowercase();
+        if let Some((_, rgb)) = Self::NAMES.iter().find(|(name, _)| *name == lower) {
+            return Ok(Self { name: lower, rgb: *rgb });
+        }
+        let names = Self::NAMES.map(|(name, _)| name).join(", ");
+        let digits = lower
+            .strip_prefix('#')
+            .filter(|d| d.len() == 6 && d.bytes().all(|b| b.is_ascii_hexdigit()))
+            .ok_or_else(|| format!("unknown colour `{text}`; use {names} or #rrggbb"))?;
+        let channel = |i: usize| u8::from_str_radix(&digits[i..i + 2], 16).map_err(|e| e.to_string());
+        let rgb = [channel(0)?, channel(2)?, channel(4)?];
+        let spread = rgb.iter().max().copied().unwrap_or(0) - rgb.iter().min().copied().unwrap_or(0);
+        if spread < 32 {
+            return Err(format!("colour `{text}` is a grey; a mark is found by its hue, so give a coloured one"));
+        }
+        Ok(Self { name: lower, rgb })
+    }
+}
+
+impl<'de> Deserialize<'de> for MarkColour {
+    fn deserialize<D: serde::Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        String::deserialize(deserializer)?.parse().map_err(serde::de::Error::custom)
+    }
+}
+
+/// How the specimen hangs and is seen.
+#[derive(Debug, Clone, PartialEq, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct Rig {
+    /// Local gravity.
+    pub gravity_m_s2: f64,
+    /// The camera looks into a mirror.
+    pub mirrored: bool,
+    /// A fixed, unmarked hinge; then the first mark is the joint.
+    pub pivot_px: Option<[f64; 2]>,
+    /// One colour a mark, top to bottom.
+    pub marks: Vec<MarkColour>,
+    /// Two points on a plumb line, upper first: the picture's true vertical.
+    pub plumb_px: Option<[[f64; 2]; 2]>,
+    /// Width of a pixel over its height, where the file states it wrongly.
+    pub pixel_aspect: Option<f64>,
+    /// An OpenCV calibration file (`camera_matrix`, `distortion_coefficients`), relative to the experiment file.
+    pub lens_calibration: Option<PathBuf>,
+}
+
+impl Default for Rig {
+    fn default() -> Self {
+        Self {
+            gravity_m_s2: 9.80665,
+            mirrored: false,
+            pivot_px: None,
+            marks: Vec::new(),
+            plumb_px: None,
+            pixel_aspect: None,
+            lens_calibration: None,
+        }
+    }
+}
+
+impl Rig {
+    pub(super) fn validate(&self) -> Result<(), String> {
+        positive("rig.gravity_m_s2", self.gravity_m_s2)?;
+        self.pixel_aspect.map_or(Ok(()), |v| positive("rig.pixel_aspect", v))?;
+        if let Some([upper, lower]) = self.plumb_px
+            && !((upper[0] - lower[0]).hypot(upper[1] - lower[1]) >= 1.0)
+        {
+            return Err("rig.plumb_px: the two points must be at least a pixel apart".to_owned());
+        }
+        if self.pivot_px.is_some_and(|p| !p[0].is_finite() || !p[1].is_finite()) {
+            return Err("rig.pivot_px: must be two finite numbers".to_owned());
+        }
+        Ok(())
+    }
+}

@@ -1,0 +1,17 @@
+//! freeswing measures vibration from video.
+//!
+//! | stage | module | in → out |
+//! |---|---|---|
+//! | decode | [`video`] | file → frames with their own time stamps |
+//! | detect | `detect` | frame → blobs, centroids to a small fraction of a pixel |
+//! | track | `track` | blobs → one track a mark |
+//! | calibrate | `calibrate` | pixels, y down → metres, y up |
+//! | angles | `angles` | tracks → θ₁, θ₂ with standard deviations |
+//! | model | `model` | the forward model of the swing |
+//! | synth | `synth` | exact swings, rendered recordings with known truth |
+
+pub mod error;
+pub mod experiment;
+pub mod video;
+
+pub use error::{Error, Result};
