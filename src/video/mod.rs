@@ -1,7 +1,16 @@
-//! Frames with their time stamps.
+//! Frames with their time stamps: a container is split at key frames and decoded on all cores, in order.
 
-pub mod picture;
+mod container;
+mod decode;
+mod frame;
+mod orientation;
+mod picture;
+mod segments;
 
+pub use container::{Container, StreamInfo};
+pub use decode::{Decoded, DecoderRecipe, StreamDecoder, decode_in_order};
+pub use frame::Frame;
+pub use orientation::Orientation;
 pub use picture::{Layout, Matrix, OwnedPicture, Picture, Plane};
 
 /// Longest picture side that is measured.
