@@ -10,8 +10,10 @@
 //! | model | `model` | the forward model of the swing |
 //! | synth | `synth` | exact swings, rendered recordings with known truth |
 
+pub mod detect;
 pub mod error;
 pub mod experiment;
+pub mod track;
 pub mod video;
 
 pub use error::{Error, Result};

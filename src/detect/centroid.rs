@@ -1,0 +1,401 @@
+//! The centroid of a mark, to a small fraction of a pixel.
+//!
+//! The mask only says where to look. Around the mark's rough centre the picture is read in polar sectors. In each
+//! sector the ring outside the mark gives the background there (a strip, its edge, the dark chamber), the core
+//! gives the mark, and every pixel of the boundary band its share α of mark:
+//!
+//! ```text
+//! α = Σ_k w_k (F_k − B_k)(p_k − B_k) / Σ_k w_k (F_k − B_k)²,   w_k = 1/σ_k²,   k = luma, colour component
+//! centroid = Σ α x / Σ α,   α = 1 in the core, 0 beyond the band
+//! ```
+//! So luma is used where the mark differs in luma from what lies beside it, and the colour where it does not. The
+//! colour component is read at its own sites (chroma siting) and interpolated to luma pixels, a symmetric kernel
+//! that leaves the centroid where it is. The variance follows from that of α:
+//!
+//! ```text
+//! var x = Σ_band σ_α² (x − x̄)² / (Σ α)²,   σ_α² = 1 / Σ_k w_k (F_k − B_k)²
+//! ```
+
+use std::f64::consts::TAU;
+
+use super::component::HueAxis;
+use crate::video::Picture;
+
+/// A mark's rough place and shape, from the mask.
+#[derive(Debug, Clone)]
+pub struct Silhouette {
+    /// Mean of the mask, luma pixels.
+    pub centre_px: [f64; 2],
+    /// Masked samples as luma pixels, each sample with its half size.
+    pub points_px: Vec<[f64; 2]>,
+    /// Half a chroma sample, luma pixels.
+    pub half_sample_px: [f64; 2],
+}
+
+/// A mark, measured.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Centroid {
+    /// Stored pixels, centre of the top-left one at (0, 0).
+    pub x_px: f64,
+    /// Downwards.
+    pub y_px: f64,
+    /// Variances and covariance (xx, yy, xy), px².
+    pub variance_px2: [f64; 3],
+    /// Σ α: the area of the mark.
+    pub area_px2: f64,
+    /// The boundary band reaches over the picture's edge.
+    pub cut: bool,
+}
+
+/// Luma and component of the pixels around a mark, at luma resolution.
+struct Patch {
+    left: i64,
+    top: i64,
+    width: usize,
+    height: usize,
+    luma: Vec<f32>,
+    component: Vec<f32>,
+}
+
+/// What a sector holds.
+#[derive(Clone, Copy, Default)]
+struct Sector {
+    radius_px: f32,
+    background: [f32; 2],
+    known: bool,
+}
+
+/// Width of the ring from which the background is read.
+const RING_PX: f64 = 3.0;
+/// The narrowest half width of the boundary band: codecs and chroma interpolation soften every edge this much.
+const LEAST_BAND_PX: f64 = 3.0;
+/// Widest half width of the boundary band: motion blur.
+const MOST_BAND_PX: f64 = 14.0;
+/// Error of a coded sample at an edge, as a share of the edge's height.
+const EDGE_ERROR: f32 = 0.04;
+/// A luma sample's rounding error, 8-bit codes (1/√12), and a little more for the codec.
+const LEAST_NOISE: f32 = 0.5;
+/// Luma pixels that share one independent chroma error, as a variance factor (4 samples and interpolation).
+const COMPONENT_SHARING: f32 = 4.0;
+
+/// Measures the mark under `silhouette`. `None` where the mark has no contrast or fills the picture.
+pub fn measure(picture: &Picture<'_>, axis: HueAxis, silhouette: &Silhouette) -> Option<Centroid> {
+    let centre = silhouette.centre_px.map(f64::round);
+    let count = sector_count(silhouette);
+    let radii = sector_radii(silhouette, centre, count);
+    let reach = radii.iter().copied().fold(0.0, f64::max);
+    let band = band_half_width(picture, axis, silhouette, reach);
+    let patch = Patch::read(picture, axis, centre, reach + band + RING_PX + 1.0);
+    let polar = Polar { centre, band_px: band as f32, count };
+    let mut sectors: Vec<Sector> =
+        radii.iter().map(|r| Sector { radius_px: *r as f32, ..Sector::default() }).collect();
+    let (mark, noise) = polar.survey(&patch, &mut sectors)?;
+    polar.integrate(&patch, &sectors, mark, noise, picture)
+}
+
+fn sector_count(silhouette: &Silhouette) -> usize {
+    let area = silhouette.points_px.len() as f64 * 4.0 * silhouette.half_sample_px[0] * silhouette.half_sample_px[1];
+    let radius = (area / std::f64::consts::PI).sqrt();
+    // a sector is about two pixels wide at the ring
+    ((TAU * (radius + LEAST_BAND_PX + 1.0) / 2.0) as usize).clamp(16, 96)
+}
+
+/// Distance of the mask's boundary in each sector.
+fn sector_radii(silhouette: &Silhouette, centre: [f64; 2], count: usize) -> Vec<f64> {
+    let [hx, hy] = silhouette.half_sample_px;
+    let mut radii = vec![0.0f64; count];
+    for [x, y] in &silhouette.points_px {
+        for (dx, dy) in [(-hx, -hy), (hx, -hy), (-hx, hy), (hx, hy)] {
+            let (rx, ry) = (x + dx - centre[0], y + dy - centre[1]);
+            let sector = sector_of(rx, ry, count);
+            radii[sector] = radii[sector].max(rx.hypot(ry));
+        }
+    }
+    let mean = radii.iter().filter(|r| **r > 0.0).sum::<f64>() / radii.iter().filter(|r| **r > 0.0).count().max(1) as f64;
+    for r in &mut radii {
+        if *r == 0.0 {
+            *r = mean;
+        }
+    }
+    // corners of samples stick out by a quarter sample on the average; the neighbours smooth the staircase
+    let inward = 0.5 * (hx + hy) * 0.5;
+    (0..count)
+        .map(|s| {
+            let neighbours = [radii[(s + count - 1) % count], radii[s], radii[(s + 1) % count]];
+            (neighbours.iter().sum::<f64>() / 3.0 - inward).max(1.0)
+        })
+        .collect()
+}
+
+fn sector_of(dx: f64, dy: f64, count: usize) -> usize {
+    (((dy.atan2(dx) / TAU + 1.0) * count as f64) as usize) % count
+}
+
+/// Half width of the band in which the mark fades into its surroundings, from the mark's own profile.
+///
+/// Over the mask the component climbs from its threshold to its plateau; samples on the slope, against the length
+/// of the boundary, give the slope's width. Motion blur smears only across the motion, hence the factor.
+fn band_half_width(picture: &Picture<'_>, axis: HueAxis, silhouette: &Silhouette, reach: f64) -> f64 {
+    let mut levels: Vec<i16> = silhouette
+        .points_px
+        .iter()
+        .map(|p| {
+            let (x, y) = picture.layout.luma_to_chroma(p[0], p[1]);
+            axis.at(picture, x.round().max(0.0) as usize, y.round().max(0.0) as usize)
+        })
+        .collect();
+    levels.sort_unstable();
+    let plateau = f64::from(levels[levels.len() * 9 / 10]);
+    let on_slope = levels.iter().filter(|l| f64::from(**l) < 0.85 * plateau).count() as f64;
+    let sample_area = 4.0 * silhouette.half_sample_px[0] * silhouette.half_sample_px[1];
+    let slope_px = on_slope * sample_area / (TAU * reach.max(1.0));
+    (1.6 * slope_px + 1.2).clamp(LEAST_BAND_PX, MOST_BAND_PX)
+}
+
+impl Patch {
+    fn read(picture: &Picture<'_>, axis: HueAxis, centre: [f64; 2], reach_px: f64) -> Self {
+        let layout = picture.layout;
+        let reach = reach_px.ceil() as i64;
+        let (cx, cy) = (centre[0] as i64, centre[1] as i64);
+        let clamp = |v: i64, size: usize| v.clamp(0, size as i64);
+        let (left, right) = (clamp(cx - reach, layout.width_px), clamp(cx + reach + 1, layout.width_px));
+        let (top, bottom) = (clamp(cy - reach, layout.height_px), clamp(cy + reach + 1, layout.height_px));
+        let (width, height) = ((right - left).max(0) as usize, (bottom - top).max(0) as usize);
+        let mut patch =
+            Self { left, top, width, height, luma: Vec::new(), component: Vec::with_capacity(width * height) };
+        patch.read_luma(picture);
+        patch.read_component(picture, axis);
+        patch
+    }
+
+    fn read_luma(&mut self, picture: &Picture<'_>) {
+        let wide = picture.wide();
+        let scale = 1.0 / f32::from(1u16 << (picture.layout.bits - 8)) / f32::from(1u16 << picture.layout.low_bits);
+        for y in self.top as usize..self.top as usize + self.height {
+            for x in self.left as usize..self.left as usize + self.width {
+                self.luma.push(f32::from(picture.luma.code(wide, x, y)) * scale);
+            }
+        }
+    }
+
+    /// The projection on the hue (8-bit codes), interpolated between the chroma sites.
+    fn read_component(&mut self, picture: &Picture<'_>, axis: HueAxis) {
+        let layout = picture.layout;
+        let (u, v) = axis.unit();
+        let (u, v) = (u as f32, v as f32);
+        let (cw, ch) = layout.chroma_size();
+        let scale = 1.0 / f32::from(1u16 << (layout.bits - 8)) / f32::from(1u16 << layout.low_bits);
+        let (x0, y0) = layout.luma_to_chroma(self.left as f64, self.top as f64);
+        let (x1, y1) = layout
+            .luma_to_chroma((self.left as usize + self.width) as f64, (self.top as usize + self.height) as f64);
+        let first = |v: f64| v.floor().max(0.0) as usize;
+        let (cx0, cy0) = (first(x0), first(y0));
+        let (cx1, cy1) = ((first(x1) + 2).min(cw), (first(y1) + 2).min(ch));
+        let columns = cx1.saturating_sub(cx0);
+        let mut coarse = Vec::with_capacity(columns * cy1.saturating_sub(cy0));
+        for y in cy0..cy1 {
+            for x in cx0..cx1 {
+                let b = f32::from(picture.cb.code(picture.wide(), x, y)) * scale - 128.0;
+                let r = f32::from(picture.cr.code(picture.wide(), x, y)) * scale - 128.0;
+                coarse.push(u * b + v * r);
+            }
+        }
+        let taps = |at: f64, from: usize, to: usize| {
+            let at = at.clamp(from as f64, (to - 1) as f64);
+            let i = (at as usize).min(to.saturating_sub(2).max(from));
+            (i - from, (i + 1).min(to - 1) - from, (at - i as f64) as f32)
+        };
+        let across: Vec<_> = (0..self.width)
+            .map(|i| taps(layout.luma_to_chroma((self.left as usize + i) as f64, 0.0).0, cx0, cx1))
+            .collect();
+        for j in 0..self.height {
+            let (a, b, t) = taps(layout.luma_to_chroma(0.0, (self.top as usize + j) as f64).1, cy0, cy1);
+            let (upper, lower) = (&coarse[a * columns..(a + 1) * columns], &coarse[b * columns..(b + 1) * columns]);
+            for &(l, r, s) in &across {
+                let up = upper[l] + s * (upper[r] - upper[l]);
+                let down = lower[l] + s * (lower[r] - lower[l]);
+                self.component.push(up + t * (down - up));
+            }
+        }
+    }
+}
+
+/// The sectors' common frame.
+struct Polar {
+    centre: [f64; 2],
+    band_px: f32,
+    count: usize,
+}
+
+impl Polar {
+    /// Visits every pixel of the patch with its index, offset from the centre, distance and sector.
+    fn visit(&self, patch: &Patch, mut f: impl FnMut(usize, f32, f32, f32, usize)) {
+        let turn = self.count as f32 / std::f32::consts::TAU;
+        for j in 0..patch.height {
+            let dy = (patch.top + j as i64) as f32 - self.centre[1] as f32;
+            for i in 0..patch.width {
+                let dx = (patch.left + i as i64) as f32 - self.centre[0] as f32;
+                let angle = fast_atan2(dy, dx);
+                let sector = ((angle * turn) as usize).min(self.count - 1);
+                f(j * patch.width + i, dx, dy, (dx * dx + dy * dy).sqrt(), sector);
+            }
+        }
+    }
+
+    /// Reads the background of every sector, the mark's own levels and the noise.
+    fn survey(&self, patch: &Patch, sectors: &mut [Sector]) -> Option<([f32; 2], [f32; 2])> {
+        let mut rings: Vec<[Vec<f32>; 2]> = vec![[Vec::with_capacity(12), Vec::with_capacity(12)]; self.count];
+        let mut core: [Vec<f32>; 2] = [Vec::new(), Vec::new()];
+        let mut deepest = (f32::MAX, [0.0; 2]);
+        self.visit(patch, |at, _, _, distance, sector| {
+            let depth = distance - sectors[sector].radius_px;
+            let levels = [patch.luma[at], patch.component[at]];
+            if depth > self.band_px && depth <= self.band_px + RING_PX as f32 {
+                for (ring, level) in rings[sector].iter_mut().zip(levels) {
+                    ring.push(level);
+                }
+            } else if depth < -self.band_px {
+                for (c, level) in core.iter_mut().zip(levels) {
+                    c.push(level);
+                }
+            }
+            if depth < deepest.0 {
+                deepest = (depth, levels);
+            }
+        });
+        // a mark narrower than its band has no core: its deepest pixel stands for it
+        let mark = if core[0].len() >= 4 { [median(&mut core[0]), median(&mut core[1])] } else { deepest.1 };
+        let mut residuals: [Vec<f32>; 2] = [Vec::new(), Vec::new()];
+        for (sector, ring) in sectors.iter_mut().zip(&mut rings) {
+            if ring[0].len() >= 3 {
+                sector.known = true;
+                for k in 0..2 {
+                    sector.background[k] = median(&mut ring[k]);
+                    residuals[k].extend(ring[k].iter().map(|v| (v - sector.background[k]).abs()));
+                }
+            }
+        }
+        fill_unknown(sectors)?;
+        // 1.4826 × median absolute deviation; the sector medians take up a third of it
+        let noise = residuals.map(|mut r| (1.4826 * 1.2 * median(&mut r)).max(LEAST_NOISE));
+        Some((mark, noise))
+    }
+
+    fn integrate(
+        &self,
+        patch: &Patch,
+        sectors: &[Sector],
+        mark: [f32; 2],
+        noise: [f32; 2],
+        picture: &Picture<'_>,
+    ) -> Option<Centroid> {
+        let weights: Vec<[f32; 3]> = sectors.iter().map(|s| share_weights(mark, s.background, noise)).collect();
+        if weights.iter().all(|w| !w[2].is_finite()) {
+            return None;
+        }
+        let (mut area, mut mx, mut my) = (0.0f64, 0.0f64, 0.0f64);
+        let mut spread = [0.0f64; 6];
+        let mut cut = false;
+        let (right, bottom) = (picture.layout.width_px as i64 - 1, picture.layout.height_px as i64 - 1);
+        self.visit(patch, |at, dx, dy, distance, sector| {
+            let depth = distance - sectors[sector].radius_px;
+            if depth > self.band_px {
+                return;
+            }
+            let (column, row) = (patch.left + (at % patch.width) as i64, patch.top + (at / patch.width) as i64);
+            cut |= column == 0 || row == 0 || column == right || row == bottom;
+            let (x, y) = (f64::from(dx), f64::from(dy));
+            let mut share = 1.0;
+            if depth >= -self.band_px {
+                let [w_luma, w_component, variance] = weights[sector];
+                let background = sectors[sector].background;
+                share = f64::from(
+                    w_luma * (patch.luma[at] - background[0]) + w_component * (patch.component[at] - background[1]),
+                );
+                let v = f64::from(variance);
+                for (sum, term) in spread.iter_mut().zip([1.0, x, y, x * x, y * y, x * y]) {
+                    *sum += v * term;
+                }
+            }
+            area += share;
+            mx += share * x;
+            my += share * y;
+        });
+        if !(area >= 1.0) {
+            return None;
+        }
+        let (x, y) = (mx / area, my / area);
+        let [s, sx, sy, sxx, syy, sxy] = spread;
+        let per_area = 1.0 / (area * area);
+        let variance_px2 = [
+            (sxx - 2.0 * x * sx + x * x * s) * per_area,
+            (syy - 2.0 * y * sy + y * y * s) * per_area,
+            (sxy - x * sy - y * sx + x * y * s) * per_area,
+        ];
+        let centroid = Centroid {
+            x_px: self.centre[0] + x,
+            y_px: self.centre[1] + y,
+            variance_px2,
+            area_px2: area,
+            cut,
+        };
+        (x.abs() < patch.width as f64 && y.abs() < patch.height as f64 && variance_px2[0].is_finite())
+            .then_some(centroid)
+    }
+}
+
+/// Factors of (luma − background) and (component − background) that sum to the share of mark, and its variance.
+fn share_weights(mark: [f32; 2], background: [f32; 2], noise: [f32; 2]) -> [f32; 3] {
+    let contrast = [mark[0] - background[0], mark[1] - background[1]];
+    let sharing = [1.0, COMPONENT_SHARING];
+    let weight: Vec<f32> = (0..2)
+        .map(|k| 1.0 / ((noise[k] * noise[k] + (EDGE_ERROR * contrast[k]).powi(2)) * sharing[k]))
+        .collect();
+    let information = weight[0] * contrast[0] * contrast[0] + weight[1] * contrast[1] * contrast[1];
+    if information <= 1e-6 {
+        return [0.0, 0.0, f32::INFINITY];
+    }
+    [weight[0] * contrast[0] / information, weight[1] * contrast[1] / information, 1.0 / information]
+}
+
+/// Sectors whose ring lies outside the picture take their neighbours' background.
+fn fill_unknown(sectors: &mut [Sector]) -> Option<()> {
+    let known: Vec<usize> = (0..sectors.len()).filter(|i| sectors[*i].known).collect();
+    if known.len() * 3 < sectors.len() {
+        return None;
+    }
+    let n = sectors.len();
+    for i in 0..n {
+        if !sectors[i].known {
+            let around = |k: &usize| (*k + n - i) % n;
+            let distance = |k: &usize| around(k).min(n - around(k));
+            let nearest = known.iter().min_by_key(|k| distance(k))?;
+            sectors[i].background = sectors[*nearest].background;
+        }
+    }
+    Some(())
+}
+
+fn median(values: &mut [f32]) -> f32 {
+    if values.is_empty() {
+        return 0.0;
+    }
+    let middle = values.len() / 2;
+    let (below, m, _) = values.select_nth_unstable_by(middle, f32::total_cmp);
+    let m = *m;
+    if below.len() == middle && values.len() % 2 == 0 {
+        let under = values[..middle].iter().copied().fold(f32::MIN, f32::max);
+        return 0.5 * (m + under);
+    }
+    m
+}
+
+/// Angle in 0..2π to 0.005 rad, enough to name a sector.
+fn fast_atan2(y: f32, x: f32) -> f32 {
+    let (ax, ay) = (x.abs(), y.abs());
+    let t = ax.min(ay) / ax.max(ay).max(1e-12);
+    let a = t * (0.785_398_2 + 0.273 * (1.0 - t));
+    let octant = if ay > ax { std::f32::consts::FRAC_PI_2 - a } else { a };
+    let half = if x < 0.0 { std::f32::consts::PI - octant } else { octant };
+    if y < 0.0 { std::f32::consts::TAU - half } else { half }
+}
