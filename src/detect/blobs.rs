@@ -1,6 +1,6 @@
 //! Frame → blobs: the scan for the hue, the binary mask, its connected regions.
 
-use opencv::core::{CV_8U, CV_32S, Mat, MatTraitConst, Point, Rect};
+use opencv::core::{CV_8U, CV_32S, Mat, MatTraitConst, MatTraitConstManual, Point, Rect};
 use opencv::imgproc;
 
 use super::centroid::{self, Centroid, Silhouette};
@@ -26,22 +26,30 @@ const BLOCK_ROWS: usize = 16;
 /// Only every second chroma row is scanned: a mark is taller than that.
 const SCAN_STEP: usize = 2;
 
-/// Finds and measures the blobs of one hue above `threshold` (64ths of a code).
-pub fn find(
-    picture: &Picture<'_>,
-    hue: u8,
-    axis: HueAxis,
-    threshold: i16,
-    least_samples: u32,
-    blobs: &mut Vec<Blob>,
-) -> Result<()> {
-    for region in regions(picture, axis, threshold) {
-        let mask = Mask::of(picture, axis, threshold, region);
-        for silhouette in mask.silhouettes(picture, least_samples)? {
+/// What is looked for.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Target {
+    /// Index of the hue.
+    pub hue: u8,
+    /// Its direction.
+    pub axis: HueAxis,
+    /// Least component, 64ths of a code.
+    pub threshold: i16,
+    /// Marks are so small that lines cannot be told from them.
+    pub thin: bool,
+    /// Least number of samples.
+    pub least_samples: u32,
+}
+
+/// Finds and measures the blobs of one hue.
+pub(super) fn find(picture: &Picture<'_>, target: &Target, blobs: &mut Vec<Blob>) -> Result<()> {
+    for region in regions(picture, target.axis, target.threshold) {
+        let mask = Mask::of(picture, target.axis, target.threshold, target.thin, region)?;
+        for silhouette in mask.silhouettes(picture, target.least_samples)? {
             let samples = silhouette.points_px.len() as u32;
             let binary_px = silhouette.centre_px;
-            if let Some(centroid) = centroid::measure(picture, axis, &silhouette) {
-                blobs.push(Blob { hue, centroid, binary_px, samples });
+            if let Some(centroid) = centroid::measure(picture, target.axis, &silhouette) {
+                blobs.push(Blob { hue: target.hue, centroid, binary_px, samples });
             }
         }
     }
@@ -110,8 +118,9 @@ pub(super) struct Mask {
 }
 
 impl Mask {
-    /// Smooths the component over a plus of five samples against camera noise, then compares.
-    pub(super) fn of(picture: &Picture<'_>, axis: HueAxis, threshold: i16, region: Region) -> Self {
+    /// Smooths the component over a plus of five samples against camera noise, compares, and mends the outline:
+    /// opening takes away lines of up to two samples (burnt-in graphics), closing heals a mark that one crosses.
+    pub(super) fn of(picture: &Picture<'_>, axis: HueAxis, threshold: i16, thin: bool, region: Region) -> Result<Self> {
         let (width, height) = (region.right - region.left, region.bottom - region.top);
         let mut component = Vec::with_capacity(width * height);
         for y in region.top..region.bottom {
@@ -127,7 +136,29 @@ impl Mask {
                 bytes[y * width + x] = if smooth > 8 * i32::from(threshold) { 255 } else { 0 };
             }
         }
-        Self { region, bytes }
+        let mut mask = Self { region, bytes };
+        if !thin {
+            mask.mend().map_err(Error::opencv("mending the binary picture"))?;
+        }
+        Ok(mask)
+    }
+
+    fn mend(&mut self) -> opencv::Result<()> {
+        let anchor = Point::new(-1, -1);
+        let kernel = imgproc::get_structuring_element(imgproc::MORPH_RECT, opencv::core::Size::new(3, 3), anchor)?;
+        let border = imgproc::morphology_default_border_value()?;
+        let (rows, columns) = self.size();
+        let mask = Mat::new_rows_cols_with_data(rows, columns, &self.bytes)?;
+        let (mut opened, mut closed) = (Mat::default(), Mat::default());
+        let constant = opencv::core::BORDER_CONSTANT;
+        imgproc::morphology_ex(&mask, &mut opened, imgproc::MORPH_OPEN, &kernel, anchor, 1, constant, border)?;
+        imgproc::morphology_ex(&opened, &mut closed, imgproc::MORPH_CLOSE, &kernel, anchor, 2, constant, border)?;
+        self.bytes = closed.data_bytes()?.to_vec();
+        Ok(())
+    }
+
+    fn size(&self) -> (i32, i32) {
+        ((self.region.bottom - self.region.top) as i32, (self.region.right - self.region.left) as i32)
     }
 
     /// The mask, row by row, 255 inside.
@@ -144,9 +175,8 @@ impl Mask {
     /// The connected regions (8 neighbours) of at least `least_samples` samples.
     fn silhouettes(&self, picture: &Picture<'_>, least_samples: u32) -> Result<Vec<Silhouette>> {
         let failed = |e| Error::opencv("labelling the binary picture")(e);
-        let rows = (self.region.bottom - self.region.top) as i32;
-        let mask = Mat::new_rows_cols_with_data(rows, (self.region.right - self.region.left) as i32, &self.bytes)
-            .map_err(failed)?;
+        let (rows, columns) = self.size();
+        let mask = Mat::new_rows_cols_with_data(rows, columns, &self.bytes).map_err(failed)?;
         debug_assert_eq!(mask.typ(), CV_8U);
         let (mut labels, mut stats, mut centroids) = (Mat::default(), Mat::default(), Mat::default());
         let count = imgproc::connected_components_with_stats(&mask, &mut labels, &mut stats, &mut centroids, 8, CV_32S)

@@ -87,8 +87,7 @@ pub fn measure(picture: &Picture<'_>, axis: HueAxis, silhouette: &Silhouette) ->
     let band = band_half_width(picture, axis, silhouette, reach);
     let patch = Patch::read(picture, axis, centre, reach + band + RING_PX + 1.0);
     let polar = Polar { centre, band_px: band as f32, count };
-    let mut sectors: Vec<Sector> =
-        radii.iter().map(|r| Sector { radius_px: *r as f32, ..Sector::default() }).collect();
+    let mut sectors: Vec<Sector> = radii.iter().map(|r| Sector { radius_px: *r as f32, ..Sector::default() }).collect();
     let (mark, noise) = polar.survey(&patch, &mut sectors)?;
     polar.integrate(&patch, &sectors, mark, noise, picture)
 }
@@ -111,7 +110,8 @@ fn sector_radii(silhouette: &Silhouette, centre: [f64; 2], count: usize) -> Vec<
             radii[sector] = radii[sector].max(rx.hypot(ry));
         }
     }
-    let mean = radii.iter().filter(|r| **r > 0.0).sum::<f64>() / radii.iter().filter(|r| **r > 0.0).count().max(1) as f64;
+    let mean =
+        radii.iter().filter(|r| **r > 0.0).sum::<f64>() / radii.iter().filter(|r| **r > 0.0).count().max(1) as f64;
     for r in &mut radii {
         if *r == 0.0 {
             *r = mean;
@@ -186,8 +186,8 @@ impl Patch {
         let (cw, ch) = layout.chroma_size();
         let scale = 1.0 / f32::from(1u16 << (layout.bits - 8)) / f32::from(1u16 << layout.low_bits);
         let (x0, y0) = layout.luma_to_chroma(self.left as f64, self.top as f64);
-        let (x1, y1) = layout
-            .luma_to_chroma((self.left as usize + self.width) as f64, (self.top as usize + self.height) as f64);
+        let (x1, y1) =
+            layout.luma_to_chroma((self.left as usize + self.width) as f64, (self.top as usize + self.height) as f64);
         let first = |v: f64| v.floor().max(0.0) as usize;
         let (cx0, cy0) = (first(x0), first(y0));
         let (cx1, cy1) = ((first(x1) + 2).min(cw), (first(y1) + 2).min(ch));
@@ -332,13 +332,8 @@ impl Polar {
             (syy - 2.0 * y * sy + y * y * s) * per_area,
             (sxy - x * sy - y * sx + x * y * s) * per_area,
         ];
-        let centroid = Centroid {
-            x_px: self.centre[0] + x,
-            y_px: self.centre[1] + y,
-            variance_px2,
-            area_px2: area,
-            cut,
-        };
+        let centroid =
+            Centroid { x_px: self.centre[0] + x, y_px: self.centre[1] + y, variance_px2, area_px2: area, cut };
         (x.abs() < patch.width as f64 && y.abs() < patch.height as f64 && variance_px2[0].is_finite())
             .then_some(centroid)
     }
@@ -348,9 +343,8 @@ impl Polar {
 fn share_weights(mark: [f32; 2], background: [f32; 2], noise: [f32; 2]) -> [f32; 3] {
     let contrast = [mark[0] - background[0], mark[1] - background[1]];
     let sharing = [1.0, COMPONENT_SHARING];
-    let weight: Vec<f32> = (0..2)
-        .map(|k| 1.0 / ((noise[k] * noise[k] + (EDGE_ERROR * contrast[k]).powi(2)) * sharing[k]))
-        .collect();
+    let weight: Vec<f32> =
+        (0..2).map(|k| 1.0 / ((noise[k] * noise[k] + (EDGE_ERROR * contrast[k]).powi(2)) * sharing[k])).collect();
     let information = weight[0] * contrast[0] * contrast[0] + weight[1] * contrast[1] * contrast[1];
     if information <= 1e-6 {
         return [0.0, 0.0, f32::INFINITY];

@@ -10,6 +10,7 @@ pub use blobs::Blob;
 pub use centroid::Centroid;
 pub use threshold::LEAST_COMPONENT;
 
+use blobs::Target;
 use component::{HueAxis, from_255};
 
 use crate::error::Result;
@@ -25,6 +26,8 @@ pub struct Hue {
     pub marks: usize,
     /// Least component of a mark, on the scale to 255.
     pub threshold: f64,
+    /// The marks are a few samples wide, so lines are not filtered out.
+    pub thin: bool,
 }
 
 /// Finds marks in pictures.
@@ -55,43 +58,57 @@ impl Detector {
     pub fn detect(&self, picture: &Picture<'_>) -> Result<Vec<Blob>> {
         let mut blobs = Vec::new();
         for (index, hue) in self.hues.iter().enumerate() {
-            let axis = HueAxis::new(&hue.colour, picture.layout.matrix);
-            let least = least_samples(picture, self.least_area_px2) as u32;
-            blobs::find(picture, index as u8, axis, from_255(hue.threshold), least, &mut blobs)?;
+            let target = Target {
+                hue: index as u8,
+                axis: HueAxis::new(&hue.colour, picture.layout.matrix),
+                threshold: from_255(hue.threshold),
+                thin: hue.thin,
+                least_samples: least_samples(picture, self.least_area_px2) as u32,
+            };
+            blobs::find(picture, &target, &mut blobs)?;
         }
         Ok(blobs)
     }
 }
 
-/// Thresholds chosen from pictures of the recording, one a hue.
+/// Thresholds chosen from pictures of the recording.
 #[derive(Debug, Clone, Default)]
 pub struct Calibration {
-    /// For each hue, for each picture.
-    summits: Vec<Vec<Vec<threshold::Summit>>>,
+    /// For each hue, for each picture: summits without thin lines, and with them.
+    summits: Vec<[Vec<Vec<threshold::Summit>>; 2]>,
 }
 
 impl Calibration {
     /// For `hues` hues.
     pub fn new(hues: usize) -> Self {
-        Self { summits: vec![Vec::new(); hues] }
+        Self { summits: vec![[Vec::new(), Vec::new()]; hues] }
     }
 
     /// Learns from a picture.
     pub fn see(&mut self, picture: &Picture<'_>, colours: &[MarkColour]) {
         let least = least_samples(picture, LEAST_AREA_PX2);
         for (seen, colour) in self.summits.iter_mut().zip(colours) {
-            seen.push(threshold::summits(picture, HueAxis::new(colour, picture.layout.matrix), least));
+            let mut relief = threshold::Relief::new(picture, HueAxis::new(colour, picture.layout.matrix));
+            seen[1].push(relief.summits(least));
+            relief.open();
+            seen[0].push(relief.summits(least));
         }
     }
 
-    /// The threshold of hue `index` with `marks` marks, on the scale to 255; `None` where nothing has that hue.
-    pub fn threshold(&self, index: usize, marks: usize) -> Option<f64> {
-        threshold::choose(self.summits.get(index)?, marks)
+    /// The threshold of hue `index` with `marks` marks, on the scale to 255, and whether the marks are thin; `None`
+    /// where nothing has that hue.
+    pub fn threshold(&self, index: usize, marks: usize) -> Option<(f64, bool)> {
+        let [opened, raw] = self.summits.get(index)?;
+        match threshold::choose(opened, marks) {
+            Some(threshold) => Some((threshold, false)),
+            None => threshold::choose(raw, marks).map(|t| (t, true)),
+        }
     }
 
     /// The strongest component of hue `index` in any picture, on the scale to 255.
     pub fn strongest(&self, index: usize) -> f64 {
-        self.summits.get(index).into_iter().flatten().flatten().map(|s| s.top).fold(0.0, f64::max)
+        let raw = self.summits.get(index).map(|s| &s[1]);
+        raw.into_iter().flatten().flatten().map(|s| s.top).fold(0.0, f64::max)
     }
 }
 

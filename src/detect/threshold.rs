@@ -33,49 +33,86 @@ impl Summit {
     }
 }
 
-/// The summits of a picture with at least `least_samples` samples, most persistent first.
-pub fn summits(picture: &Picture<'_>, axis: HueAxis, least_samples: usize) -> Vec<Summit> {
-    let (width, height) = picture.layout.chroma_size();
-    let floor = from_255(LEAST_COMPONENT);
-    let mut order: Vec<(i16, u32)> = Vec::new();
-    for y in 0..height {
-        for x in 0..width {
-            let c = axis.at(picture, x, y);
-            if c > floor {
-                order.push((c, (y * width + x) as u32));
+/// The colour component as a landscape over the chroma samples.
+pub struct Relief {
+    width: usize,
+    heights: Vec<i16>,
+}
+
+impl Relief {
+    /// Of a picture.
+    pub fn new(picture: &Picture<'_>, axis: HueAxis) -> Self {
+        let (width, height) = picture.layout.chroma_size();
+        let heights = (0..height).flat_map(|y| (0..width).map(move |x| axis.at(picture, x, y))).collect();
+        Self { width, heights }
+    }
+
+    /// Grey opening over 3×3 samples: ridges of up to two samples, such as burnt-in lines, are worn away.
+    pub fn open(&mut self) {
+        self.slide(i16::min);
+        self.slide(i16::max);
+    }
+
+    /// Replaces every height by the extreme of its 3×3 neighbourhood.
+    fn slide(&mut self, extreme: fn(i16, i16) -> i16) {
+        let width = self.width;
+        let across: Vec<i16> = self
+            .heights
+            .chunks(width)
+            .flat_map(|row| {
+                (0..width).map(move |x| {
+                    let sides = (row[x.saturating_sub(1)], row[(x + 1).min(width - 1)]);
+                    extreme(row[x], extreme(sides.0, sides.1))
+                })
+            })
+            .collect();
+        let rows = across.len() / width;
+        for y in 0..rows {
+            let (above, below) = (y.saturating_sub(1) * width, (y + 1).min(rows - 1) * width);
+            for x in 0..width {
+                self.heights[y * width + x] =
+                    extreme(across[y * width + x], extreme(across[above + x], across[below + x]));
             }
         }
     }
-    order.sort_unstable_by(|a, b| b.cmp(a));
-    let mut forest = Forest::new(width * height);
-    let mut found = Vec::new();
-    for &(level, at) in &order {
-        forest.add(at, level);
-        let (x, y) = (at as usize % width, at as usize / width);
-        let neighbours = [
-            (x > 0).then(|| at - 1),
-            (x + 1 < width).then(|| at + 1),
-            (y > 0).then(|| at - width as u32),
-            (y + 1 < height).then(|| at + width as u32),
-        ];
-        for neighbour in neighbours.into_iter().flatten() {
-            if let Some((top, samples)) = forest.join(at, neighbour) {
-                found.push((top, level, samples));
+
+    /// The summits with at least `least_samples` samples, most persistent first.
+    pub fn summits(&self, least_samples: usize) -> Vec<Summit> {
+        let (width, height) = (self.width, self.heights.len() / self.width);
+        let floor = from_255(LEAST_COMPONENT);
+        let mut order: Vec<(i16, u32)> =
+            self.heights.iter().enumerate().filter(|(_, h)| **h > floor).map(|(i, h)| (*h, i as u32)).collect();
+        order.sort_unstable_by(|a, b| b.cmp(a));
+        let mut forest = Forest::new(width * height);
+        let mut found = Vec::new();
+        for &(level, at) in &order {
+            forest.add(at, level);
+            let (x, y) = (at as usize % width, at as usize / width);
+            let neighbours = [
+                (x > 0).then(|| at - 1),
+                (x + 1 < width).then(|| at + 1),
+                (y > 0).then(|| at - width as u32),
+                (y + 1 < height).then(|| at + width as u32),
+            ];
+            for neighbour in neighbours.into_iter().flatten() {
+                if let Some((top, samples)) = forest.join(at, neighbour) {
+                    found.push((top, level, samples));
+                }
             }
         }
+        found.extend(forest.survivors().map(|(top, samples)| (top, floor, samples)));
+        let mut summits: Vec<Summit> = found
+            .into_iter()
+            .filter(|(_, _, samples)| *samples >= least_samples)
+            .map(|(top, saddle, samples)| Summit {
+                top: to_255(f64::from(top)),
+                saddle: to_255(f64::from(saddle)),
+                samples,
+            })
+            .collect();
+        summits.sort_by(|a, b| b.persistence().total_cmp(&a.persistence()));
+        summits
     }
-    found.extend(forest.survivors().map(|(top, samples)| (top, floor, samples)));
-    let mut summits: Vec<Summit> = found
-        .into_iter()
-        .filter(|(_, _, samples)| *samples >= least_samples)
-        .map(|(top, saddle, samples)| Summit {
-            top: to_255(f64::from(top)),
-            saddle: to_255(f64::from(saddle)),
-            samples,
-        })
-        .collect();
-    summits.sort_by(|a, b| b.persistence().total_cmp(&a.persistence()));
-    summits
 }
 
 /// The threshold, on the scale to 255, for `marks` marks of this hue seen in several pictures; `None` where no

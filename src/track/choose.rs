@@ -134,8 +134,7 @@ fn score(kept: &[Candidate], assignment: &[Option<usize>]) -> f64 {
     let presence: f64 = chosen.iter().map(|c| c.presence).sum();
     let stretch = chosen.windows(2).map(|w| length_spread(w[0], w[1])).fold(0.0, f64::max);
     let mean = chosen.iter().map(|c| c.ln_area).sum::<f64>() / chosen.len().max(1) as f64;
-    let unlike =
-        (chosen.iter().map(|c| (c.ln_area - mean).powi(2)).sum::<f64>() / chosen.len().max(1) as f64).sqrt();
+    let unlike = (chosen.iter().map(|c| (c.ln_area - mean).powi(2)).sum::<f64>() / chosen.len().max(1) as f64).sqrt();
     presence - 3.0 * stretch - 0.5 * unlike
 }
 

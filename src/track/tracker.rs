@@ -51,7 +51,8 @@ const LONGEST_WINDOW: usize = 4096;
 const GATE: f64 = 25.0;
 /// What it costs to leave a newcomer that is no mark unseen.
 const YOUNG_MISS: f64 = 6.0;
-/// Frames after which something that is no mark counts as furniture.
+/// Frames beside all marks of its hue after which something that is no mark counts as furniture. Beside them, for a
+/// newcomer that appears while a mark is missed may be that mark.
 const YOUNG_FRAMES: u32 = 30;
 /// Seconds after which something that is no mark is forgotten.
 const FORGET_S: f64 = 2.0;
@@ -115,7 +116,6 @@ impl Follower {
         }
         self.area_px2 += 0.05 * (f64::from(sighting.measured.area_px2) - self.area_px2);
         self.seen_s = self.t_s;
-        self.age += 1;
     }
 }
 
@@ -234,11 +234,14 @@ impl Tracker {
         rows.extend(self.others.iter_mut());
         let assigned = assign_frame(&mut rows, marks.len(), sightings, frame.t_s);
         let ambiguous = ambiguous_rows(&rows[..marks.len()], sightings, &assigned.before, &assigned.columns);
+        let missed: Vec<u8> =
+            (0..marks.len()).filter(|r| assigned.columns[*r].is_none()).map(|r| rows[r].hue).collect();
         let mut taken = vec![false; sightings.len()];
         for (row, column) in assigned.columns.iter().enumerate() {
             if let Some(column) = column {
                 taken[*column] = true;
                 rows[row].update(&sightings[*column]);
+                rows[row].age += u32::from(!missed.contains(&rows[row].hue));
             }
         }
         for points in &mut self.points {

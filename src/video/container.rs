@@ -17,6 +17,8 @@ pub struct StreamInfo {
     pub stream: usize,
     /// Streams of all kinds in the file.
     pub streams: usize,
+    /// Video streams beside the measured one, cover pictures apart.
+    pub other_videos: usize,
     /// Short name of the container format.
     pub container: String,
     /// Name of the codec.
@@ -67,10 +69,10 @@ impl Container {
         let mut url = std::ffi::OsString::from("file:");
         url.push(path);
         let input = ffmpeg::format::input(&url).map_err(|e| not_a_video(path, &e))?;
-        let stream = input.streams().best(media::Type::Video).ok_or_else(|| Error::NoVideoStream {
-            path: path.to_owned(),
-            found: describe_streams(&input),
-        })?;
+        let stream = input
+            .streams()
+            .best(media::Type::Video)
+            .ok_or_else(|| Error::NoVideoStream { path: path.to_owned(), found: describe_streams(&input) })?;
         let parameters = owned_parameters(&stream).map_err(|e| not_a_video(path, &e))?;
         let codec = parameters.id();
         if ffmpeg::decoder::find(codec).is_none() {
@@ -84,6 +86,7 @@ impl Container {
         let info = StreamInfo {
             stream: stream.index(),
             streams: input.nb_streams() as usize,
+            other_videos: other_videos(&input, stream.index()),
             container: input.format().name().to_owned(),
             codec: codec.name().to_owned(),
             stored_size_px: (width as usize, height as usize),
@@ -130,7 +133,9 @@ impl Container {
 
 fn not_a_video(path: &Path, error: &ffmpeg::Error) -> Error {
     let detail = match error {
-        ffmpeg::Error::InvalidData => "no container or codec is recognised in it, or it was cut off before its index was written".to_owned(),
+        ffmpeg::Error::InvalidData => {
+            "no container or codec is recognised in it, or it was cut off before its index was written".to_owned()
+        }
         other => other.to_string(),
     };
     Error::NotAVideo { path: path.to_owned(), detail }
@@ -139,16 +144,21 @@ fn not_a_video(path: &Path, error: &ffmpeg::Error) -> Error {
 fn owned_parameters(stream: &ffmpeg::Stream<'_>) -> std::result::Result<Parameters, ffmpeg::Error> {
     let mut owned = Parameters::new();
     // SAFETY: both pointers are valid for the call, which makes a deep copy.
-    let status = unsafe {
-        ffmpeg::ffi::avcodec_parameters_copy(owned.as_mut_ptr(), stream.parameters().as_ptr())
-    };
+    let status = unsafe { ffmpeg::ffi::avcodec_parameters_copy(owned.as_mut_ptr(), stream.parameters().as_ptr()) };
     if status < 0 { Err(status.into()) } else { Ok(owned) }
 }
 
 fn describe_streams(input: &ffmpeg::format::context::Input) -> String {
-    let kinds: Vec<String> =
-        input.streams().map(|s| format!("{:?}", s.parameters().medium()).to_lowercase()).collect();
+    let kinds: Vec<String> = input.streams().map(|s| format!("{:?}", s.parameters().medium()).to_lowercase()).collect();
     if kinds.is_empty() { "no stream at all".to_owned() } else { format!("only {}", kinds.join(", ")) }
+}
+
+fn other_videos(input: &ffmpeg::format::context::Input, chosen: usize) -> usize {
+    let picture = ffmpeg::format::stream::Disposition::ATTACHED_PIC;
+    let is_other = |s: &ffmpeg::Stream<'_>| {
+        s.index() != chosen && s.parameters().medium() == media::Type::Video && !s.disposition().contains(picture)
+    };
+    input.streams().filter(is_other).count()
 }
 
 fn display_orientation(stream: &ffmpeg::Stream<'_>) -> Orientation {

@@ -6,12 +6,14 @@ mod frame;
 mod orientation;
 mod picture;
 mod segments;
+mod timing;
 
 pub use container::{Container, StreamInfo};
 pub use decode::{Decoded, DecoderRecipe, StreamDecoder, decode_in_order};
 pub use frame::Frame;
 pub use orientation::Orientation;
 pub use picture::{Layout, Matrix, OwnedPicture, Picture, Plane};
+pub use timing::{Gap, Timing};
 
 /// Longest picture side that is measured.
 pub const MAX_SIDE_PX: u32 = 16384;

@@ -231,9 +231,7 @@ fn nal_units(data: &[u8], length_bytes: Option<usize>) -> Box<dyn Iterator<Item 
                 .filter(|u| !u.is_empty()),
             )
         }
-        None => Box::new(
-            data.windows(4).enumerate().filter(|(_, w)| w[..3] == [0, 0, 1]).map(|(i, _)| &data[i + 3..]),
-        ),
+        None => Box::new(data.windows(4).enumerate().filter(|(_, w)| w[..3] == [0, 0, 1]).map(|(i, _)| &data[i + 3..])),
     }
 }
 
