@@ -84,7 +84,7 @@ pub fn measure(picture: &Picture<'_>, axis: HueAxis, silhouette: &Silhouette) ->
     let count = sector_count(silhouette);
     let radii = sector_radii(silhouette, centre, count);
     let reach = radii.iter().copied().fold(0.0, f64::max);
-    let band = band_half_width(picture, axis, silhouette, reach);
+    let band = band_half_width(picture, axis, silhouette, centre, &radii);
     let patch = Patch::read(picture, axis, centre, reach + band + RING_PX + 1.0);
     let polar = Polar { centre, band_px: band as f32, count };
     let mut sectors: Vec<Sector> = radii.iter().map(|r| Sector { radius_px: *r as f32, ..Sector::default() }).collect();
@@ -133,23 +133,35 @@ fn sector_of(dx: f64, dy: f64, count: usize) -> usize {
 
 /// Half width of the band in which the mark fades into its surroundings, from the mark's own profile.
 ///
-/// Over the mask the component climbs from its threshold to its plateau; samples on the slope, against the length
-/// of the boundary, give the slope's width. Motion blur smears only across the motion, hence the factor.
-fn band_half_width(picture: &Picture<'_>, axis: HueAxis, silhouette: &Silhouette, reach: f64) -> f64 {
-    let mut levels: Vec<i16> = silhouette
-        .points_px
-        .iter()
-        .map(|p| {
-            let (x, y) = picture.layout.luma_to_chroma(p[0], p[1]);
-            axis.at(picture, x.round().max(0.0) as usize, y.round().max(0.0) as usize)
-        })
-        .collect();
-    levels.sort_unstable();
-    let plateau = f64::from(levels[levels.len() * 9 / 10]);
-    let on_slope = levels.iter().filter(|l| f64::from(**l) < 0.85 * plateau).count() as f64;
-    let sample_area = 4.0 * silhouette.half_sample_px[0] * silhouette.half_sample_px[1];
-    let slope_px = on_slope * sample_area / (TAU * reach.max(1.0));
-    (1.6 * slope_px + 1.2).clamp(LEAST_BAND_PX, MOST_BAND_PX)
+/// Seen from the boundary inwards the component climbs to its plateau. The depth at which the slowest quarter of the
+/// boundary has climbed is half the band: codecs and chroma interpolation soften every edge, motion blur the edges
+/// across the motion. What a thin line covers is less than a quarter.
+fn band_half_width(
+    picture: &Picture<'_>,
+    axis: HueAxis,
+    silhouette: &Silhouette,
+    centre: [f64; 2],
+    radii: &[f64],
+) -> f64 {
+    const DEPTHS: usize = MOST_BAND_PX as usize;
+    let mut levels: [Vec<i16>; DEPTHS] = std::array::from_fn(|_| Vec::new());
+    for [px, py] in &silhouette.points_px {
+        let (dx, dy) = (px - centre[0], py - centre[1]);
+        let depth = radii[sector_of(dx, dy, radii.len())] - dx.hypot(dy);
+        let (x, y) = picture.layout.luma_to_chroma(*px, *py);
+        let bin = (depth.max(0.0) as usize).min(DEPTHS - 1);
+        levels[bin].push(axis.at(picture, x.round().max(0.0) as usize, y.round().max(0.0) as usize));
+    }
+    let mut all: Vec<i16> = levels.iter().flatten().copied().collect();
+    all.sort_unstable();
+    let plateau = f64::from(all[all.len() * 3 / 4]);
+    for (depth, bin) in levels.iter_mut().enumerate().filter(|(_, b)| !b.is_empty()) {
+        bin.sort_unstable();
+        if f64::from(bin[bin.len() / 4]) > 0.85 * plateau {
+            return (depth as f64 + 1.5).clamp(LEAST_BAND_PX, MOST_BAND_PX);
+        }
+    }
+    MOST_BAND_PX
 }
 
 impl Patch {
@@ -281,6 +293,7 @@ impl Polar {
         Some((mark, noise))
     }
 
+    /// Shares of mark, their moments, and what follows from them.
     fn integrate(
         &self,
         patch: &Patch,
@@ -289,12 +302,12 @@ impl Polar {
         noise: [f32; 2],
         picture: &Picture<'_>,
     ) -> Option<Centroid> {
-        let weights: Vec<[f32; 3]> = sectors.iter().map(|s| share_weights(mark, s.background, noise)).collect();
-        if weights.iter().all(|w| !w[2].is_finite()) {
+        let weights: Vec<Share> = sectors.iter().map(|s| Share::new(mark, s.background, noise)).collect();
+        if weights.iter().all(|w| !w.variance.is_finite()) {
             return None;
         }
-        let (mut area, mut mx, mut my) = (0.0f64, 0.0f64, 0.0f64);
-        let mut spread = [0.0f64; 6];
+        let profile = self.profile(patch, sectors, &weights);
+        let mut moments = Moments::default();
         let mut cut = false;
         let (right, bottom) = (picture.layout.width_px as i64 - 1, picture.layout.height_px as i64 - 1);
         self.visit(patch, |at, dx, dy, distance, sector| {
@@ -304,52 +317,158 @@ impl Polar {
             }
             let (column, row) = (patch.left + (at % patch.width) as i64, patch.top + (at / patch.width) as i64);
             cut |= column == 0 || row == 0 || column == right || row == bottom;
-            let (x, y) = (f64::from(dx), f64::from(dy));
-            let mut share = 1.0;
-            if depth >= -self.band_px {
-                let [w_luma, w_component, variance] = weights[sector];
-                let background = sectors[sector].background;
-                share = f64::from(
-                    w_luma * (patch.luma[at] - background[0]) + w_component * (patch.component[at] - background[1]),
-                );
-                let v = f64::from(variance);
-                for (sum, term) in spread.iter_mut().zip([1.0, x, y, x * x, y * y, x * y]) {
-                    *sum += v * term;
-                }
+            if depth < -self.band_px {
+                moments.add(1.0, 0.0, dx, dy);
+            } else {
+                let share = weights[sector].of(patch.luma[at], patch.component[at], sectors[sector].background);
+                moments.add(share.unwrap_or_else(|| profile.at(depth)), weights[sector].variance, dx, dy);
             }
-            area += share;
-            mx += share * x;
-            my += share * y;
         });
-        if !(area >= 1.0) {
+        let mut centroid = moments.centroid()?;
+        centroid.cut = cut;
+        let inside = centroid.x_px.abs() < patch.width as f64 && centroid.y_px.abs() < patch.height as f64;
+        centroid.x_px += self.centre[0];
+        centroid.y_px += self.centre[1];
+        inside.then_some(centroid)
+    }
+
+    /// The mean share of mark against the depth, over the pixels that can be such a mixture.
+    fn profile(&self, patch: &Patch, sectors: &[Sector], weights: &[Share]) -> Profile {
+        let mut profile = Profile::new(self.band_px);
+        self.visit(patch, |at, _, _, distance, sector| {
+            let depth = distance - sectors[sector].radius_px;
+            if depth.abs() <= self.band_px
+                && let Some(share) = weights[sector].of(patch.luma[at], patch.component[at], sectors[sector].background)
+            {
+                profile.add(depth, share);
+            }
+        });
+        profile.finish()
+    }
+}
+
+/// Zeroth, first and second moments about the polar centre.
+#[derive(Default)]
+struct Moments {
+    area: f64,
+    mx: f64,
+    my: f64,
+    /// Σ v, Σ v x, Σ v y, Σ v x², Σ v y², Σ v x y with v the variance of a pixel's share.
+    spread: [f64; 6],
+}
+
+impl Moments {
+    fn add(&mut self, share: f32, variance: f32, dx: f32, dy: f32) {
+        let (x, y, share, v) = (f64::from(dx), f64::from(dy), f64::from(share), f64::from(variance));
+        self.area += share;
+        self.mx += share * x;
+        self.my += share * y;
+        if v > 0.0 {
+            for (sum, term) in self.spread.iter_mut().zip([1.0, x, y, x * x, y * y, x * y]) {
+                *sum += v * term;
+            }
+        }
+    }
+
+    fn centroid(&self) -> Option<Centroid> {
+        if !(self.area >= 1.0) {
             return None;
         }
-        let (x, y) = (mx / area, my / area);
-        let [s, sx, sy, sxx, syy, sxy] = spread;
-        let per_area = 1.0 / (area * area);
+        let (x, y) = (self.mx / self.area, self.my / self.area);
+        let [s, sx, sy, sxx, syy, sxy] = self.spread;
+        let per_area = 1.0 / (self.area * self.area);
         let variance_px2 = [
             (sxx - 2.0 * x * sx + x * x * s) * per_area,
             (syy - 2.0 * y * sy + y * y * s) * per_area,
             (sxy - x * sy - y * sx + x * y * s) * per_area,
         ];
-        let centroid =
-            Centroid { x_px: self.centre[0] + x, y_px: self.centre[1] + y, variance_px2, area_px2: area, cut };
-        (x.abs() < patch.width as f64 && y.abs() < patch.height as f64 && variance_px2[0].is_finite())
-            .then_some(centroid)
+        variance_px2.iter().all(|v| v.is_finite()).then_some(Centroid {
+            x_px: x,
+            y_px: y,
+            variance_px2,
+            area_px2: self.area,
+            cut: false,
+        })
     }
 }
 
-/// Factors of (luma − background) and (component − background) that sum to the share of mark, and its variance.
-fn share_weights(mark: [f32; 2], background: [f32; 2], noise: [f32; 2]) -> [f32; 3] {
-    let contrast = [mark[0] - background[0], mark[1] - background[1]];
-    let sharing = [1.0, COMPONENT_SHARING];
-    let weight: Vec<f32> =
-        (0..2).map(|k| 1.0 / ((noise[k] * noise[k] + (EDGE_ERROR * contrast[k]).powi(2)) * sharing[k])).collect();
-    let information = weight[0] * contrast[0] * contrast[0] + weight[1] * contrast[1] * contrast[1];
-    if information <= 1e-6 {
-        return [0.0, 0.0, f32::INFINITY];
+/// Mean share of mark in half-pixel steps of depth.
+struct Profile {
+    band_px: f32,
+    bins: Vec<(f32, u32)>,
+}
+
+impl Profile {
+    fn new(band_px: f32) -> Self {
+        Self { band_px, bins: vec![(0.0, 0); (4.0 * band_px) as usize + 2] }
     }
-    [weight[0] * contrast[0] / information, weight[1] * contrast[1] / information, 1.0 / information]
+
+    fn bin(&self, depth: f32) -> usize {
+        (((depth + self.band_px) * 2.0).max(0.0) as usize).min(self.bins.len() - 1)
+    }
+
+    fn add(&mut self, depth: f32, share: f32) {
+        let bin = self.bin(depth);
+        self.bins[bin].0 += share;
+        self.bins[bin].1 += 1;
+    }
+
+    /// Sums → means; an empty bin takes the straight fall from mark to background.
+    fn finish(mut self) -> Self {
+        let last = self.bins.len() as f32 - 1.0;
+        for (i, bin) in self.bins.iter_mut().enumerate() {
+            bin.0 = if bin.1 >= 3 { bin.0 / bin.1 as f32 } else { 1.0 - i as f32 / last };
+        }
+        self
+    }
+
+    fn at(&self, depth: f32) -> f32 {
+        self.bins[self.bin(depth)].0
+    }
+}
+
+/// How luma and component of a pixel in one sector give its share of mark.
+struct Share {
+    /// Factors of (luma − background) and (component − background).
+    factors: [f32; 2],
+    /// Contrasts of the mark against the background.
+    contrasts: [f32; 2],
+    /// Variance of the share.
+    variance: f32,
+    /// Channels with enough contrast to judge whether a pixel is a mixture at all.
+    telling: [bool; 2],
+}
+
+/// A mixture of mark and background has a share in 0..1; this much beyond is noise, more is a foreign thing.
+const BEYOND_MIXTURE: f32 = 0.3;
+/// Shares by luma and by component differ by their different sharpness; more is a foreign thing.
+const DISAGREEMENT: f32 = 0.65;
+
+impl Share {
+    fn new(mark: [f32; 2], background: [f32; 2], noise: [f32; 2]) -> Self {
+        let contrasts = [mark[0] - background[0], mark[1] - background[1]];
+        let sharing = [1.0, COMPONENT_SHARING];
+        let weight = [0, 1].map(|k| 1.0 / ((noise[k] * noise[k] + (EDGE_ERROR * contrasts[k]).powi(2)) * sharing[k]));
+        let information = weight[0] * contrasts[0] * contrasts[0] + weight[1] * contrasts[1] * contrasts[1];
+        let telling = [0, 1].map(|k| contrasts[k].abs() > 8.0 * noise[k].max(1.0));
+        if information <= 1e-6 {
+            return Self { factors: [0.0; 2], contrasts, variance: f32::INFINITY, telling };
+        }
+        let factors = [0, 1].map(|k| weight[k] * contrasts[k] / information);
+        Self { factors, contrasts, variance: 1.0 / information, telling }
+    }
+
+    /// The share, or `None` for a pixel that is no mixture of mark and background.
+    fn of(&self, luma: f32, component: f32, background: [f32; 2]) -> Option<f32> {
+        let above = [luma - background[0], component - background[1]];
+        let single = [0, 1].map(|k| self.telling[k].then(|| above[k] / self.contrasts[k]));
+        let foreign = |s: &f32| *s < -BEYOND_MIXTURE || *s > 1.0 + BEYOND_MIXTURE;
+        let differ = matches!(single, [Some(a), Some(b)] if (a - b).abs() > DISAGREEMENT);
+        if differ || single.iter().flatten().any(foreign) {
+            return None;
+        }
+        Some(self.factors[0] * above[0] + self.factors[1] * above[1])
+    }
 }
 
 /// Sectors whose ring lies outside the picture take their neighbours' background.

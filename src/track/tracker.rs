@@ -61,6 +61,9 @@ const MOST_OTHERS: usize = 24;
 /// One standard deviation of ln(area) from frame to frame, blur included.
 const LN_AREA_SD: f64 = 0.5;
 
+/// A sighting more than five times as large or as small is something else.
+const MOST_LN_AREA: f64 = 1.61;
+
 /// One followed thing, while frames come in.
 #[derive(Debug, Clone)]
 pub(super) struct Follower {
@@ -105,6 +108,9 @@ impl Follower {
         let radius = 0.56 * self.area_px2.sqrt();
         let (d2, _) = self.belief.distance2(&measurement(&sighting.measured, radius))?;
         let ln_area = (f64::from(sighting.measured.area_px2) / self.area_px2).ln();
+        if ln_area.abs() > MOST_LN_AREA {
+            return None;
+        }
         let cost = d2 + (ln_area / LN_AREA_SD).powi(2).min(8.0);
         (d2 <= GATE).then_some(cost)
     }
