@@ -12,6 +12,7 @@
 
 pub mod error;
 pub mod experiment;
+pub mod model;
 pub mod video;
 
 pub use error::{Error, Result};
