@@ -10,9 +10,11 @@
 //! | model | `model` | the forward model of the swing |
 //! | synth | `synth` | exact swings, rendered recordings with known truth |
 
+pub mod cli;
 pub mod error;
 pub mod experiment;
 pub mod model;
+pub mod synth;
 pub mod video;
 
 pub use error::{Error, Result};
