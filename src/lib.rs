@@ -18,9 +18,11 @@ pub mod detect;
 pub mod error;
 pub mod experiment;
 pub mod measure;
+pub mod model;
 pub mod output;
 pub mod progress;
 pub mod sidecar;
+pub mod synth;
 pub mod track;
 pub mod video;
 

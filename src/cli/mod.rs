@@ -1,6 +1,7 @@
 //! The command line: parse → options → stage → write → exit code. One file a command.
 
 mod bar;
+mod render;
 mod track;
 
 use std::process::ExitCode;
@@ -20,6 +21,7 @@ pub struct Cli {
 #[derive(Debug, Subcommand)]
 enum Command {
     Track(track::TrackArgs),
+    Render(render::RenderArgs),
 }
 
 /// `track` alone, so that `track VIDEO --out angles.csv` works as typed.
@@ -35,6 +37,7 @@ impl Cli {
     pub fn run() -> ExitCode {
         exit(match Self::parse().command {
             Command::Track(args) => args.run(),
+            Command::Render(args) => args.run(),
         })
     }
 }

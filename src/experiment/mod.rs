@@ -12,7 +12,7 @@ use std::path::Path;
 use serde::Deserialize;
 
 pub use model::{Effects, Hysteresis, Model, SupportMotion};
-pub use render::{Codec, Distractor, Lens, Render};
+pub use render::{Caption, Codec, CodecName, Distractor, Lens, Noise, Occlusion, PixelFormat, Render, Rgb, Siting};
 pub use rig::{MarkColour, Rig};
 pub use specimen::{Inertia, Link, Reflectivity, Specimen};
 

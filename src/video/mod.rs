@@ -2,6 +2,7 @@
 
 mod container;
 mod decode;
+mod encode;
 mod frame;
 mod orientation;
 mod picture;
@@ -10,6 +11,7 @@ mod timing;
 
 pub use container::{Container, StreamInfo};
 pub use decode::{Decoded, DecoderRecipe, StreamDecoder, decode_in_order};
+pub use encode::{TICKS_PER_SECOND, VideoWriter};
 pub use frame::Frame;
 pub use orientation::Orientation;
 pub use picture::{Layout, Matrix, OwnedPicture, Picture, Plane};

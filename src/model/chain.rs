@@ -1,0 +1,225 @@
+//! The chain: n rigid links hung one below the other from a hinge.
+
+use nalgebra::{DMatrix, DVector};
+
+use crate::error::{Error, Result};
+use crate::experiment::{Inertia, Link, Specimen};
+
+/// Rigid links, from the hinge down.
+///
+/// Angles θᵢ are absolute, from the downward vertical, positive towards +x. With cᵢ the distance from the link's pivot to its centre of
+/// mass and Iᵢ the inertia about that centre:
+///
+/// ```text
+/// aᵢᵢ = Iᵢ + mᵢcᵢ² + Lᵢ² Σ_{k>i} mₖ
+/// aᵢⱼ = Lᵢ (mⱼcⱼ + Lⱼ Σ_{k>j} mₖ)      i < j
+/// hᵢ  = mᵢcᵢ + Lᵢ Σ_{k>i} mₖ            gᵢ = g hᵢ
+/// ```
+///
+/// A uniform rod has c = L/2, I = mL²/12 (paper Eq. 33); a lump at the lower node has c = L, I = 0 (paper Eq. 22–25).
+#[derive(Debug, Clone, PartialEq)]
+pub struct Chain {
+    links: Vec<Link>,
+    /// a, without the cosines.
+    inertia_kg_m2: DMatrix<f64>,
+    /// h.
+    static_moment_kg_m: Vec<f64>,
+}
+
+impl Chain {
+    /// A chain of these links.
+    ///
+    /// # Errors
+    /// [`Error::Simulation`] when there is no link, or the links' masses leave a direction of motion without inertia.
+    pub fn new(links: Vec<Link>) -> Result<Self> {
+        if links.is_empty() {
+            return Err(Error::Simulation { detail: "the specimen has no link; give specimen.link_lengths_m".into() });
+        }
+        let n = links.len();
+        let mass_below = |i: usize| links[i + 1..].iter().map(|l| l.mass_kg).sum::<f64>();
+        let static_moment_kg_m: Vec<f64> =
+            (0..n).map(|i| links[i].mass_kg * links[i].com_m + links[i].length_m * mass_below(i)).collect();
+        let inertia_kg_m2 = DMatrix::from_fn(n, n, |i, j| {
+            if i == j {
+                let Link { length_m, mass_kg, com_m, inertia_kg_m2 } = links[i];
+                inertia_kg_m2 + mass_kg * com_m * com_m + mass_below(i) * length_m * length_m
+            } else {
+                links[i.min(j)].length_m * static_moment_kg_m[i.max(j)]
+            }
+        });
+        let scaled = DMatrix::from_fn(n, n, |i, j| {
+            inertia_kg_m2[(i, j)] / (inertia_kg_m2[(i, i)] * inertia_kg_m2[(j, j)]).sqrt()
+        });
+        if !(scaled.symmetric_eigenvalues().min() > 1e-9) {
+            return Err(Error::Simulation {
+                detail: "a link swings without inertia; give every node below the hinge a mass (specimen.lumps)".into(),
+            });
+        }
+        Ok(Self { links, inertia_kg_m2, static_moment_kg_m })
+    }
+
+    /// The chain of a specimen: its `links`, or its strip as rods or lumps. The strip's whole mass is carried by the links in proportion
+    /// to their lengths; lumps default to those of a uniform strip.
+    ///
+    /// # Errors
+    /// As [`Chain::new`].
+    pub fn of(specimen: &Specimen) -> Result<Self> {
+        if !specimen.links.is_empty() {
+            return Self::new(specimen.links.clone());
+        }
+        let lengths_m = &specimen.link_lengths_m;
+        let total_m: f64 = lengths_m.iter().sum();
+        let share = |i: usize| lengths_m.get(i).copied().unwrap_or(0.0) / total_m;
+        let lump = |node: usize| match &specimen.lumps {
+            Some(lumps) => lumps.get(node).copied().unwrap_or(0.0),
+            None => 0.5 * (share(node - 1) + share(node)),
+        };
+        let link = |(i, &length_m): (usize, &f64)| match specimen.inertia {
+            Inertia::Rods => {
+                let mass_kg = specimen.mass_kg * share(i);
+                Link { length_m, mass_kg, com_m: 0.5 * length_m, inertia_kg_m2: mass_kg * length_m * length_m / 12.0 }
+            }
+            Inertia::Lumps => {
+                Link { length_m, mass_kg: specimen.mass_kg * lump(i + 1), com_m: length_m, inertia_kg_m2: 0.0 }
+            }
+        };
+        Self::new(lengths_m.iter().enumerate().map(link).collect())
+    }
+
+    /// The links, top to bottom.
+    pub fn links(&self) -> &[Link] {
+        &self.links
+    }
+
+    /// Number of links.
+    pub fn count(&self) -> usize {
+        self.links.len()
+    }
+
+    /// aᵢⱼ [kg·m²].
+    pub fn inertia_kg_m2(&self) -> &DMatrix<f64> {
+        &self.inertia_kg_m2
+    }
+
+    /// hᵢ [kg·m]; gravity's torque on θᵢ is −g hᵢ sin θᵢ.
+    pub fn static_moment_kg_m(&self, i: usize) -> f64 {
+        self.static_moment_kg_m[i]
+    }
+
+    /// The inertia matrix aᵢⱼ cos(θᵢ−θⱼ) [kg·m²] in a position.
+    pub fn inertia_at(&self, motion: &Motion) -> DMatrix<f64> {
+        self.inertia_kg_m2.map_with_location(|i, j, a| a * motion.cos_difference(i, j))
+    }
+
+    /// −Σⱼ aᵢⱼ sin(θᵢ−θⱼ) θ̇ⱼ² [N·m]: the torque of the links' own rotation.
+    pub fn rotation_torque(&self, motion: &Motion) -> DVector<f64> {
+        let torque = |i: usize| -> f64 {
+            (0..self.count())
+                .map(|j| self.inertia_kg_m2[(i, j)] * motion.sin_difference(i, j) * motion.omega_rad_s[j].powi(2))
+                .sum()
+        };
+        DVector::from_fn(self.count(), |i, _| -torque(i))
+    }
+}
+
+/// One instant of the motion, with the sines and cosines every law needs.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Motion {
+    /// Time.
+    pub t_s: f64,
+    /// θ.
+    pub theta_rad: Vec<f64>,
+    /// θ̇.
+    pub omega_rad_s: Vec<f64>,
+    /// sin θ.
+    pub sin: Vec<f64>,
+    /// cos θ.
+    pub cos: Vec<f64>,
+    /// Sideways velocity of the pivot.
+    pub pivot_m_s: f64,
+    /// Sideways acceleration of the pivot.
+    pub pivot_m_s2: f64,
+}
+
+impl Motion {
+    /// An instant with the pivot at rest.
+    pub fn new(t_s: f64, theta_rad: &[f64], omega_rad_s: &[f64]) -> Self {
+        Self {
+            t_s,
+            theta_rad: theta_rad.to_vec(),
+            omega_rad_s: omega_rad_s.to_vec(),
+            sin: theta_rad.iter().map(|a| a.sin()).collect(),
+            cos: theta_rad.iter().map(|a| a.cos()).collect(),
+            pivot_m_s: 0.0,
+            pivot_m_s2: 0.0,
+        }
+    }
+
+    /// cos(θᵢ−θⱼ).
+    pub fn cos_difference(&self, i: usize, j: usize) -> f64 {
+        self.cos[i] * self.cos[j] + self.sin[i] * self.sin[j]
+    }
+
+    /// sin(θᵢ−θⱼ).
+    pub fn sin_difference(&self, i: usize, j: usize) -> f64 {
+        self.sin[i] * self.cos[j] - self.cos[i] * self.sin[j]
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn two_rods_have_the_coefficients_of_eq_33() {
+        let strip = Specimen { mass_kg: 5.0, link_lengths_m: vec![2.0, 3.0], ..Specimen::default() };
+        let chain = Chain::of(&strip).unwrap();
+        let (m1, m2, l1, l2) = (2.0, 3.0, 2.0, 3.0);
+        let a = chain.inertia_kg_m2();
+        assert!((a[(0, 0)] - (m1 * l1 * l1 / 3.0 + m2 * l1 * l1)).abs() < 1e-12);
+        assert!((a[(0, 1)] - m2 * l1 * l2 / 2.0).abs() < 1e-12 && a[(0, 1)] == a[(1, 0)]);
+        assert!((a[(1, 1)] - m2 * l2 * l2 / 3.0).abs() < 1e-12);
+        assert!((chain.static_moment_kg_m(0) - l1 * (m1 / 2.0 + m2)).abs() < 1e-12);
+        assert!((chain.static_moment_kg_m(1) - m2 * l2 / 2.0).abs() < 1e-12);
+    }
+
+    #[test]
+    fn lumps_have_the_coefficients_of_eq_22_to_25() {
+        let strip = Specimen {
+            mass_kg: 4.0,
+            link_lengths_m: vec![2.0, 3.0],
+            inertia: Inertia::Lumps,
+            lumps: Some(vec![0.25, 0.5, 0.25]),
+            ..Specimen::default()
+        };
+        let chain = Chain::of(&strip).unwrap();
+        let (m2, m3, l1, l2) = (2.0, 1.0, 2.0, 3.0);
+        let a = chain.inertia_kg_m2();
+        assert_eq!(a[(0, 0)], (m2 + m3) * l1 * l1);
+        assert_eq!(a[(0, 1)], m3 * l1 * l2);
+        assert_eq!(a[(1, 1)], m3 * l2 * l2);
+        assert_eq!(chain.static_moment_kg_m(0), (m2 + m3) * l1);
+        assert_eq!(chain.static_moment_kg_m(1), m3 * l2);
+    }
+
+    #[test]
+    fn n_equal_rods_have_the_coefficients_of_the_continuous_limit() {
+        let (n, mass, length) = (5usize, 0.1, 0.04);
+        let strip = Specimen { mass_kg: 0.5, link_lengths_m: vec![length; n], ..Specimen::default() };
+        let chain = Chain::of(&strip).unwrap();
+        for i in 0..n {
+            assert!((chain.static_moment_kg_m(i) - mass * length * (n as f64 - i as f64 - 0.5)).abs() < 1e-15);
+            for j in 0..n {
+                let offset = if i == j { 2.0 / 3.0 } else { 0.5 };
+                let expected = mass * length * length * (n as f64 - i.max(j) as f64 - offset);
+                assert!((chain.inertia_kg_m2()[(i, j)] - expected).abs() < 1e-15);
+            }
+        }
+    }
+
+    #[test]
+    fn a_massless_tip_is_refused() {
+        let strip = Specimen { inertia: Inertia::Lumps, lumps: Some(vec![0.5, 0.5, 0.0]), ..Specimen::default() };
+        assert!(Chain::of(&strip).unwrap_err().to_string().contains("without inertia"));
+    }
+}

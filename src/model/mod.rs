@@ -1,0 +1,18 @@
+//! What the model says: the chain of rigid links, its effects, and its motion in time.
+//!
+//! | file | holds |
+//! |---|---|
+//! | [`chain`] | the links: inertia matrix and static moments |
+//! | [`effects`] | every further torque, one law each |
+//! | [`forward`] | the equations of motion |
+//! | [`integrate`] | their solution in time |
+
+pub mod chain;
+pub mod effects;
+pub mod forward;
+pub mod integrate;
+
+pub use chain::{Chain, Motion};
+pub use effects::Effect;
+pub use forward::ForwardModel;
+pub use integrate::{State, Trajectory};

@@ -1,0 +1,149 @@
+//! The model's motion, and where the camera sees the marks.
+
+use crate::error::Result;
+use crate::experiment::Experiment;
+use crate::model::{ForwardModel, State, Trajectory};
+
+/// A swing as the camera sees it, in the undistorted picture.
+///
+/// The camera effects of `[model.effects]` enter here. The angle seen of link i at stamp t is
+///
+/// ```text
+/// φᵢ(t) = (1 + angle_gain) θᵢ((1 + time_base) t + [i > 1] differential_lag) + camera_tilt + render.tilt_rad
+/// ```
+///
+/// `dropped_frames` of `[model.effects]` is applied by [`super::Recording`]: from the middle of the recording on, the motion is that much
+/// further than the stamps say.
+#[derive(Debug)]
+pub struct Swing {
+    model: ForwardModel,
+    trajectory: Trajectory,
+    lengths_m: Vec<f64>,
+    hinge_px: [f64; 2],
+    scale_px_per_m: f64,
+    mirrored: bool,
+    tilt_rad: f64,
+    gain: f64,
+    rate: f64,
+    lag_s: f64,
+    jump_s: f64,
+    jump_at_s: f64,
+}
+
+impl Swing {
+    /// Simulates the experiment's swing over its recording. It is released at stamp 0, or at the first stamp where that is later.
+    ///
+    /// # Errors
+    /// [`crate::Error::Simulation`].
+    pub fn of(experiment: &Experiment) -> Result<Self> {
+        let model = ForwardModel::of(experiment)?;
+        let (render, effects) = (&experiment.render, &experiment.model.effects);
+        let rate = 1.0 + effects.time_base.unwrap_or(0.0);
+        let lag_s = effects.differential_lag.unwrap_or(0.0);
+        let jump_s = effects.dropped_frames.unwrap_or(0.0);
+        // Jitter, exposure and rolling shutter together reach less than two frames beyond the last stamp.
+        let last_stamp_s = render.start_s + render.duration_s + 2.0 / render.fps;
+        let until_s = rate.max(0.0) * last_stamp_s + lag_s.max(0.0) + jump_s.max(0.0);
+        let release = State::at_rest(&experiment.model.release_rad);
+        let trajectory = Trajectory::swing(&model, &release, 0.0, until_s)?;
+        Ok(Self {
+            lengths_m: model.chain().links().iter().map(|l| l.length_m).collect(),
+            model,
+            trajectory,
+            hinge_px: experiment.rig.pivot_px.unwrap_or(render.hinge_px),
+            scale_px_per_m: render.scale_px_per_m,
+            mirrored: experiment.rig.mirrored,
+            tilt_rad: effects.camera_tilt.unwrap_or(0.0) + render.tilt_rad,
+            gain: 1.0 + effects.angle_gain.unwrap_or(0.0),
+            rate,
+            lag_s,
+            jump_s,
+            jump_at_s: render.start_s + 0.5 * render.duration_s,
+        })
+    }
+
+    /// φ at a stamp, top to bottom: what a perfect measurement reads.
+    pub fn angles_rad(&self, t_s: f64) -> Vec<f64> {
+        let upper = self.trajectory.at(self.true_time_s(t_s));
+        let lower = if self.lag_s == 0.0 { None } else { Some(self.trajectory.at(self.true_time_s(t_s) + self.lag_s)) };
+        let theta = |i: usize| match &lower {
+            Some(state) if i > 0 => state.theta_rad[i],
+            _ => upper.theta_rad[i],
+        };
+        (0..self.lengths_m.len()).map(|i| self.gain * theta(i) + self.tilt_rad).collect()
+    }
+
+    /// The hinge, the joints and the tip at a stamp, in the undistorted picture.
+    pub fn nodes_px(&self, t_s: f64) -> Vec<[f64; 2]> {
+        let pivot_px = self.scale_px_per_m * self.model.pivot_m(self.true_time_s(t_s));
+        let side = if self.mirrored { -1.0 } else { 1.0 };
+        let mut node = [
+            self.hinge_px[0] + side * pivot_px * self.tilt_rad.cos(),
+            self.hinge_px[1] - pivot_px * self.tilt_rad.sin(),
+        ];
+        let mut nodes = vec![node];
+        for (length_m, angle_rad) in self.lengths_m.iter().zip(self.angles_rad(t_s)) {
+            let length_px = length_m * self.scale_px_per_m;
+            node = [node[0] + side * length_px * angle_rad.sin(), node[1] + length_px * angle_rad.cos()];
+            nodes.push(node);
+        }
+        nodes
+    }
+
+    /// Roll of the picture: anticlockwise, or clockwise in a mirror.
+    pub fn roll_rad(&self) -> f64 {
+        if self.mirrored { -self.tilt_rad } else { self.tilt_rad }
+    }
+
+    /// The hinge at rest, in the undistorted picture.
+    pub fn hinge_px(&self) -> [f64; 2] {
+        self.hinge_px
+    }
+
+    fn true_time_s(&self, t_s: f64) -> f64 {
+        self.rate * t_s + if t_s >= self.jump_at_s { self.jump_s } else { 0.0 }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn short() -> Experiment {
+        let mut experiment = Experiment::default();
+        experiment.render.duration_s = 0.5;
+        experiment
+    }
+
+    #[test]
+    fn the_marks_hang_where_the_angles_say() {
+        let swing = Swing::of(&short()).unwrap();
+        let nodes = swing.nodes_px(0.0);
+        assert_eq!(nodes[0], [640.0, 96.0]);
+        assert!((nodes[1][0] - (640.0 + 260.0 * 0.5f64.sin())).abs() < 1e-9);
+        assert!((nodes[2][1] - (96.0 + 260.0 * (0.5f64.cos() + 0.6f64.cos()))).abs() < 1e-9);
+    }
+
+    #[test]
+    fn a_mirror_swaps_left_and_right() {
+        let mut experiment = short();
+        let plain = Swing::of(&experiment).unwrap().nodes_px(0.2);
+        experiment.rig.mirrored = true;
+        let mirrored = Swing::of(&experiment).unwrap().nodes_px(0.2);
+        for (p, m) in plain.iter().zip(&mirrored) {
+            assert!((p[0] + m[0] - 1280.0).abs() < 1e-9 && p[1] == m[1]);
+        }
+    }
+
+    #[test]
+    fn camera_effects_change_what_is_seen() {
+        let mut experiment = short();
+        let plain = Swing::of(&experiment).unwrap();
+        let effects = &mut experiment.model.effects;
+        (effects.camera_tilt, effects.angle_gain, effects.time_base) = (Some(0.01), Some(0.02), Some(0.1));
+        effects.differential_lag = Some(0.003);
+        let seen = Swing::of(&experiment).unwrap().angles_rad(0.2);
+        assert!((seen[0] - (1.02 * plain.angles_rad(0.22)[0] + 0.01)).abs() < 1e-8);
+        assert!((seen[1] - (1.02 * plain.angles_rad(0.223)[1] + 0.01)).abs() < 1e-8);
+    }
+}
