@@ -5,6 +5,10 @@ use serde::Deserialize;
 use super::{not_negative, positive};
 use crate::video::{Layout, MAX_SIDE_PX, Matrix};
 
+/// The presets of x264 and x265.
+const PRESETS: [&str; 10] =
+    ["ultrafast", "superfast", "veryfast", "faster", "fast", "medium", "slow", "slower", "veryslow", "placebo"];
+
 type Check = Result<(), String>;
 
 /// A colour, red, green, blue, gamma-coded; `#rrggbb` in a file.
@@ -213,6 +217,10 @@ impl Codec {
             CodecName::Mpeg4 | CodecName::Mjpeg => (1.0, 31.0),
         };
         within("render.codec.crf", self.crf, least, most)?;
+        let encoder = matches!(self.name, CodecName::H264 | CodecName::Hevc);
+        if encoder && !PRESETS.contains(&self.preset.as_str()) {
+            return Err(format!("render.codec.preset = {}: must be one of {}", self.preset, PRESETS.join(", ")));
+        }
         if self.gop == 0 {
             return Err("render.codec.gop = 0: must be 1 or more".to_owned());
         }
@@ -271,7 +279,7 @@ pub struct Render {
     pub occlusions: Vec<Occlusion>,
     /// Exposure of a frame (of a row, with a rolling shutter), centred on its stamp.
     pub exposure_s: f64,
-    /// Standard deviation of the lens's Gaussian blur; 0 leaves that of the pixels alone.
+    /// Standard deviation of the lens's Gaussian blur. Lens and pixel together blur by 0.45 px at least.
     pub lens_blur_px: f64,
     /// Exponent of the signal: V = light^(1/gamma).
     pub gamma: f64,

@@ -6,8 +6,8 @@
 //! coverage = Φ(d/σ)      σ² = lens_blur² + 1/12,  d the distance inside the edge
 //! ```
 //!
-//! 1/12 being the variance of a pixel's aperture. A disc drawn so is round to the last digit, so its centroid is its centre: what is left
-//! is aliasing, exp(−2π²σ²) of a thin ring, below 0.002 px.
+//! 1/12 being the variance of a pixel's aperture; σ is at least 0.45 px. A disc drawn so is round to the last digit, so its centroid is its
+//! centre: what is left is aliasing, exp(−2π²σ²) of a thin ring, below 0.002 px.
 
 use crate::experiment::Rgb;
 
@@ -29,10 +29,12 @@ pub struct Edge {
 impl Edge {
     const REACH: f64 = 4.0;
     const STEPS: usize = 2048;
+    /// Sharper edges would alias, as no lens before a sensor lets them.
+    const SHARPEST_PX: f64 = 0.45;
 
     /// An edge behind a lens of this blur.
     pub fn new(lens_blur_px: f64) -> Self {
-        let sigma_px = (lens_blur_px * lens_blur_px + 1.0 / 12.0).sqrt();
+        let sigma_px = (lens_blur_px * lens_blur_px + 1.0 / 12.0).sqrt().max(Self::SHARPEST_PX);
         let z = |i: usize| Self::REACH * (2.0 * i as f64 / Self::STEPS as f64 - 1.0);
         // Φ by the midpoint rule of its density, then scaled so that it reaches 0 and 1 at its ends.
         let mut table = vec![0.0f64];
@@ -312,4 +314,55 @@ fn direction(from: [f64; 2], to: [f64; 2]) -> [f64; 2] {
 
 fn dot(a: [f64; 2], b: [f64; 2]) -> f64 {
     a[0] * b[0] + a[1] * b[1]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_discs_coverage_has_its_centroid_at_the_centre_at_every_pixel_phase() {
+        let look = StripLook {
+            half_width_px: 40.0,
+            overhang_px: 20.0,
+            sheen: 0.0,
+            mark_radius_px: 11.0,
+            hinge_unmarked: false,
+        };
+        let mut worst: f64 = 0.0;
+        for (blur, phase) in [0.0, 0.4, 0.8].into_iter().flat_map(|b| (0..13).map(move |p| (b, f64::from(p) / 13.0))) {
+            let edge = Edge::new(blur);
+            let centre = [30.0 + phase, 30.0 + (5.0 * phase).fract()];
+            let outline = Outline::new(look, &[centre, [30.0, 400.0]]);
+            let mut sum = [0.0f64; 3];
+            let mut row = RowCover::new(0, 60, 2);
+            for y in 0..60 {
+                row.clear();
+                outline.add_row(&edge, &mut row, [f64::from(y); 2], |x| [x as f64, f64::from(y)]);
+                for (x, cover) in row.marks[0].iter().enumerate() {
+                    let cover = f64::from(*cover);
+                    sum = [sum[0] + cover * x as f64, sum[1] + cover * f64::from(y), sum[2] + cover];
+                }
+            }
+            worst = worst.max((sum[0] / sum[2] - centre[0]).hypot(sum[1] / sum[2] - centre[1]));
+        }
+        assert!(worst < 0.002, "{worst}");
+    }
+
+    #[test]
+    fn the_strips_pieces_join_without_a_seam() {
+        let look = StripLook {
+            half_width_px: 20.0,
+            overhang_px: 20.0,
+            sheen: 0.0,
+            mark_radius_px: 5.0,
+            hinge_unmarked: false,
+        };
+        let outline = Outline::new(look, &[[60.0, 20.0], [80.0, 100.0], [70.0, 180.0]]);
+        let edge = Edge::new(0.8);
+        let mut row = RowCover::new(0, 140, 3);
+        outline.add_row(&edge, &mut row, [60.0; 2], |x| [x as f64, 60.0]);
+        let inside = row.strip_cover.iter().filter(|c| (**c - 1.0).abs() < 1e-4).count();
+        assert!(row.strip_cover.iter().all(|c| *c < 1.0001) && (30..42).contains(&inside), "{inside}");
+    }
 }

@@ -65,7 +65,12 @@ impl VideoWriter {
         stream.copy_parameters_from_context(&encoder);
         stream.set_avg_frame_rate(frame_period(fps).invert());
         set_rotation(&mut stream, codec.rotation_deg).map_err(refused)?;
-        output.write_header().map_err(failed)?;
+        // Edit lists count in the movie's own ticks; the default, a millisecond, would round the first stamp.
+        let header = match target.extension().and_then(|e| e.to_str()) {
+            Some(e) if e.eq_ignore_ascii_case("mkv") || avi => Dictionary::new(),
+            _ => ffmpeg::dict!("movie_timescale" => TICKS_PER_SECOND.to_string()),
+        };
+        output.write_header_with(header).map_err(failed)?;
 
         let seconds_per_tick = f64::from(time_base.0) / f64::from(time_base.1);
         let frame_ticks = (1.0 / fps / seconds_per_tick).round().max(1.0) as i64;
@@ -258,7 +263,9 @@ fn encoder_options(codec: &Codec) -> Dictionary {
             options.set("preset", &codec.preset);
             options.set("x265-params", "open-gop=0:log-level=none");
         }
-        CodecName::Mpeg4 | CodecName::Mjpeg => {}
+        // FFmpeg's encoder closes its groups only when it looks for no scene changes.
+        CodecName::Mpeg4 => options.set("sc_threshold", "1000000000"),
+        CodecName::Mjpeg => {}
     }
     options
 }
@@ -290,8 +297,11 @@ fn configured(
         flags |= codec::Flags::GLOBAL_HEADER;
     }
     if matches!(codec.name, CodecName::Mpeg4 | CodecName::Mjpeg) {
-        flags |= codec::Flags::QSCALE | codec::Flags::CLOSED_GOP;
+        flags |= codec::Flags::QSCALE;
         video.set_global_quality((codec.crf * f64::from(ffi::FF_QP2LAMBDA)).round() as i32);
+    }
+    if codec.name == CodecName::Mpeg4 {
+        flags |= codec::Flags::CLOSED_GOP;
     }
     video.set_flags(flags);
     set_colour_tags(&mut video, layout);
@@ -333,7 +343,7 @@ fn set_rotation(stream: &mut format::stream::StreamMut<'_>, rotation_deg: i32) -
         if matrix.is_null() {
             return Err("no memory for the display matrix".to_owned());
         }
-        ffi::av_display_rotation_set(matrix.cast(), -f64::from(rotation_deg));
+        ffi::av_display_rotation_set(matrix.cast(), f64::from(rotation_deg));
     }
     Ok(())
 }
