@@ -41,6 +41,10 @@ pub(super) struct Target {
     pub least_samples: u32,
 }
 
+/// Samples around a hit block: a mark that ends in the next block is whole, and mending its outline does not meet
+/// the region's edge.
+const MARGIN: usize = 6;
+
 /// Finds and measures the blobs of one hue.
 pub(super) fn find(picture: &Picture<'_>, target: &Target, blobs: &mut Vec<Blob>) -> Result<()> {
     for region in regions(picture, target.axis, target.threshold) {
@@ -81,12 +85,11 @@ pub(super) fn regions(picture: &Picture<'_>, axis: HueAxis, threshold: i16) -> V
     for row in 0..rows {
         for column in 0..columns {
             if hit[row * columns + column] {
-                // a margin, so that a mark that ends in the next block is whole
                 let grown = Region {
-                    left: (column * BLOCK).saturating_sub(SCAN_STEP),
-                    top: (row * BLOCK_ROWS).saturating_sub(SCAN_STEP),
-                    right: ((column + 1) * BLOCK + SCAN_STEP).min(width),
-                    bottom: ((row + 1) * BLOCK_ROWS + SCAN_STEP).min(height),
+                    left: (column * BLOCK).saturating_sub(MARGIN),
+                    top: (row * BLOCK_ROWS).saturating_sub(MARGIN),
+                    right: ((column + 1) * BLOCK + MARGIN).min(width),
+                    bottom: ((row + 1) * BLOCK_ROWS + MARGIN).min(height),
                 };
                 merge(&mut regions, grown);
             }

@@ -61,14 +61,28 @@ struct Patch {
 #[derive(Clone, Copy, Default)]
 struct Sector {
     radius_px: f32,
+    /// Luma and component where the ring is read.
     background: [f32; 2],
+    /// The middle of the ring in this sector, from the polar centre.
+    ring: [f32; 2],
     known: bool,
+}
+
+/// How the background changes across the mark, per pixel: ∂/∂x, ∂/∂y of luma and of the component.
+type Slope = [[f32; 2]; 2];
+
+impl Sector {
+    /// The background continued from the ring to a pixel.
+    fn background_at(&self, slope: &Slope, dx: f32, dy: f32) -> [f32; 2] {
+        let (ex, ey) = (dx - self.ring[0], dy - self.ring[1]);
+        [0, 1].map(|k| self.background[k] + slope[k][0] * ex + slope[k][1] * ey)
+    }
 }
 
 /// Width of the ring from which the background is read.
 const RING_PX: f64 = 3.0;
 /// The narrowest half width of the boundary band: codecs and chroma interpolation soften every edge this much.
-const LEAST_BAND_PX: f64 = 3.0;
+const LEAST_BAND_PX: f64 = 2.5;
 /// Widest half width of the boundary band: motion blur.
 const MOST_BAND_PX: f64 = 14.0;
 /// Error of a coded sample at an edge, as a share of the edge's height.
@@ -88,8 +102,20 @@ pub fn measure(picture: &Picture<'_>, axis: HueAxis, silhouette: &Silhouette) ->
     let patch = Patch::read(picture, axis, centre, reach + band + RING_PX + 1.0);
     let polar = Polar { centre, band_px: band as f32, count };
     let mut sectors: Vec<Sector> = radii.iter().map(|r| Sector { radius_px: *r as f32, ..Sector::default() }).collect();
-    let (mark, noise) = polar.survey(&patch, &mut sectors)?;
-    polar.integrate(&patch, &sectors, mark, noise, picture)
+    let levels = polar.survey(&patch, &mut sectors)?;
+    // the mask's outline is a staircase of chroma samples: the shares of mark give a finer one
+    polar.refine(&patch, &mut sectors, &levels);
+    polar.integrate(&patch, &sectors, &levels, picture)
+}
+
+/// What the survey of a mark's surroundings finds.
+struct Levels {
+    /// Luma and component of the mark.
+    mark: [f32; 2],
+    /// Their noise.
+    noise: [f32; 2],
+    /// How the background changes across the mark.
+    slope: Slope,
 }
 
 fn sector_count(silhouette: &Silhouette) -> usize {
@@ -255,7 +281,7 @@ impl Polar {
     }
 
     /// Reads the background of every sector, the mark's own levels and the noise.
-    fn survey(&self, patch: &Patch, sectors: &mut [Sector]) -> Option<([f32; 2], [f32; 2])> {
+    fn survey(&self, patch: &Patch, sectors: &mut [Sector]) -> Option<Levels> {
         let mut rings: Vec<[Vec<f32>; 2]> = vec![[Vec::with_capacity(12), Vec::with_capacity(12)]; self.count];
         let mut core: [Vec<f32>; 2] = [Vec::new(), Vec::new()];
         let mut deepest = (f32::MAX, [0.0; 2]);
@@ -290,23 +316,52 @@ impl Polar {
         fill_unknown(sectors)?;
         // 1.4826 × median absolute deviation; the sector medians take up a third of it
         let noise = residuals.map(|mut r| (1.4826 * 1.2 * median(&mut r)).max(LEAST_NOISE));
-        Some((mark, noise))
+        for (index, sector) in sectors.iter_mut().enumerate() {
+            let reach = sector.radius_px + self.band_px + 0.5 * RING_PX as f32;
+            let (sin, cos) = self.direction(index);
+            sector.ring = [reach * cos, reach * sin];
+        }
+        let slope = [0, 1].map(|k| background_slope(sectors, k, noise[k]));
+        Some(Levels { mark, noise, slope })
+    }
+
+    /// Sine and cosine of the middle of a sector.
+    fn direction(&self, index: usize) -> (f32, f32) {
+        ((index as f32 + 0.5) / self.count as f32 * std::f32::consts::TAU).sin_cos()
+    }
+
+    /// Replaces every sector's radius by that of the circle's sector with the same area of mark, smoothed.
+    fn refine(&self, patch: &Patch, sectors: &mut [Sector], levels: &Levels) {
+        let weights = shares(sectors, levels);
+        let profile = self.profile(patch, sectors, &weights, levels);
+        let mut areas = vec![0.0f32; self.count];
+        self.visit(patch, |at, dx, dy, distance, sector| {
+            let depth = distance - sectors[sector].radius_px;
+            if depth < -self.band_px {
+                areas[sector] += 1.0;
+            } else if depth <= self.band_px {
+                let background = sectors[sector].background_at(&levels.slope, dx, dy);
+                let share = weights[sector].of(patch.luma[at], patch.component[at], background);
+                areas[sector] += share.unwrap_or_else(|| profile.at(depth));
+            }
+        });
+        let radius = |area: f32| (2.0 * area.max(0.0) * self.count as f32 / std::f32::consts::TAU).sqrt();
+        // a pixel belongs to one sector whole, so single sectors are uneven: five together are not
+        for (index, sector) in sectors.iter_mut().enumerate() {
+            let near = [-2i32, -1, 0, 1, 2].map(|k| areas[(index as i32 + k).rem_euclid(self.count as i32) as usize]);
+            sector.radius_px = radius(near.iter().sum::<f32>() / 5.0)
+                .clamp(sector.radius_px - self.band_px, sector.radius_px + self.band_px)
+                .max(1.0);
+        }
     }
 
     /// Shares of mark, their moments, and what follows from them.
-    fn integrate(
-        &self,
-        patch: &Patch,
-        sectors: &[Sector],
-        mark: [f32; 2],
-        noise: [f32; 2],
-        picture: &Picture<'_>,
-    ) -> Option<Centroid> {
-        let weights: Vec<Share> = sectors.iter().map(|s| Share::new(mark, s.background, noise)).collect();
+    fn integrate(&self, patch: &Patch, sectors: &[Sector], levels: &Levels, picture: &Picture<'_>) -> Option<Centroid> {
+        let weights = shares(sectors, levels);
         if weights.iter().all(|w| !w.variance.is_finite()) {
             return None;
         }
-        let profile = self.profile(patch, sectors, &weights);
+        let profile = self.profile(patch, sectors, &weights, levels);
         let mut moments = Moments::default();
         let mut cut = false;
         let (right, bottom) = (picture.layout.width_px as i64 - 1, picture.layout.height_px as i64 - 1);
@@ -320,7 +375,8 @@ impl Polar {
             if depth < -self.band_px {
                 moments.add(1.0, 0.0, dx, dy);
             } else {
-                let share = weights[sector].of(patch.luma[at], patch.component[at], sectors[sector].background);
+                let background = sectors[sector].background_at(&levels.slope, dx, dy);
+                let share = weights[sector].of(patch.luma[at], patch.component[at], background);
                 moments.add(share.unwrap_or_else(|| profile.at(depth)), weights[sector].variance, dx, dy);
             }
         });
@@ -333,18 +389,55 @@ impl Polar {
     }
 
     /// The mean share of mark against the depth, over the pixels that can be such a mixture.
-    fn profile(&self, patch: &Patch, sectors: &[Sector], weights: &[Share]) -> Profile {
+    fn profile(&self, patch: &Patch, sectors: &[Sector], weights: &[Share], levels: &Levels) -> Profile {
         let mut profile = Profile::new(self.band_px);
-        self.visit(patch, |at, _, _, distance, sector| {
+        self.visit(patch, |at, dx, dy, distance, sector| {
             let depth = distance - sectors[sector].radius_px;
-            if depth.abs() <= self.band_px
-                && let Some(share) = weights[sector].of(patch.luma[at], patch.component[at], sectors[sector].background)
-            {
-                profile.add(depth, share);
+            if depth.abs() <= self.band_px {
+                let background = sectors[sector].background_at(&levels.slope, dx, dy);
+                if let Some(share) = weights[sector].of(patch.luma[at], patch.component[at], background) {
+                    profile.add(depth, share);
+                }
             }
         });
         profile.finish()
     }
+}
+
+fn shares(sectors: &[Sector], levels: &Levels) -> Vec<Share> {
+    sectors.iter().map(|s| Share::new(levels.mark, s.background, levels.noise)).collect()
+}
+
+/// The plane that most sectors' backgrounds lie in, by least squares with outlying sectors left out (a strip's edge,
+/// a line). Flat where less than two thirds of them agree.
+fn background_slope(sectors: &[Sector], channel: usize, noise: f32) -> [f32; 2] {
+    let mut kept: Vec<bool> = sectors.iter().map(|s| s.known).collect();
+    let mut plane = [0.0f64; 3];
+    for _ in 0..4 {
+        let mut normal = nalgebra::Matrix3::zeros();
+        let mut right = nalgebra::Vector3::zeros();
+        for (sector, _) in sectors.iter().zip(&kept).filter(|(_, k)| **k) {
+            let row = nalgebra::Vector3::new(1.0, f64::from(sector.ring[0]), f64::from(sector.ring[1]));
+            normal += row * row.transpose();
+            right += row * f64::from(sector.background[channel]);
+        }
+        let Some(solution) = normal.cholesky().map(|c| c.solve(&right)) else { return [0.0; 2] };
+        plane = [solution[0], solution[1], solution[2]];
+        let residual = |s: &Sector| {
+            (f64::from(s.background[channel])
+                - plane[0]
+                - plane[1] * f64::from(s.ring[0])
+                - plane[2] * f64::from(s.ring[1]))
+            .abs() as f32
+        };
+        let mut sizes: Vec<f32> = sectors.iter().filter(|s| s.known).map(residual).collect();
+        let limit = (3.0 * 1.4826 * median(&mut sizes)).max(2.0 * noise);
+        kept = sectors.iter().map(|s| s.known && residual(s) <= limit).collect();
+    }
+    if 3 * kept.iter().filter(|k| **k).count() < 2 * sectors.len() {
+        return [0.0; 2];
+    }
+    [plane[1] as f32, plane[2] as f32]
 }
 
 /// Zeroth, first and second moments about the polar centre.
