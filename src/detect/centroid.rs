@@ -404,13 +404,34 @@ impl Polar {
     }
 }
 
-fn shares(sectors: &[Sector], levels: &Levels) -> Vec<Share> {
-    sectors.iter().map(|s| Share::new(levels.mark, s.background, levels.noise)).collect()
+/// Two halves of an eighth turn, side by side, differ by half of the whole range.
+fn has_edge(sectors: &[Sector], channel: usize, noise: f32) -> bool {
+    let n = sectors.len();
+    let mut levels: Vec<f32> = sectors.iter().map(|s| s.background[channel]).collect();
+    let half = (n / 16).max(1);
+    let mid =
+        |from: usize| median(&mut (0..half).map(|i| sectors[(from + i) % n].background[channel]).collect::<Vec<_>>());
+    let steepest = (0..n).map(|i| (mid(i) - mid((i + half) % n)).abs()).fold(0.0, f32::max);
+    levels.sort_by(f32::total_cmp);
+    let range = levels[n * 9 / 10] - levels[n / 10];
+    steepest > 0.5 * range && steepest > 4.0 * noise
 }
 
-/// The plane that most sectors' backgrounds lie in, by least squares with outlying sectors left out (a strip's edge,
-/// a line). Flat where less than two thirds of them agree.
+fn shares(sectors: &[Sector], levels: &Levels) -> Vec<Share> {
+    let contrast_at = |s: &Sector| {
+        // the background where the mark ends, not where the ring is read
+        let inward = s.radius_px / s.ring[0].hypot(s.ring[1]).max(1e-3);
+        s.background_at(&levels.slope, inward * s.ring[0], inward * s.ring[1])
+    };
+    sectors.iter().map(|s| Share::new(levels.mark, contrast_at(s), levels.noise)).collect()
+}
+
+/// The plane that the sectors' backgrounds lie in, by least squares with outlying sectors left out (a line). Flat
+/// where the background has an edge, such as a strip's, or where less than two thirds of the sectors agree.
 fn background_slope(sectors: &[Sector], channel: usize, noise: f32) -> [f32; 2] {
+    if has_edge(sectors, channel, noise) {
+        return [0.0; 2];
+    }
     let mut kept: Vec<bool> = sectors.iter().map(|s| s.known).collect();
     let mut plane = [0.0f64; 3];
     for _ in 0..4 {
@@ -605,3 +626,7 @@ fn fast_atan2(y: f32, x: f32) -> f32 {
     let half = if x < 0.0 { std::f32::consts::PI - octant } else { octant };
     if y < 0.0 { std::f32::consts::TAU - half } else { half }
 }
+
+#[cfg(test)]
+#[path = "centroid_tests.rs"]
+mod tests;

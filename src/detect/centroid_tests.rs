@@ -1,0 +1,95 @@
+use super::super::{Detector, Hue};
+use crate::experiment::MarkColour;
+use crate::video::{Layout, Matrix, OwnedPicture};
+
+/// A 4:2:0 picture of `colour(x, y)`, each luma pixel the mean of 6×6 points, chroma co-sited to the left.
+fn paint(width: usize, height: usize, colour: impl Fn(f64, f64) -> [f64; 3]) -> OwnedPicture {
+    let layout = Layout {
+        width_px: width,
+        height_px: height,
+        bits: 8,
+        low_bits: 0,
+        chroma_shift_x: 1,
+        chroma_shift_y: 1,
+        chroma_site_px: [0.0, 0.5],
+        full_range: false,
+        matrix: Matrix::Bt709,
+    };
+    let fine = |x: usize, y: usize| -> [f64; 3] {
+        let mut sum = [0.0; 3];
+        for i in 0..36 {
+            let (u, v) = ((i % 6) as f64, (i / 6) as f64);
+            let rgb = colour(x as f64 - 0.5 + (u + 0.5) / 6.0, y as f64 - 0.5 + (v + 0.5) / 6.0);
+            let ycc = layout.matrix.ycbcr(rgb);
+            (0..3).for_each(|k| sum[k] += ycc[k] / 36.0);
+        }
+        sum
+    };
+    let full: Vec<[f64; 3]> = (0..width * height).map(|i| fine(i % width, i / width)).collect();
+    let mut picture = OwnedPicture::black(layout);
+    for (i, ycc) in full.iter().enumerate() {
+        picture.set(0, i, (16.0 + 219.0 * ycc[0]).round() as u16);
+    }
+    let (cw, ch) = layout.chroma_size();
+    for y in 0..ch {
+        for x in 0..cw {
+            for plane in 1..3 {
+                let at = |dx: i64, row: usize| {
+                    let column = (2 * x as i64 + dx).clamp(0, width as i64 - 1) as usize;
+                    full[row.min(height - 1) * width + column][plane]
+                };
+                let mean: f64 =
+                    [2 * y, 2 * y + 1].iter().map(|r| at(-1, *r) + 2.0 * at(0, *r) + at(1, *r)).sum::<f64>() / 8.0;
+                picture.set(plane, y * cw + x, (128.0 + 224.0 * mean).round() as u16);
+            }
+        }
+    }
+    picture
+}
+
+/// Largest and mean error over sixteen positions of a red disc of 22 px over `behind`.
+fn errors(behind: impl Fn(f64, f64, [f64; 2]) -> [f64; 3]) -> (f64, [f64; 2]) {
+    let detector = Detector::new(vec![Hue { colour: MarkColour::red(), marks: 1, threshold: 60.0, thin: false }]);
+    let (mut worst, mut mean) = (0.0f64, [0.0; 2]);
+    for k in 0..16 {
+        let truth = [40.0 + f64::from(k) * 0.137, 38.0 + f64::from(k * 5 % 16) * 0.131];
+        let picture = paint(84, 80, |x, y| {
+            let inside = (x - truth[0]).hypot(y - truth[1]) <= 11.0;
+            if inside { [0.8, 0.1, 0.1] } else { behind(x, y, truth) }
+        });
+        let blobs = detector.detect(&picture.view()).unwrap();
+        assert_eq!(blobs.len(), 1, "{blobs:?}");
+        let c = blobs[0].centroid;
+        let error = [c.x_px - truth[0], c.y_px - truth[1]];
+        worst = worst.max(error[0].abs()).max(error[1].abs());
+        mean = [mean[0] + error[0] / 16.0, mean[1] + error[1] / 16.0];
+    }
+    (worst, mean)
+}
+
+#[test]
+fn a_disc_on_white_is_found_to_a_hundredth_of_a_pixel_at_every_phase() {
+    let (worst, mean) = errors(|_, _, _| [0.9, 0.9, 0.9]);
+    assert!(worst < 0.015 && mean[0].abs() < 0.005 && mean[1].abs() < 0.005, "{worst} {mean:?}");
+}
+
+#[test]
+fn a_disc_half_on_an_amber_strip_and_half_on_the_dark_is_not_drawn_to_either() {
+    let (worst, mean) = errors(|_, y, t| if y < t[1] { [0.77, 0.52, 0.18] } else { [0.12, 0.13, 0.14] });
+    assert!(worst < 0.06 && mean[0].abs() < 0.015 && mean[1].abs() < 0.03, "{worst} {mean:?}");
+}
+
+#[test]
+fn a_background_that_brightens_across_the_mark_does_not_move_it() {
+    let (worst, mean) = errors(|x, _, t| [0.5 + 0.005 * (x - t[0]); 3]);
+    assert!(worst < 0.04 && mean[0].abs() < 0.03, "{worst} {mean:?}");
+}
+
+#[test]
+fn a_dark_line_through_the_mark_and_a_distant_object_do_not_move_it() {
+    let (worst, mean) = errors(|x, y, t| {
+        let on_line = ((x - t[0]) * 0.6 - (y - t[1]) * 0.8).abs() < 0.8 && x > t[0];
+        if on_line || x > t[0] + 24.0 { [0.05, 0.05, 0.4] } else { [0.85, 0.85, 0.85] }
+    });
+    assert!(worst < 0.1 && mean[0].abs() < 0.03, "{worst} {mean:?}");
+}
