@@ -228,3 +228,10 @@ fn a_fixed_pivot_carries_no_mark() {
     let error = Recording::of(&experiment).unwrap_err().to_string();
     assert_eq!(error, "rig.marks: names 1 colours for 2 marks; name one a mark, top to bottom");
 }
+
+#[test]
+fn the_hard_recording_of_the_fixtures_renders() {
+    let path = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("fixtures/render/hard.toml");
+    let recording = Recording::of(&Experiment::read(&path).unwrap()).unwrap();
+    assert_eq!(recording.frames().count(), 27);
+}

@@ -314,8 +314,8 @@ impl Default for Render {
             strip_width_px: 48.0,
             strip_rgb: Rgb([196, 132, 46]),
             strip_sheen: 0.5,
-            background_rgb: Rgb([46, 50, 56]),
-            vignette: 0.6,
+            background_rgb: Rgb([58, 64, 74]),
+            vignette: 0.85,
             stand: true,
             distractor: None,
             captions: Vec::new(),
@@ -373,7 +373,7 @@ impl Render {
         within("render.tilt_rad", self.tilt_rad, -3.2, 3.2)?;
         within("render.row_time_s", self.row_time_s, 0.0, 1.0 / self.fps / f64::from(self.height_px))?;
         within("render.jitter_s", self.jitter_s, 0.0, 0.2 / self.fps)?;
-        if self.hinge_px.iter().any(|p| !(p.abs() <= f64::from(MAX_SIDE_PX))) {
+        if !self.hinge_px.iter().all(|p| p.abs() <= f64::from(MAX_SIDE_PX)) {
             return Err("render.hinge_px: must be two numbers of pixels near the picture".to_owned());
         }
         if self.dropped_frames.iter().filter(|f| **f < self.nominal_frames()).count() as u64 >= self.nominal_frames() {
@@ -399,7 +399,7 @@ impl Render {
             within("render.captions.height_px", caption.height_px, 1.0, 1024.0)?;
         }
         for occlusion in &self.occlusions {
-            if occlusion.rect_px.iter().any(|v| !(v.abs() <= f64::from(MAX_SIDE_PX))) {
+            if !occlusion.rect_px.iter().all(|v| v.abs() <= f64::from(MAX_SIDE_PX)) {
                 return Err("render.occlusions.rect_px: must be left, top, width, height in pixels".to_owned());
             }
             not_negative("render.occlusions.until_s - from_s", occlusion.until_s - occlusion.from_s)?;

@@ -48,14 +48,16 @@ impl<'a> Backdrop<'a> {
         light
     }
 
-    /// A wall lit from the upper left, darker towards the corners, with the soft glow of a viewport behind the strip.
+    /// A wall lit from the upper left, darker towards the corners: a round glow with a soft rim, and a rail out of focus.
     fn wall(&self, p: [f64; 2]) -> Light {
         let (w, h) = (f64::from(self.render.width_px), f64::from(self.render.height_px));
-        let (u, v) = ((p[0] - 0.46 * w) / w, (p[1] - 0.42 * h) / w);
-        let fall = (-(u * u + 1.6 * v * v) / 0.11).exp();
-        let rail = 0.10 * (-((p[0] - 0.80 * w) / (0.018 * w)).powi(2)).exp();
-        let shade = (1.0 - self.render.vignette * (1.0 - fall)) * (1.0 + rail);
-        light_of(self.render.background_rgb, self.render.gamma).map(|c| c * shade as f32)
+        let (u, v) = ((p[0] - 0.47 * w) / w, (p[1] - 0.44 * h) / w);
+        let r2 = u * u + 1.3 * v * v;
+        let glow = (-r2 / 0.075).exp();
+        let rim = 0.12 * (-((r2.sqrt() - 0.31) / 0.02).powi(2)).exp();
+        let rail = 0.14 * (-((p[0] - 0.845 * w) / (0.012 * w)).powi(2)).exp();
+        let shade = 1.0 - self.render.vignette * (1.0 - glow - rim - rail);
+        light_of(self.render.background_rgb, self.render.gamma).map(|c| c * shade.max(0.0) as f32)
     }
 
     /// A crossbeam above the picture's subject, and the bracket that holds the hinge.

@@ -120,7 +120,8 @@ impl Outline {
         let pieces = (0..last).map(|i| {
             let (upper, lower) = (curve[i], curve[i + 1]);
             let along = direction(upper, lower);
-            let glint = 1.0 + look.sheen * (0.30 * along[0] + 0.12 * (9.0 * along[0] + 0.4).sin());
+            // A film mirrors the lamps: its brightness follows its slope.
+            let glint = 1.0 + look.sheen * (0.45 * along[0] + 0.25 * (7.0 * along[0] + 0.6).sin());
             Piece {
                 upper,
                 lower,
@@ -202,7 +203,7 @@ impl Outline {
             let half = self.look.half_width_px;
             let cover = between * (edge.coverage(half - across) - edge.coverage(-half - across));
             let q = (across / half.max(1e-9)).clamp(-1.0, 1.0);
-            let shade = piece.glint + self.look.sheen * (0.22 * (1.0 - q * q) - 0.25 + 0.16 * q);
+            let shade = piece.glint + self.look.sheen * (0.30 - 0.75 * q * q + 0.30 * q);
             row.instant_cover[x - row.left] += cover;
             row.instant_light[x - row.left] += cover * shade as f32;
         }
