@@ -10,11 +10,20 @@
 //! | model | `model` | the forward model of the swing |
 //! | synth | `synth` | exact swings, rendered recordings with known truth |
 
+pub mod angles;
+pub mod calibrate;
+#[doc(hidden)]
 pub mod cli;
+pub mod detect;
 pub mod error;
 pub mod experiment;
+pub mod measure;
 pub mod model;
+pub mod output;
+pub mod progress;
+pub mod sidecar;
 pub mod synth;
+pub mod track;
 pub mod video;
 
 pub use error::{Error, Result};

@@ -1,5 +1,5 @@
-use std::process::ExitCode;
+//! `freeswing`: every command.
 
-fn main() -> ExitCode {
-    freeswing::cli::run()
+fn main() -> std::process::ExitCode {
+    freeswing::cli::Cli::run()
 }

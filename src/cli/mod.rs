@@ -1,34 +1,60 @@
 //! The command line: parse → options → stage → write → exit code. One file a command.
 
-pub mod render;
+mod bar;
+mod render;
+mod track;
 
 use std::process::ExitCode;
 
 use clap::{Parser, Subcommand};
 
+pub use bar::Bar;
+
 /// Measures vibration from video.
 #[derive(Debug, Parser)]
-#[command(name = "freeswing", version, about)]
-struct Cli {
+#[command(name = "freeswing", version, about, arg_required_else_help = true)]
+pub struct Cli {
     #[command(subcommand)]
     command: Command,
 }
 
 #[derive(Debug, Subcommand)]
 enum Command {
-    /// Make a synthetic recording with known truth.
-    Render(render::Args),
+    Track(track::TrackArgs),
+    Render(render::RenderArgs),
 }
 
-/// Runs the command that was typed: 0 when done, 2 for bad input or a failed stage, said in one line on standard error.
-pub fn run() -> ExitCode {
-    let result = match Cli::parse().command {
-        Command::Render(args) => render::run(&args),
-    };
-    match result {
+/// `track` alone, so that `track VIDEO --out angles.csv` works as typed.
+#[derive(Debug, Parser)]
+#[command(name = "track", version)]
+pub struct TrackCli {
+    #[command(flatten)]
+    args: track::TrackArgs,
+}
+
+impl Cli {
+    /// Runs the command.
+    pub fn run() -> ExitCode {
+        exit(match Self::parse().command {
+            Command::Track(args) => args.run(),
+            Command::Render(args) => args.run(),
+        })
+    }
+}
+
+impl TrackCli {
+    /// Runs `track`.
+    pub fn run() -> ExitCode {
+        exit(Self::parse().args.run())
+    }
+}
+
+/// 0 done, 2 bad input or a failed stage, with one line on standard error.
+fn exit(outcome: crate::Result<()>) -> ExitCode {
+    match outcome {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {
-            eprintln!("freeswing: {error:#}");
+            eprintln!("error: {error}");
             ExitCode::from(2)
         }
     }

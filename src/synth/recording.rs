@@ -16,7 +16,7 @@ use super::swing::Swing;
 use super::truth::{PendingTable, Truth};
 use crate::error::{Error, Result};
 use crate::experiment::{Experiment, MarkColour, Render, Rgb};
-use crate::video::encode::TICKS_PER_SECOND;
+use crate::video::TICKS_PER_SECOND;
 use crate::video::{Layout, OwnedPicture, VideoWriter};
 
 /// One frame of a synthetic recording.

@@ -1,10 +1,21 @@
-//! Frames with their time stamps.
+//! Frames with their time stamps: a container is split at key frames and decoded on all cores, in order.
 
-pub mod encode;
-pub mod picture;
+mod container;
+mod decode;
+mod encode;
+mod frame;
+mod orientation;
+mod picture;
+mod segments;
+mod timing;
 
-pub use encode::VideoWriter;
+pub use container::{Container, StreamInfo};
+pub use decode::{Decoded, DecoderRecipe, StreamDecoder, decode_in_order};
+pub use encode::{TICKS_PER_SECOND, VideoWriter};
+pub use frame::Frame;
+pub use orientation::Orientation;
 pub use picture::{Layout, Matrix, OwnedPicture, Picture, Plane};
+pub use timing::{Gap, Timing};
 
 /// Longest picture side that is measured.
 pub const MAX_SIDE_PX: u32 = 16384;

@@ -1,0 +1,183 @@
+//! `track VIDEO --out angles.csv`.
+
+use std::path::{Path, PathBuf};
+
+use clap::{Args, ValueEnum};
+
+use super::Bar;
+use crate::angles::{self, AngleSource};
+use crate::error::{Error, Result};
+use crate::experiment::{Experiment, MarkColour};
+use crate::measure::{Measurement, Options, measure};
+use crate::output::OutputFile;
+use crate::sidecar::Sidecar;
+
+/// Follow the marks of a recording and write their angles.
+#[derive(Debug, Args)]
+#[command(after_help = "\
+Examples:
+  track videos/kapton.mp4 --out angles.csv
+  track pendulum.mp4 --out angles.csv --color red --color green --pivot 497,508
+  track swing.mov --out angles.csv --config experiment.toml --overlay seen.mp4
+
+Beside angles.csv stands angles.json: the source and its SHA-256, the options, the time stamps' gaps and jitter,
+the noise, and every warning. Exit code 0: done; 2: bad input, nothing written.")]
+pub struct TrackArgs {
+    /// The recording: MP4, MOV, AVI, MKV, …
+    video: PathBuf,
+    /// The table of angles; `-` for standard output.
+    #[arg(long, value_name = "CSV")]
+    out: PathBuf,
+    /// The experiment: marks, pivot, mirror, plumb line, lens.
+    #[arg(long, value_name = "TOML")]
+    config: Option<PathBuf>,
+    /// Colour of the marks, a name or #rrggbb; once for all, or once a mark, top to bottom.
+    #[arg(long, value_name = "COLOUR")]
+    color: Vec<MarkColour>,
+    /// Number of marks.
+    #[arg(long, value_name = "N")]
+    markers: Option<usize>,
+    /// A fixed, unmarked pivot above the first mark, in displayed pixels.
+    #[arg(long, value_name = "X,Y", value_parser = point)]
+    pivot: Option<[f64; 2]>,
+    /// The camera looks into a mirror.
+    #[arg(long)]
+    mirrored: bool,
+    /// Least colour component of a mark, 0 to 255; chosen from the recording otherwise.
+    #[arg(long, value_name = "0..255")]
+    threshold: Option<f64>,
+    /// Positions behind the angles.
+    #[arg(long, value_name = "WHICH", default_value = "measured")]
+    angles_from: AnglesFrom,
+    /// How a mark is represented by one point.
+    #[arg(long, value_name = "HOW", default_value = "subpixel")]
+    centroid: CentroidKind,
+    /// Cores to use; all by default.
+    #[arg(long, value_name = "N")]
+    threads: Option<usize>,
+    /// No progress bar and no warnings.
+    #[arg(long)]
+    quiet: bool,
+}
+
+#[derive(Debug, Clone, Copy, ValueEnum)]
+enum AnglesFrom {
+    /// Centroids; gaps stay gaps.
+    Measured,
+    /// Fixed-interval smoother; gaps are bridged.
+    Smoothed,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+enum CentroidKind {
+    /// Background removed, luma and colour weighted.
+    Subpixel,
+    /// Mean of the binary mask, for comparison.
+    Binary,
+}
+
+fn point(text: &str) -> std::result::Result<[f64; 2], String> {
+    let numbers: Vec<f64> = text.split(',').filter_map(|n| n.trim().parse().ok()).collect();
+    match numbers[..] {
+        [x, y] if x.is_finite() && y.is_finite() => Ok([x, y]),
+        _ => Err("give two numbers as X,Y".to_owned()),
+    }
+}
+
+impl TrackArgs {
+    /// Runs the command.
+    ///
+    /// # Errors
+    /// Whatever [`measure`] and the outputs report.
+    pub fn run(&self) -> Result<()> {
+        let experiment = self.config.as_deref().map(Experiment::read).transpose()?.unwrap_or_default();
+        let folder = self.config.as_deref().and_then(Path::parent).unwrap_or(Path::new("")).to_owned();
+        let options = self.options(experiment)?;
+        let table = OutputFile::create(&self.out)?;
+        let beside = self.sidecar_path().map(|path| OutputFile::create(&path)).transpose()?;
+        let bar = Bar::new(self.quiet);
+        let measurement = measure(&self.video, &options, &folder, &bar)?;
+        let sidecar = Sidecar::new(&self.video, &options, &measurement)?;
+        drop(bar);
+        table.commit(angles::to_csv(&measurement.tracks, &measurement.angles).as_bytes())?;
+        if let Some(beside) = beside {
+            beside.commit(sidecar.to_json().as_bytes())?;
+        }
+        if !self.quiet {
+            self.report(&measurement, &sidecar);
+        }
+        Ok(())
+    }
+
+    fn options(&self, experiment: Experiment) -> Result<Options> {
+        let mut rig = experiment.rig;
+        rig.mirrored |= self.mirrored;
+        rig.pivot_px = self.pivot.or(rig.pivot_px);
+        let threshold = self.threshold;
+        if threshold.is_some_and(|t| !(t > 0.0 && t < 255.0)) {
+            return Err(option("--threshold", "must lie between 0 and 255"));
+        }
+        if self.threads == Some(0) {
+            return Err(option("--threads", "must be at least 1"));
+        }
+        let defaults = Options::default();
+        Ok(Options {
+            marks: self.marks(&rig.marks, rig.pivot_px.is_some())?,
+            rig,
+            threshold,
+            angle_source: match self.angles_from {
+                AnglesFrom::Measured => AngleSource::Measured,
+                AnglesFrom::Smoothed => AngleSource::Smoothed,
+            },
+            binary_centroid: self.centroid == CentroidKind::Binary,
+            workers: self.threads.unwrap_or(defaults.workers),
+        })
+    }
+
+    /// One colour a mark: the command line before the file before the paper's three red ones.
+    fn marks(&self, configured: &[MarkColour], pivot: bool) -> Result<Vec<MarkColour>> {
+        let given = if self.color.is_empty() { configured } else { &self.color };
+        let usual = if pivot { 2 } else { 3 };
+        let marks = match given {
+            [] => vec![MarkColour::red(); self.markers.unwrap_or(usual)],
+            [one] if self.color.len() == 1 => vec![one.clone(); self.markers.unwrap_or(configured.len().max(usual))],
+            several => several.to_vec(),
+        };
+        if self.markers.is_some_and(|n| n != marks.len()) {
+            let message = format!("{} marks asked for, {} colours given", self.markers.unwrap_or(0), marks.len());
+            return Err(option("--markers", &message));
+        }
+        let least = if pivot { 1 } else { 2 };
+        if !(least..=12).contains(&marks.len()) {
+            let message = format!(
+                "an angle needs {least} to 12 marks{}",
+                if pivot { " below the pivot" } else { " or a --pivot" }
+            );
+            return Err(option("--markers", &message));
+        }
+        Ok(marks)
+    }
+
+    fn sidecar_path(&self) -> Option<PathBuf> {
+        (self.out.as_os_str() != "-" && (self.out.is_file() || !self.out.exists()))
+            .then(|| self.out.with_extension("json"))
+    }
+
+    fn report(&self, measurement: &Measurement, sidecar: &Sidecar) {
+        for warning in &sidecar.warnings {
+            eprintln!("warning: {warning}");
+        }
+        let links = &measurement.angles.links;
+        let measured = (0..measurement.timing.frames).filter(|f| links.iter().all(|l| l[*f].is_some())).count();
+        eprintln!(
+            "{}: {} frames, all angles in {measured}, written to {}",
+            self.video.display(),
+            measurement.timing.frames,
+            self.out.display()
+        );
+    }
+}
+
+fn option(option: &str, message: &str) -> Error {
+    Error::Option { option: option.to_owned(), message: message.to_owned() }
+}

@@ -1,0 +1,113 @@
+//! The colour component of a picture: how much of the marks' hue each chroma sample carries.
+//!
+//! The paper takes the red component less the grey one (Fig. 8 b). In Y′C_bC_r that difference already stands in
+//! the file: R′ − Y′ is proportional to C_r. For any hue the component is the projection on the hue's direction,
+//! less what lies across it, so that a sample more than 45° away from the hue counts for nothing:
+//!
+//! ```text
+//! component = u·C_b + v·C_r − |u·C_r − v·C_b|,   (u, v) the unit vector of the mark's hue
+//! ```
+
+use crate::experiment::MarkColour;
+use crate::video::{Matrix, Picture};
+
+/// Fixed-point ones in [`HueAxis`].
+const ONE: f64 = 64.0;
+
+/// Columns of chroma samples that are judged together in the scan.
+pub(super) const BLOCK: usize = 32;
+
+/// The direction of a hue in the plane of the colour differences, in 64ths.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct HueAxis {
+    u: i16,
+    v: i16,
+}
+
+impl HueAxis {
+    /// The hue of `colour` as `matrix` codes it.
+    pub fn new(colour: &MarkColour, matrix: Matrix) -> Self {
+        let [_, cb, cr] = matrix.ycbcr(colour.rgb.map(|c| f64::from(c) / 255.0));
+        let norm = cb.hypot(cr).max(1e-9);
+        Self { u: (ONE * cb / norm).round() as i16, v: (ONE * cr / norm).round() as i16 }
+    }
+
+    /// The unit vector (C_b, C_r).
+    pub fn unit(self) -> (f64, f64) {
+        let (u, v) = (f64::from(self.u), f64::from(self.v));
+        let norm = u.hypot(v);
+        (u / norm, v / norm)
+    }
+
+    /// The component of 8-bit codes, in 64ths of a code.
+    #[inline]
+    fn of(self, cb: u8, cr: u8) -> i16 {
+        let (b, r) = (i16::from(cb) - 128, i16::from(cr) - 128);
+        (self.u * b + self.v * r) - (self.u * r - self.v * b).abs()
+    }
+
+    /// The component at chroma sample (x, y), in 64ths of an 8-bit code.
+    #[inline]
+    pub fn at(self, picture: &Picture<'_>, x: usize, y: usize) -> i16 {
+        let wide = picture.wide();
+        let down = picture.layout.low_bits + picture.layout.bits - 8;
+        let code = |p: &crate::video::Plane<'_>| (p.code(wide, x, y) >> down) as u8;
+        self.of(code(&picture.cb), code(&picture.cr))
+    }
+
+    /// Largest component in each run of [`BLOCK`] samples of chroma row `y`.
+    pub(super) fn block_maxima(self, picture: &Picture<'_>, y: usize, maxima: &mut [i16]) {
+        let (width, _) = picture.layout.chroma_size();
+        if picture.wide() || picture.cb.step != 1 {
+            for (block, max) in maxima.iter_mut().enumerate() {
+                let columns = block * BLOCK..((block + 1) * BLOCK).min(width);
+                *max = columns.map(|x| self.at(picture, x, y)).max().unwrap_or(i16::MIN);
+            }
+            return;
+        }
+        let cb = &picture.cb.bytes[y * picture.cb.stride..][..width];
+        let cr = &picture.cr.bytes[y * picture.cr.stride..][..width];
+        for ((cb, cr), max) in cb.chunks(BLOCK).zip(cr.chunks(BLOCK)).zip(maxima) {
+            // a plain fold over bytes, which the compiler turns into vector instructions
+            *max = cb.iter().zip(cr).fold(i16::MIN, |m, (b, r)| m.max(self.of(*b, *r)));
+        }
+    }
+}
+
+/// Codes (in 64ths) → the scale on which a fully saturated colour counts about 255.
+pub fn to_255(component: f64) -> f64 {
+    component / ONE * 255.0 / 112.0
+}
+
+/// The inverse of [`to_255`], as the integer that a component must exceed.
+pub fn from_255(value: f64) -> i16 {
+    (value * 112.0 / 255.0 * ONE).clamp(0.0, f64::from(i16::MAX)) as i16
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn codes(rgb: [u8; 3]) -> (u8, u8) {
+        let [_, cb, cr] = Matrix::Bt601.ycbcr(rgb.map(|c| f64::from(c) / 255.0));
+        ((128.0 + 224.0 * cb).round() as u8, (128.0 + 224.0 * cr).round() as u8)
+    }
+
+    #[test]
+    fn a_pure_colour_counts_in_full_and_greys_and_opposites_do_not() {
+        let axis = HueAxis::new(&MarkColour::red(), Matrix::Bt601);
+        let value = |rgb| {
+            let (cb, cr) = codes(rgb);
+            to_255(f64::from(axis.of(cb, cr)))
+        };
+        assert!(value([255, 0, 0]) > 240.0);
+        assert!(value([200, 200, 200]).abs() < 6.0);
+        assert!(value([0, 0, 255]) < 0.0 && value([0, 255, 0]) < 0.0 && value([255, 200, 0]) < 0.0);
+        assert!(value([208, 128, 32]) < 0.3 * value([200, 30, 30]), "amber film is not red");
+    }
+
+    #[test]
+    fn the_scale_inverts() {
+        assert!((to_255(f64::from(from_255(80.0))) - 80.0).abs() < 0.1);
+    }
+}

@@ -1,0 +1,83 @@
+//! Files written whole or not at all: a temporary beside the target, renamed when finished.
+
+use std::fs::Permissions;
+use std::io::Write;
+use std::path::{Path, PathBuf};
+
+use tempfile::NamedTempFile;
+
+use crate::error::{Error, Result};
+
+/// An output that appears only when it is [committed](OutputFile::commit).
+#[derive(Debug)]
+pub struct OutputFile {
+    path: PathBuf,
+    sink: Sink,
+}
+
+#[derive(Debug)]
+enum Sink {
+    /// Beside the target, renamed over it.
+    Temporary(NamedTempFile),
+    /// A pipe or device, which cannot be renamed over.
+    Device,
+    /// `-`.
+    StandardOutput,
+}
+
+impl OutputFile {
+    /// Makes sure that `path` can be written, before any work is done.
+    ///
+    /// # Errors
+    /// [`Error::Unwritable`].
+    pub fn create(path: &Path) -> Result<Self> {
+        let sink = if path.as_os_str() == "-" {
+            Sink::StandardOutput
+        } else if path.is_dir() {
+            let kind = std::io::Error::other("it is a folder");
+            return Err(Error::unwritable(path, kind));
+        } else if path.exists() && !path.is_file() {
+            Sink::Device
+        } else {
+            Sink::Temporary(temporary_beside(path)?)
+        };
+        Ok(Self { path: path.to_owned(), sink })
+    }
+
+    /// Writes everything and lets the file appear.
+    ///
+    /// # Errors
+    /// [`Error::Unwritable`]; nothing appears then.
+    pub fn commit(self, contents: &[u8]) -> Result<()> {
+        let failed = |e| Error::unwritable(&self.path, e);
+        match self.sink {
+            Sink::StandardOutput => std::io::stdout().write_all(contents).map_err(failed),
+            Sink::Device => std::fs::write(&self.path, contents).map_err(failed),
+            Sink::Temporary(mut file) => {
+                file.write_all(contents).and_then(|()| file.as_file().sync_all()).map_err(failed)?;
+                file.persist(&self.path).map(|_| ()).map_err(|e| Error::unwritable(&self.path, e.error))
+            }
+        }
+    }
+}
+
+/// A temporary file in the folder of `path`, with its extension, deleted unless it is persisted.
+///
+/// # Errors
+/// [`Error::Unwritable`].
+pub fn temporary_beside(path: &Path) -> Result<NamedTempFile> {
+    let folder = match path.parent() {
+        Some(parent) if !parent.as_os_str().is_empty() => parent,
+        _ => Path::new("."),
+    };
+    let suffix = path.extension().map(|e| format!(".{}", e.to_string_lossy())).unwrap_or_default();
+    let mut builder = tempfile::Builder::new();
+    builder.prefix(".freeswing-").suffix(&suffix);
+    #[cfg(unix)]
+    {
+        use std::os::unix::fs::PermissionsExt;
+        // the umask applies, as to any file a program makes
+        builder.permissions(Permissions::from_mode(0o666));
+    }
+    builder.tempfile_in(folder).map_err(|e| Error::unwritable(path, e))
+}

@@ -1,0 +1,269 @@
+//! `angles.json`: what a reader of `angles.csv` should know about where it came from.
+
+use std::path::Path;
+
+use serde::Serialize;
+use sha2::{Digest, Sha256};
+
+use crate::angles::AngleSource;
+use crate::error::{Error, Result};
+use crate::measure::{Measurement, Options};
+use crate::track::Point;
+use crate::video::Timing;
+
+/// The file, ready to be written.
+#[derive(Debug, Serialize)]
+pub struct Sidecar {
+    schema: &'static str,
+    program: &'static str,
+    version: &'static str,
+    source: Source,
+    options: Settings,
+    pixel_origin: &'static str,
+    video: Video,
+    time_stamps: Timing,
+    marks: Vec<Mark>,
+    angles: Vec<Link>,
+    damage: Damage,
+    /// Everything that a person should know.
+    pub warnings: Vec<String>,
+}
+
+#[derive(Debug, Serialize)]
+struct Source {
+    file: String,
+    bytes: u64,
+    sha256: String,
+}
+
+#[derive(Debug, Serialize)]
+struct Settings {
+    marks: Vec<String>,
+    pivot_px: Option<[f64; 2]>,
+    mirrored: bool,
+    plumb_px: Option<[[f64; 2]; 2]>,
+    lens_calibration: Option<String>,
+    angles_from: &'static str,
+    centroid: &'static str,
+    threshold: Vec<Threshold>,
+}
+
+#[derive(Debug, Serialize)]
+struct Threshold {
+    colour: String,
+    of_255: f64,
+    chosen: bool,
+}
+
+#[derive(Debug, Serialize)]
+struct Video {
+    container: String,
+    codec: String,
+    stream: usize,
+    streams: usize,
+    width_px: usize,
+    height_px: usize,
+    rotation_deg: i32,
+    pixel_aspect: f64,
+}
+
+#[derive(Debug, Serialize)]
+struct Mark {
+    colour: String,
+    frames_measured: usize,
+    share_measured: f64,
+    longest_gap_frames: usize,
+    partial_frames: usize,
+    median_area_px2: f64,
+    /// Root mean square stated standard deviation, the noise estimate.
+    noise_px: [f64; 2],
+    /// Factor by which the track's own scatter corrected the stated standard deviation.
+    scatter_factor: [f64; 2],
+    acceleration_psd_px2_s3: f64,
+}
+
+#[derive(Debug, Serialize)]
+struct Link {
+    frames_measured: usize,
+    /// Median stated standard deviation, the noise estimate.
+    noise_rad: f64,
+}
+
+#[derive(Debug, Serialize)]
+struct Damage {
+    packets: u64,
+    damaged_packets: u64,
+    damaged_frames: Vec<usize>,
+    frames_of_another_size: u64,
+    frames_without_time_stamp: u64,
+    read_error: Option<String>,
+}
+
+impl Sidecar {
+    /// Gathers everything; reads the source once more for its digest.
+    ///
+    /// # Errors
+    /// [`Error::Unreadable`].
+    pub fn new(path: &Path, options: &Options, m: &Measurement) -> Result<Self> {
+        let (width_px, height_px) = m.stream.orientation.size(m.stream.stored_size_px);
+        let mut sidecar = Self {
+            schema: "freeswing.angles/1",
+            program: env!("CARGO_PKG_NAME"),
+            version: env!("CARGO_PKG_VERSION"),
+            source: Source::read(path)?,
+            options: Settings::new(options, m),
+            pixel_origin: "the centre of the top-left displayed pixel is (0, 0); x right, y down",
+            video: Video {
+                container: m.stream.container.clone(),
+                codec: m.stream.codec.clone(),
+                stream: m.stream.stream,
+                streams: m.stream.streams,
+                width_px,
+                height_px,
+                rotation_deg: m.stream.orientation.degrees(),
+                pixel_aspect: m.stream.pixel_aspect,
+            },
+            time_stamps: m.timing.clone(),
+            marks: (0..options.marks.len()).map(|i| Mark::new(options, m, i)).collect(),
+            angles: m.angles.links.iter().map(|link| Link::new(link)).collect(),
+            damage: Damage {
+                packets: m.decoded.packets,
+                damaged_packets: m.decoded.damaged_packets,
+                damaged_frames: m.tracks.damaged_frames.clone(),
+                frames_of_another_size: m.decoded.resized_frames,
+                frames_without_time_stamp: m.decoded.unstamped_frames,
+                read_error: m.decoded.read_error.clone(),
+            },
+            warnings: Vec::new(),
+        };
+        sidecar.warnings = sidecar.find_warnings(m);
+        Ok(sidecar)
+    }
+
+    /// The file's text.
+    pub fn to_json(&self) -> String {
+        // every field is a number, a string or a list of them, which cannot fail to serialise
+        serde_json::to_string_pretty(self).unwrap_or_default() + "\n"
+    }
+
+    fn find_warnings(&self, m: &Measurement) -> Vec<String> {
+        let mut warnings = m.timing.warnings();
+        let damage = &self.damage;
+        if damage.damaged_packets > 0 || !damage.damaged_frames.is_empty() {
+            let at = damage.damaged_frames.first().map(|f| m.timing_at(*f));
+            warnings.push(format!(
+                "the file is damaged: {} packets refused, {} frames not measured{}; the rest is measured",
+                damage.damaged_packets,
+                damage.damaged_frames.len(),
+                at.map(|t| format!(", the first at {t:.3} s")).unwrap_or_default()
+            ));
+        }
+        if let Some(error) = &damage.read_error {
+            warnings.push(format!(
+                "reading stopped at {:.3} s: {error}; the file is cut off or damaged there",
+                m.timing.last_s
+            ));
+        } else if m.stream.stated_frames.is_some_and(|n| n > m.decoded.packets) {
+            warnings.push(format!(
+                "the file states {} frames and holds {}; it ends early",
+                m.stream.stated_frames.unwrap_or(0),
+                m.decoded.packets
+            ));
+        }
+        for (i, mark) in self.marks.iter().enumerate() {
+            if mark.share_measured < 0.98 {
+                warnings.push(format!(
+                    "mark {} ({}) was measured in {:.1} % of the frames, longest gap {} frames",
+                    i + 1,
+                    mark.colour,
+                    100.0 * mark.share_measured,
+                    mark.longest_gap_frames
+                ));
+            }
+        }
+        if m.stream.streams > 1 && m.stream.other_videos > 0 {
+            warnings.push(format!("the file holds several video streams; stream {} was measured", m.stream.stream));
+        }
+        warnings
+    }
+}
+
+impl Source {
+    fn read(path: &Path) -> Result<Self> {
+        let failed = |e| Error::unreadable(path, e);
+        let mut file = std::fs::File::open(path).map_err(failed)?;
+        let mut digest = Sha256::new();
+        let mut buffer = vec![0u8; 1 << 20];
+        let mut bytes = 0;
+        loop {
+            let n = std::io::Read::read(&mut file, &mut buffer).map_err(failed)?;
+            if n == 0 {
+                break;
+            }
+            bytes += n as u64;
+            digest.update(&buffer[..n]);
+        }
+        let sha256 = digest.finalize().iter().map(|b| format!("{b:02x}")).collect();
+        let file = path.file_name().map(|n| n.to_string_lossy().into_owned()).unwrap_or_default();
+        Ok(Self { file, bytes, sha256 })
+    }
+}
+
+impl Settings {
+    fn new(options: &Options, m: &Measurement) -> Self {
+        Self {
+            marks: options.marks.iter().map(|c| c.name.clone()).collect(),
+            pivot_px: options.rig.pivot_px,
+            mirrored: options.rig.mirrored,
+            plumb_px: options.rig.plumb_px,
+            lens_calibration: options.rig.lens_calibration.as_ref().map(|p| p.display().to_string()),
+            angles_from: match options.angle_source {
+                AngleSource::Measured => "measured",
+                AngleSource::Smoothed => "smoothed",
+            },
+            centroid: if options.binary_centroid { "binary" } else { "subpixel" },
+            threshold: m
+                .hues
+                .iter()
+                .map(|h| Threshold {
+                    colour: h.colour.name.clone(),
+                    of_255: h.threshold,
+                    chosen: options.threshold.is_none(),
+                })
+                .collect(),
+        }
+    }
+}
+
+impl Mark {
+    fn new(options: &Options, m: &Measurement, index: usize) -> Self {
+        let points = &m.tracks.marks[index];
+        let measured: Vec<[f64; 3]> = points.iter().filter_map(|p| p.measured).map(|m| m.covariance_px2).collect();
+        let rms = |axis: usize| (measured.iter().map(|c| c[axis]).sum::<f64>() / measured.len().max(1) as f64).sqrt();
+        Self {
+            colour: options.marks[index].name.clone(),
+            frames_measured: measured.len(),
+            share_measured: measured.len() as f64 / points.len().max(1) as f64,
+            longest_gap_frames: longest_gap(points),
+            partial_frames: points.iter().filter(|p| p.flags.contains(crate::track::Flags::PARTIAL)).count(),
+            median_area_px2: m.tracks.area_px2[index],
+            noise_px: [rms(0), rms(1)],
+            scatter_factor: m.tracks.scatter_factor[index],
+            acceleration_psd_px2_s3: m.tracks.motion[index].acceleration_psd_px2_s3,
+        }
+    }
+}
+
+fn longest_gap(points: &[Point]) -> usize {
+    points
+        .chunk_by(|a, b| a.measured.is_some() == b.measured.is_some())
+        .fold(0, |longest, run| if run[0].measured.is_some() { longest } else { longest.max(run.len()) })
+}
+
+impl Link {
+    fn new(link: &[Option<crate::angles::Angle>]) -> Self {
+        let mut sd: Vec<f64> = link.iter().flatten().map(|a| a.sd_rad).collect();
+        sd.sort_by(f64::total_cmp);
+        Self { frames_measured: sd.len(), noise_rad: sd.get(sd.len() / 2).copied().unwrap_or(0.0) }
+    }
+}

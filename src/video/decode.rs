@@ -1,0 +1,323 @@
+//! Packets → frames, in order, on all cores.
+//!
+//! ```text
+//! reader ──segments──▶ worker 1 (decoder) ──values──▶ sink, in order
+//!                      worker 2 (decoder)
+//! ```
+//! The caller's `measure` runs in the worker, on the decoder's own samples while they are warm; only what it
+//! returns travels on. A recording with one entry point is decoded by one decoder with threads of its own.
+
+use std::collections::BTreeMap;
+use std::ops::ControlFlow;
+
+use crossbeam_channel::{Receiver, Sender, bounded};
+use ffmpeg_the_third as ffmpeg;
+
+use ffmpeg::codec::{Id, Parameters, threading};
+use ffmpeg::{Packet, Rational};
+
+use super::container::Container;
+use super::frame::{self, Frame};
+use super::segments::{Segment, Segmenter};
+use crate::error::{Error, Result};
+
+/// What decoding met.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Decoded {
+    /// Packets of the video stream.
+    pub packets: u64,
+    /// Frames handed on.
+    pub frames: u64,
+    /// Packets that the decoder refused.
+    pub damaged_packets: u64,
+    /// Frames of another size than the first, not handed on.
+    pub resized_frames: u64,
+    /// Frames without a time stamp, not handed on.
+    pub unstamped_frames: u64,
+    /// Why reading ended early, if it did.
+    pub read_error: Option<String>,
+    /// Segments decoded alone; 1 where the recording was decoded as a whole.
+    pub segments: u64,
+    /// A frame's pixel format that is not supported.
+    pub unsupported_format: Option<String>,
+}
+
+impl Decoded {
+    fn absorb(&mut self, other: Decoded) {
+        self.frames += other.frames;
+        self.damaged_packets += other.damaged_packets;
+        self.resized_frames += other.resized_frames;
+        self.unstamped_frames += other.unstamped_frames;
+        self.unsupported_format = self.unsupported_format.take().or(other.unsupported_format);
+    }
+}
+
+/// How a decoder is made and its frames are read.
+#[derive(Clone)]
+pub struct DecoderRecipe {
+    parameters: Parameters,
+    codec: Id,
+    time_base: Rational,
+    size_px: (usize, usize),
+}
+
+impl DecoderRecipe {
+    /// For the video stream of `container`.
+    pub fn new(container: &Container) -> Self {
+        Self {
+            parameters: container.parameters.clone(),
+            codec: container.codec,
+            time_base: container.time_base,
+            size_px: container.info.stored_size_px,
+        }
+    }
+
+    /// A decoder with `threads` threads.
+    pub fn decoder(&self, threads: usize) -> std::result::Result<StreamDecoder, ffmpeg::Error> {
+        let mut context = ffmpeg::codec::Context::from_parameters(self.parameters.clone())?;
+        let kind = if threads > 1 { threading::Type::Frame } else { threading::Type::None };
+        context.set_threading(threading::Config { kind, count: threads, ..Default::default() });
+        let mut decoder = context.decoder();
+        set_packet_time_base(&mut decoder, self.time_base);
+        Ok(StreamDecoder { video: decoder.video()?, frame: ffmpeg::frame::Video::empty(), recipe: self.clone() })
+    }
+}
+
+fn set_packet_time_base(decoder: &mut ffmpeg::codec::decoder::Decoder, time_base: Rational) {
+    // SAFETY: the context is owned by `decoder` and not yet opened.
+    unsafe { (*decoder.as_mut_ptr()).pkt_timebase = time_base.into() }
+}
+
+/// One decoder and the frame it fills.
+pub struct StreamDecoder {
+    video: ffmpeg::decoder::Video,
+    frame: ffmpeg::frame::Video,
+    recipe: DecoderRecipe,
+}
+
+impl StreamDecoder {
+    /// Sends packets until `packets` ends, drains, and makes the decoder ready for another stretch. `on_frame` may
+    /// break off.
+    pub fn decode(
+        &mut self,
+        packets: &mut dyn FnMut() -> Option<Packet>,
+        on_frame: &mut dyn FnMut(Frame<'_>) -> ControlFlow<()>,
+    ) -> (Decoded, ControlFlow<()>) {
+        let mut decoded = Decoded::default();
+        let mut flow = ControlFlow::Continue(());
+        while let Some(packet) = packets() {
+            if self.video.send_packet(&packet).is_err() {
+                decoded.damaged_packets += 1;
+            }
+            flow = self.receive(&mut decoded, on_frame);
+            if flow.is_break() {
+                break;
+            }
+        }
+        if flow.is_continue() && self.video.send_eof().is_ok() {
+            flow = self.receive(&mut decoded, on_frame);
+        }
+        self.video.flush();
+        (decoded, flow)
+    }
+
+    fn receive(
+        &mut self,
+        decoded: &mut Decoded,
+        on_frame: &mut dyn FnMut(Frame<'_>) -> ControlFlow<()>,
+    ) -> ControlFlow<()> {
+        loop {
+            match self.video.receive_frame(&mut self.frame) {
+                Ok(()) => self.hand_on(decoded, on_frame)?,
+                Err(ffmpeg::Error::Other { errno }) if errno == libc::EAGAIN => break,
+                Err(ffmpeg::Error::Eof) => break,
+                // with threads of its own a decoder reports a damaged packet here, frames later
+                Err(_) => decoded.damaged_packets += 1,
+            }
+        }
+        ControlFlow::Continue(())
+    }
+
+    fn hand_on(
+        &mut self,
+        decoded: &mut Decoded,
+        on_frame: &mut dyn FnMut(Frame<'_>) -> ControlFlow<()>,
+    ) -> ControlFlow<()> {
+        if (self.frame.width() as usize, self.frame.height() as usize) != self.recipe.size_px {
+            decoded.resized_frames += 1;
+            return ControlFlow::Continue(());
+        }
+        let Some(stamp) = self.frame.timestamp() else {
+            decoded.unstamped_frames += 1;
+            return ControlFlow::Continue(());
+        };
+        let Some(samples) = frame::samples(&self.frame, self.recipe.codec) else {
+            decoded.unsupported_format = Some(format!("{:?}", self.frame.format()).to_lowercase());
+            return ControlFlow::Break(());
+        };
+        decoded.frames += 1;
+        let (numerator, denominator) =
+            (f64::from(self.recipe.time_base.numerator()), f64::from(self.recipe.time_base.denominator()));
+        on_frame(Frame {
+            picture: samples.picture(),
+            t_s: stamp as f64 * numerator / denominator,
+            damaged: frame::is_damaged(&self.frame),
+        })
+    }
+}
+
+/// Decodes every frame of `container` once, calls `measure` on each (in any worker) and `sink` with each value in
+/// order. `sink` may end the work with an error.
+///
+/// The values and their order do not depend on `workers`.
+///
+/// # Errors
+/// [`Error::NotAVideo`] where no decoder can be opened, [`Error::PixelFormat`], and whatever `sink` returns.
+pub fn decode_in_order<T: Send>(
+    container: &mut Container,
+    workers: usize,
+    measure: &(dyn Fn(Frame<'_>) -> T + Sync),
+    sink: &mut dyn FnMut(T) -> Result<()>,
+) -> Result<Decoded> {
+    let recipe = DecoderRecipe::new(container);
+    let mut segmenter = Segmenter::new(container);
+    let decoded = if segmenter.can_split(container) {
+        split(container, &mut segmenter, &recipe, workers.max(1), measure, sink)?
+    } else {
+        whole(container, &mut segmenter, &recipe, workers.max(1), measure, sink)?
+    };
+    match decoded.unsupported_format {
+        Some(format) => Err(Error::PixelFormat { path: container.path().to_owned(), format }),
+        None => Ok(decoded),
+    }
+}
+
+fn cannot_open(container: &Container, error: &ffmpeg::Error) -> Error {
+    Error::NotAVideo {
+        path: container.path().to_owned(),
+        detail: format!("the {} decoder cannot be opened: {error}", container.info.codec),
+    }
+}
+
+/// One decoder with threads of its own.
+fn whole<T>(
+    container: &mut Container,
+    segmenter: &mut Segmenter,
+    recipe: &DecoderRecipe,
+    threads: usize,
+    measure: &(dyn Fn(Frame<'_>) -> T + Sync),
+    sink: &mut dyn FnMut(T) -> Result<()>,
+) -> Result<Decoded> {
+    let mut decoder = recipe.decoder(threads).map_err(|e| cannot_open(container, &e))?;
+    let mut outcome = Ok(());
+    let (mut decoded, _) = decoder.decode(&mut || segmenter.next_packet(container), &mut |frame| {
+        outcome = sink(measure(frame));
+        if outcome.is_ok() { ControlFlow::Continue(()) } else { ControlFlow::Break(()) }
+    });
+    outcome?;
+    decoded.segments = 1;
+    decoded.packets = segmenter.packets;
+    decoded.read_error = segmenter.read_error.take();
+    Ok(decoded)
+}
+
+/// A segment's place in the order, and what came of it.
+struct Done<T> {
+    index: u64,
+    values: Vec<T>,
+    decoded: Decoded,
+}
+
+/// One decoder a worker, one segment at a time.
+fn split<T: Send>(
+    container: &mut Container,
+    segmenter: &mut Segmenter,
+    recipe: &DecoderRecipe,
+    workers: usize,
+    measure: &(dyn Fn(Frame<'_>) -> T + Sync),
+    sink: &mut dyn FnMut(T) -> Result<()>,
+) -> Result<Decoded> {
+    let decoders = (0..workers)
+        .map(|_| recipe.decoder(1))
+        .collect::<std::result::Result<Vec<_>, _>>()
+        .map_err(|e| cannot_open(container, &e))?;
+    std::thread::scope(|scope| {
+        let (todo, work) = bounded::<(u64, Segment)>(1);
+        let (done, finished) = bounded::<Done<T>>(workers);
+        // a segment starts only against a permit, and its permit returns when its values have reached the sink
+        let permits = 2 * workers;
+        let (give, take) = bounded::<()>(permits);
+        for _ in 0..permits {
+            let _ = give.send(());
+        }
+        let segmenter = &mut *segmenter;
+        let container = &mut *container;
+        let reader = scope.spawn(move || {
+            let mut sent = 0;
+            while let (Ok(()), Some(segment)) = (take.recv(), segmenter.next(container)) {
+                if todo.send((sent, segment)).is_err() {
+                    break;
+                }
+                sent += 1;
+            }
+            drop(todo);
+            sent
+        });
+        for decoder in decoders {
+            let (work, done) = (work.clone(), done.clone());
+            scope.spawn(move || decode_segments(decoder, &work, &done, measure));
+        }
+        drop((work, done));
+        let mut order = InOrder { next: 0, early: BTreeMap::new(), total: Decoded::default() };
+        while let Ok(result) = finished.recv() {
+            order.early.insert(result.index, result);
+            while let Some(values) = order.pop() {
+                let _ = give.send(());
+                values.into_iter().try_for_each(&mut *sink)?;
+            }
+        }
+        drop(give);
+        order.total.segments = reader.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic));
+        Ok(order.total)
+    })
+    .map(|mut total| {
+        total.packets = segmenter.packets;
+        total.read_error = segmenter.read_error.take();
+        total
+    })
+}
+
+fn decode_segments<T>(
+    mut decoder: StreamDecoder,
+    work: &Receiver<(u64, Segment)>,
+    done: &Sender<Done<T>>,
+    measure: &(dyn Fn(Frame<'_>) -> T + Sync),
+) {
+    while let Ok((index, mut segment)) = work.recv() {
+        let mut values = Vec::with_capacity(segment.packets.len());
+        let (decoded, _) = decoder.decode(&mut || segment.packets.pop_front(), &mut |frame| {
+            values.push(measure(frame));
+            ControlFlow::Continue(())
+        });
+        if done.send(Done { index, values, decoded }).is_err() {
+            break;
+        }
+    }
+}
+
+/// Puts results back in order.
+struct InOrder<T> {
+    next: u64,
+    early: BTreeMap<u64, Done<T>>,
+    total: Decoded,
+}
+
+impl<T> InOrder<T> {
+    /// The values of the next segment, if it is done.
+    fn pop(&mut self) -> Option<Vec<T>> {
+        let result = self.early.remove(&self.next)?;
+        self.next += 1;
+        self.total.absorb(result.decoded);
+        Some(result.values)
+    }
+}
