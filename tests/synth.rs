@@ -15,6 +15,7 @@ fn still() -> Experiment {
         hinge_px: [80.0, 40.0],
         strip_width_px: 90.0,
         strip_sheen: 0.0,
+        strip_slope: 0.0,
         noise: Noise { read: 0.0, shot: 0.0 },
         exposure_s: 0.0,
         ..Render::default()

@@ -265,6 +265,9 @@ pub struct Render {
     pub strip_rgb: Rgb,
     /// Strength of the strip's sheen, 0 (flat) to 1.
     pub strip_sheen: f64,
+    /// Change of the strip's brightness from its left edge to its right, as a share, −1 to 1. A slope under a mark pulls a careless
+    /// centroid to its darker side.
+    pub strip_slope: f64,
     /// Colour of the chamber's wall where it is brightest.
     pub background_rgb: Rgb,
     /// Fall of the light towards the corners, 0 to 1.
@@ -314,6 +317,7 @@ impl Default for Render {
             strip_width_px: 48.0,
             strip_rgb: Rgb([196, 132, 46]),
             strip_sheen: 0.5,
+            strip_slope: 0.1,
             background_rgb: Rgb([58, 64, 74]),
             vignette: 0.85,
             stand: true,
@@ -364,6 +368,7 @@ impl Render {
         within("render.mark_diameter_px", self.mark_diameter_px, 1.0, 4096.0)?;
         within("render.strip_width_px", self.strip_width_px, 0.0, 4096.0)?;
         within("render.strip_sheen", self.strip_sheen, 0.0, 1.0)?;
+        within("render.strip_slope", self.strip_slope, -1.0, 1.0)?;
         within("render.vignette", self.vignette, 0.0, 1.0)?;
         within("render.exposure_s", self.exposure_s, 0.0, 1.0 / self.fps)?;
         within("render.lens_blur_px", self.lens_blur_px, 0.0, 64.0)?;

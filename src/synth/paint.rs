@@ -78,6 +78,8 @@ pub struct StripLook {
     pub overhang_px: f64,
     /// Strength of the sheen.
     pub sheen: f64,
+    /// Change of brightness from the left edge to the right.
+    pub slope: f64,
     /// Radius of a mark.
     pub mark_radius_px: f64,
     /// The first node carries no mark.
@@ -203,7 +205,7 @@ impl Outline {
             let half = self.look.half_width_px;
             let cover = between * (edge.coverage(half - across) - edge.coverage(-half - across));
             let q = (across / half.max(1e-9)).clamp(-1.0, 1.0);
-            let shade = piece.glint + self.look.sheen * (0.30 - 0.75 * q * q + 0.30 * q);
+            let shade = piece.glint + self.look.sheen * (0.30 - 0.75 * q * q) + 0.5 * self.look.slope * q;
             row.instant_cover[x - row.left] += cover;
             row.instant_light[x - row.left] += cover * shade as f32;
         }
@@ -327,6 +329,7 @@ mod tests {
             half_width_px: 40.0,
             overhang_px: 20.0,
             sheen: 0.0,
+            slope: 0.0,
             mark_radius_px: 11.0,
             hinge_unmarked: false,
         };
@@ -356,6 +359,7 @@ mod tests {
             half_width_px: 20.0,
             overhang_px: 20.0,
             sheen: 0.0,
+            slope: 0.0,
             mark_radius_px: 5.0,
             hinge_unmarked: false,
         };
