@@ -15,6 +15,7 @@ fn still() -> Experiment {
         hinge_px: [80.0, 40.0],
         strip_width_px: 90.0,
         strip_sheen: 0.0,
+        strip_slope: 0.0,
         noise: Noise { read: 0.0, shot: 0.0 },
         exposure_s: 0.0,
         ..Render::default()
@@ -227,4 +228,11 @@ fn a_fixed_pivot_carries_no_mark() {
     experiment.rig.marks = vec!["red".parse().unwrap()];
     let error = Recording::of(&experiment).unwrap_err().to_string();
     assert_eq!(error, "rig.marks: names 1 colours for 2 marks; name one a mark, top to bottom");
+}
+
+#[test]
+fn the_hard_recording_of_the_fixtures_renders() {
+    let path = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("fixtures/render/hard.toml");
+    let recording = Recording::of(&Experiment::read(&path).unwrap()).unwrap();
+    assert_eq!(recording.frames().count(), 27);
 }

@@ -265,6 +265,9 @@ pub struct Render {
     pub strip_rgb: Rgb,
     /// Strength of the strip's sheen, 0 (flat) to 1.
     pub strip_sheen: f64,
+    /// Change of the strip's brightness from its left edge to its right, as a share, −1 to 1. A slope under a mark pulls a careless
+    /// centroid to its darker side.
+    pub strip_slope: f64,
     /// Colour of the chamber's wall where it is brightest.
     pub background_rgb: Rgb,
     /// Fall of the light towards the corners, 0 to 1.
@@ -314,8 +317,9 @@ impl Default for Render {
             strip_width_px: 48.0,
             strip_rgb: Rgb([196, 132, 46]),
             strip_sheen: 0.5,
-            background_rgb: Rgb([46, 50, 56]),
-            vignette: 0.6,
+            strip_slope: 0.1,
+            background_rgb: Rgb([58, 64, 74]),
+            vignette: 0.85,
             stand: true,
             distractor: None,
             captions: Vec::new(),
@@ -364,6 +368,7 @@ impl Render {
         within("render.mark_diameter_px", self.mark_diameter_px, 1.0, 4096.0)?;
         within("render.strip_width_px", self.strip_width_px, 0.0, 4096.0)?;
         within("render.strip_sheen", self.strip_sheen, 0.0, 1.0)?;
+        within("render.strip_slope", self.strip_slope, -1.0, 1.0)?;
         within("render.vignette", self.vignette, 0.0, 1.0)?;
         within("render.exposure_s", self.exposure_s, 0.0, 1.0 / self.fps)?;
         within("render.lens_blur_px", self.lens_blur_px, 0.0, 64.0)?;
@@ -373,7 +378,7 @@ impl Render {
         within("render.tilt_rad", self.tilt_rad, -3.2, 3.2)?;
         within("render.row_time_s", self.row_time_s, 0.0, 1.0 / self.fps / f64::from(self.height_px))?;
         within("render.jitter_s", self.jitter_s, 0.0, 0.2 / self.fps)?;
-        if self.hinge_px.iter().any(|p| !(p.abs() <= f64::from(MAX_SIDE_PX))) {
+        if !self.hinge_px.iter().all(|p| p.abs() <= f64::from(MAX_SIDE_PX)) {
             return Err("render.hinge_px: must be two numbers of pixels near the picture".to_owned());
         }
         if self.dropped_frames.iter().filter(|f| **f < self.nominal_frames()).count() as u64 >= self.nominal_frames() {
@@ -399,7 +404,7 @@ impl Render {
             within("render.captions.height_px", caption.height_px, 1.0, 1024.0)?;
         }
         for occlusion in &self.occlusions {
-            if occlusion.rect_px.iter().any(|v| !(v.abs() <= f64::from(MAX_SIDE_PX))) {
+            if !occlusion.rect_px.iter().all(|v| v.abs() <= f64::from(MAX_SIDE_PX)) {
                 return Err("render.occlusions.rect_px: must be left, top, width, height in pixels".to_owned());
             }
             not_negative("render.occlusions.until_s - from_s", occlusion.until_s - occlusion.from_s)?;

@@ -50,7 +50,8 @@ impl Chain {
         let scaled = DMatrix::from_fn(n, n, |i, j| {
             inertia_kg_m2[(i, j)] / (inertia_kg_m2[(i, i)] * inertia_kg_m2[(j, j)]).sqrt()
         });
-        if !(scaled.symmetric_eigenvalues().min() > 1e-9) {
+        let swings = scaled.iter().all(|v| v.is_finite()) && scaled.symmetric_eigenvalues().min() > 1e-9;
+        if !swings {
             return Err(Error::Simulation {
                 detail: "a link swings without inertia; give every node below the hinge a mass (specimen.lumps)".into(),
             });
@@ -96,22 +97,22 @@ impl Chain {
         self.links.len()
     }
 
-    /// aᵢⱼ [kg·m²].
+    /// aᵢⱼ (kg·m²).
     pub fn inertia_kg_m2(&self) -> &DMatrix<f64> {
         &self.inertia_kg_m2
     }
 
-    /// hᵢ [kg·m]; gravity's torque on θᵢ is −g hᵢ sin θᵢ.
+    /// hᵢ (kg·m); gravity's torque on θᵢ is −g hᵢ sin θᵢ.
     pub fn static_moment_kg_m(&self, i: usize) -> f64 {
         self.static_moment_kg_m[i]
     }
 
-    /// The inertia matrix aᵢⱼ cos(θᵢ−θⱼ) [kg·m²] in a position.
+    /// The inertia matrix aᵢⱼ cos(θᵢ−θⱼ) (kg·m²) in a position.
     pub fn inertia_at(&self, motion: &Motion) -> DMatrix<f64> {
         self.inertia_kg_m2.map_with_location(|i, j, a| a * motion.cos_difference(i, j))
     }
 
-    /// −Σⱼ aᵢⱼ sin(θᵢ−θⱼ) θ̇ⱼ² [N·m]: the torque of the links' own rotation.
+    /// −Σⱼ aᵢⱼ sin(θᵢ−θⱼ) θ̇ⱼ² (N·m): the torque of the links' own rotation.
     pub fn rotation_torque(&self, motion: &Motion) -> DVector<f64> {
         let torque = |i: usize| -> f64 {
             (0..self.count())

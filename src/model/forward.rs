@@ -39,7 +39,7 @@ impl ForwardModel {
         &self.chain
     }
 
-    /// Sideways position of the pivot [m]: A sin(2πft + φ).
+    /// Sideways position of the pivot (m): A sin(2πft + φ).
     pub fn pivot_m(&self, t_s: f64) -> f64 {
         self.support.map_or(0.0, |s| s.amplitude_m * phase_rad(&s, t_s).sin())
     }
@@ -55,7 +55,7 @@ impl ForwardModel {
         motion
     }
 
-    /// θ̈ [rad/s²].
+    /// θ̈ (rad/s²).
     ///
     /// # Errors
     /// [`Error::Simulation`] when the inertia matrix is not positive (a negative added mass).
@@ -65,7 +65,7 @@ impl ForwardModel {
         Ok(self.inertia(motion).cholesky().ok_or_else(singular)?.solve(&torque_n_m))
     }
 
-    /// Kinetic energy in the pivot's frame, gravity's from the hanging position, and what the effects store [J].
+    /// Kinetic energy in the pivot's frame, gravity's from the hanging position, and what the effects store (J).
     pub fn energy_j(&self, motion: &Motion) -> f64 {
         let omega = DVector::from_column_slice(&motion.omega_rad_s);
         let kinetic_j = 0.5 * omega.dot(&(self.chain.inertia_at(motion) * &omega));

@@ -13,12 +13,16 @@ pub struct Backdrop<'a> {
     hinge_px: [f64; 2],
     /// Roll of the stand about the hinge, anticlockwise.
     roll_rad: f64,
+    wall: Light,
+    steel: Light,
 }
 
 impl<'a> Backdrop<'a> {
     /// The backdrop of a recording whose stand holds `hinge_px` and is rolled with the scene.
     pub fn new(render: &'a Render, edge: &'a Edge, hinge_px: [f64; 2], roll_rad: f64) -> Self {
-        Self { render, edge, hinge_px, roll_rad }
+        let wall = light_of(render.background_rgb, render.gamma);
+        let steel = light_of(Rgb([104, 108, 114]), render.gamma);
+        Self { render, edge, hinge_px, roll_rad, wall, steel }
     }
 
     /// The light of every pixel, row after row.
@@ -48,14 +52,16 @@ impl<'a> Backdrop<'a> {
         light
     }
 
-    /// A wall lit from the upper left, darker towards the corners, with the soft glow of a viewport behind the strip.
+    /// A wall lit from the upper left, darker towards the corners: a round glow with a soft rim, and a rail out of focus.
     fn wall(&self, p: [f64; 2]) -> Light {
         let (w, h) = (f64::from(self.render.width_px), f64::from(self.render.height_px));
-        let (u, v) = ((p[0] - 0.46 * w) / w, (p[1] - 0.42 * h) / w);
-        let fall = (-(u * u + 1.6 * v * v) / 0.11).exp();
-        let rail = 0.10 * (-((p[0] - 0.80 * w) / (0.018 * w)).powi(2)).exp();
-        let shade = (1.0 - self.render.vignette * (1.0 - fall)) * (1.0 + rail);
-        light_of(self.render.background_rgb, self.render.gamma).map(|c| c * shade as f32)
+        let (u, v) = ((p[0] - 0.47 * w) / w, (p[1] - 0.44 * h) / w);
+        let r2 = u * u + 1.3 * v * v;
+        let glow = (-r2 / 0.075).exp();
+        let rim = 0.12 * (-((r2.sqrt() - 0.31) / 0.02).powi(2)).exp();
+        let rail = 0.14 * (-((p[0] - 0.845 * w) / (0.012 * w)).powi(2)).exp();
+        let shade = 1.0 - self.render.vignette * (1.0 - glow - rim - rail);
+        self.wall.map(|c| c * shade.max(0.0) as f32)
     }
 
     /// A crossbeam above the picture's subject, and the bracket that holds the hinge.
@@ -65,7 +71,7 @@ impl<'a> Backdrop<'a> {
         let q = [cos * dx - sin * dy, sin * dx + cos * dy];
         // Sizes follow the marks, so that a small picture gets a small stand.
         let unit = self.render.mark_diameter_px / 22.0;
-        let grey = |level: f64| light_of(Rgb([104, 108, 114]), self.render.gamma).map(|c| c * level as f32);
+        let grey = |level: f64| self.steel.map(|c| c * level as f32);
 
         let beam = box_distance(q, [0.0, -66.0 * unit], [1e5, 17.0 * unit], 0.0);
         let across = (q[1] / unit + 66.0) / 17.0;
@@ -91,6 +97,9 @@ impl<'a> Backdrop<'a> {
     fn knob(&self, p: [f64; 2], centre: [f64; 2], radius: f64, rgb: Rgb, light: &mut Light) {
         let (dx, dy) = ((p[0] - centre[0]) / radius, (p[1] - centre[1]) / radius);
         let r = dx.hypot(dy);
+        if r > 1.2 + self.edge.reach_px() / radius {
+            return;
+        }
         let colour = light_of(rgb, self.render.gamma);
         let dome = 0.9 - 0.45 * r * r - 0.25 * (dx + dy);
         let glint = 0.5 * (-((dx + 0.35).powi(2) + (dy + 0.4).powi(2)) / 0.03).exp();

@@ -78,6 +78,8 @@ pub struct StripLook {
     pub overhang_px: f64,
     /// Strength of the sheen.
     pub sheen: f64,
+    /// Change of brightness from the left edge to the right.
+    pub slope: f64,
     /// Radius of a mark.
     pub mark_radius_px: f64,
     /// The first node carries no mark.
@@ -120,7 +122,8 @@ impl Outline {
         let pieces = (0..last).map(|i| {
             let (upper, lower) = (curve[i], curve[i + 1]);
             let along = direction(upper, lower);
-            let glint = 1.0 + look.sheen * (0.30 * along[0] + 0.12 * (9.0 * along[0] + 0.4).sin());
+            // A film mirrors the lamps: its brightness follows its slope.
+            let glint = 1.0 + look.sheen * (0.45 * along[0] + 0.25 * (7.0 * along[0] + 0.6).sin());
             Piece {
                 upper,
                 lower,
@@ -202,7 +205,7 @@ impl Outline {
             let half = self.look.half_width_px;
             let cover = between * (edge.coverage(half - across) - edge.coverage(-half - across));
             let q = (across / half.max(1e-9)).clamp(-1.0, 1.0);
-            let shade = piece.glint + self.look.sheen * (0.22 * (1.0 - q * q) - 0.25 + 0.16 * q);
+            let shade = piece.glint + self.look.sheen * (0.30 - 0.75 * q * q) + 0.5 * self.look.slope * q;
             row.instant_cover[x - row.left] += cover;
             row.instant_light[x - row.left] += cover * shade as f32;
         }
@@ -326,6 +329,7 @@ mod tests {
             half_width_px: 40.0,
             overhang_px: 20.0,
             sheen: 0.0,
+            slope: 0.0,
             mark_radius_px: 11.0,
             hinge_unmarked: false,
         };
@@ -355,6 +359,7 @@ mod tests {
             half_width_px: 20.0,
             overhang_px: 20.0,
             sheen: 0.0,
+            slope: 0.0,
             mark_radius_px: 5.0,
             hinge_unmarked: false,
         };

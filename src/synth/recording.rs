@@ -67,6 +67,7 @@ impl Recording {
             half_width_px: 0.5 * render.strip_width_px,
             overhang_px: 0.9 * render.mark_diameter_px,
             sheen: render.strip_sheen,
+            slope: render.strip_slope,
             mark_radius_px: 0.5 * render.mark_diameter_px,
             hinge_unmarked,
         };

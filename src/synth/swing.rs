@@ -12,8 +12,8 @@ use crate::model::{ForwardModel, State, Trajectory};
 /// φᵢ(t) = (1 + angle_gain) θᵢ((1 + time_base) t + [i > 1] differential_lag) + camera_tilt + render.tilt_rad
 /// ```
 ///
-/// `dropped_frames` of `[model.effects]` is applied by [`super::Recording`]: from the middle of the recording on, the motion is that much
-/// further than the stamps say.
+/// `dropped_frames` of `[model.effects]` are missing without a trace in the stamps: from the middle of the recording on, the motion is that
+/// much further than the stamps say. (Those of `[render]` leave a gap in the stamps.)
 #[derive(Debug)]
 pub struct Swing {
     model: ForwardModel,

@@ -56,7 +56,8 @@ impl VideoWriter {
         let library = encoder::find_by_name(name).ok_or_else(|| refused(format!("FFmpeg was built without {name}")))?;
         let pixel = pixel_of(codec).map_err(refused)?;
         let global_header = output.format().flags().contains(format::Flags::GLOBAL_HEADER);
-        let context = configured(library, codec, &layout, pixel, time_base, fps, global_header).map_err(failed)?;
+        let stream = Stream { library, pixel, time_base, rate: frame_period(fps).invert(), global_header };
+        let context = stream.configured(codec, &layout).map_err(failed)?;
         let opened = context.open_as_with(library, encoder_options(codec));
         let encoder = opened.map_err(|e| refused(format!("{name} refuses the options: {e}")))?;
 
@@ -270,42 +271,41 @@ fn encoder_options(codec: &Codec) -> Dictionary {
     options
 }
 
-fn configured(
+/// What the container and the pictures ask of the encoder.
+struct Stream {
     library: ffmpeg::Codec,
-    codec: &Codec,
-    layout: &Layout,
     pixel: Pixel,
     time_base: Rational,
-    fps: f64,
+    rate: Rational,
     global_header: bool,
-) -> std::result::Result<encoder::video::Video, ffmpeg::Error> {
-    let mut video = codec::Context::new_with_codec(library).encoder().video()?;
-    video.set_width(layout.width_px as u32);
-    video.set_height(layout.height_px as u32);
-    video.set_format(pixel);
-    video.set_time_base(time_base);
-    video.set_frame_rate(Some(frame_period(fps).invert()));
-    video.set_aspect_ratio(Rational(1, 1));
-    video.set_gop(codec.gop);
-    if let Some(b_frames) = codec.b_frames {
-        video.set_max_b_frames(b_frames as usize);
+}
+
+impl Stream {
+    fn configured(&self, codec: &Codec, layout: &Layout) -> std::result::Result<encoder::video::Video, ffmpeg::Error> {
+        let mut video = codec::Context::new_with_codec(self.library).encoder().video()?;
+        video.set_width(layout.width_px as u32);
+        video.set_height(layout.height_px as u32);
+        video.set_format(self.pixel);
+        video.set_time_base(self.time_base);
+        video.set_frame_rate(Some(self.rate));
+        video.set_aspect_ratio(Rational(1, 1));
+        video.set_gop(codec.gop);
+        if let Some(b_frames) = codec.b_frames {
+            video.set_max_b_frames(b_frames as usize);
+        }
+        video.set_colorspace(space_of(layout));
+        video.set_color_range(range_of(layout));
+        let mut flags = codec::Flags::empty();
+        flags.set(codec::Flags::GLOBAL_HEADER, self.global_header);
+        flags.set(codec::Flags::CLOSED_GOP, codec.name == CodecName::Mpeg4);
+        if matches!(codec.name, CodecName::Mpeg4 | CodecName::Mjpeg) {
+            flags |= codec::Flags::QSCALE;
+            video.set_global_quality((codec.crf * f64::from(ffi::FF_QP2LAMBDA)).round() as i32);
+        }
+        video.set_flags(flags);
+        set_colour_tags(&mut video, layout);
+        Ok(video)
     }
-    video.set_colorspace(space_of(layout));
-    video.set_color_range(range_of(layout));
-    let mut flags = codec::Flags::empty();
-    if global_header {
-        flags |= codec::Flags::GLOBAL_HEADER;
-    }
-    if matches!(codec.name, CodecName::Mpeg4 | CodecName::Mjpeg) {
-        flags |= codec::Flags::QSCALE;
-        video.set_global_quality((codec.crf * f64::from(ffi::FF_QP2LAMBDA)).round() as i32);
-    }
-    if codec.name == CodecName::Mpeg4 {
-        flags |= codec::Flags::CLOSED_GOP;
-    }
-    video.set_flags(flags);
-    set_colour_tags(&mut video, layout);
-    Ok(video)
 }
 
 /// Primaries, transfer and chroma siting, for which the binding has no setters.
@@ -318,8 +318,8 @@ fn set_colour_tags(video: &mut encoder::video::Video, layout: &Layout) {
     };
     let location = match layout.chroma_site_px {
         _ if (layout.chroma_shift_x, layout.chroma_shift_y) != (1, 1) => AVChromaLocation::UNSPECIFIED,
-        [x, y] if x == 0.0 && y == 0.0 => AVChromaLocation::TOPLEFT,
-        [x, _] if x == 0.0 => AVChromaLocation::LEFT,
+        [0.0, 0.0] => AVChromaLocation::TOPLEFT,
+        [0.0, _] => AVChromaLocation::LEFT,
         _ => AVChromaLocation::CENTER,
     };
     // SAFETY: the context is allocated, not yet opened, and borrowed mutably; these are plain fields.

@@ -7,8 +7,8 @@
 //! | [`air`] | `air_linear`, `air_quadratic`, `added_mass` |
 //! | [`outside`] | `side_force`, `support_motion` |
 //!
-//! `joint_hysteretic` and `distributed_flexibility` are not simulated. Camera effects (`time_base`, `camera_tilt`, `angle_gain`,
-//! `differential_lag`) change the observation, not the motion: see [`crate::synth::swing`].
+//! `joint_hysteretic` and `distributed_flexibility` are not simulated. Camera effects (`time_base`, `dropped_frames`, `camera_tilt`,
+//! `angle_gain`, `differential_lag`) change the observation, not the motion: see [`crate::synth::swing`].
 
 pub mod air;
 pub mod hinge;
@@ -23,13 +23,13 @@ use crate::experiment::Model;
 
 /// One law: what it adds to the equations of motion.
 pub trait Effect: std::fmt::Debug + Send + Sync {
-    /// Adds its generalised torques Qᵢ [N·m], of the work Qᵢ δθᵢ.
+    /// Adds its generalised torques Qᵢ (N·m), of the work Qᵢ δθᵢ.
     fn add_torque(&self, chain: &Chain, motion: &Motion, torque_n_m: &mut DVector<f64>);
 
-    /// Adds to the inertia matrix [kg·m²].
+    /// Adds to the inertia matrix (kg·m²).
     fn add_inertia(&self, _chain: &Chain, _motion: &Motion, _inertia_kg_m2: &mut DMatrix<f64>) {}
 
-    /// Energy it stores [J].
+    /// Energy it stores (J).
     fn energy_j(&self, _chain: &Chain, _motion: &Motion) -> f64 {
         0.0
     }
