@@ -10,6 +10,7 @@ use crate::error::{Error, Result};
 use crate::experiment::{Experiment, MarkColour};
 use crate::measure::{Measurement, Options, measure};
 use crate::output::OutputFile;
+use crate::overlay::{self, Overlay};
 use crate::sidecar::Sidecar;
 
 /// Follow the marks of a recording and write their angles.
@@ -31,6 +32,9 @@ pub struct TrackArgs {
     /// The experiment: marks, pivot, mirror, plumb line, lens.
     #[arg(long, value_name = "TOML")]
     config: Option<PathBuf>,
+    /// The recording with what was measured drawn into it: .mp4, .mov or .mkv.
+    #[arg(long, value_name = "VIDEO")]
+    overlay: Option<PathBuf>,
     /// Colour of the marks, a name or #rrggbb; once for all, or once a mark, top to bottom.
     #[arg(long, value_name = "COLOUR")]
     color: Vec<MarkColour>,
@@ -95,9 +99,16 @@ impl TrackArgs {
         let options = self.options(experiment)?;
         let table = OutputFile::create(&self.out)?;
         let beside = self.sidecar_path().map(|path| OutputFile::create(&path)).transpose()?;
+        self.overlay.as_deref().map(overlay::check_target).transpose()?;
         let bar = Bar::new(self.quiet);
         let measurement = measure(&self.video, &options, &folder, &bar)?;
         let sidecar = Sidecar::new(&self.video, &options, &measurement)?;
+        if let Some(target) = &self.overlay {
+            let Measurement { tracks, angles, timing, .. } = &measurement;
+            let rate_hz = timing.real_rate_hz.or(timing.nominal_rate_hz);
+            let overlay = Overlay { tracks, angles, pivot_px: options.rig.pivot_px, rate_hz };
+            overlay.write(&self.video, target, options.workers, &bar)?;
+        }
         drop(bar);
         table.commit(angles::to_csv(&measurement.tracks, &measurement.angles).as_bytes())?;
         if let Some(beside) = beside {

@@ -10,7 +10,7 @@ mod segments;
 mod timing;
 
 pub use container::{Container, StreamInfo};
-pub use decode::{Decoded, DecoderRecipe, StreamDecoder, decode_in_order};
+pub use decode::{Decoded, DecoderRecipe, StreamDecoder, decode_in_order, decode_one_by_one};
 pub use encode::{TICKS_PER_SECOND, VideoWriter};
 pub use frame::Frame;
 pub use orientation::Orientation;
