@@ -12,6 +12,7 @@ use crate::measure::{Measurement, Options, measure};
 use crate::output::OutputFile;
 use crate::overlay::{self, Overlay};
 use crate::sidecar::Sidecar;
+use crate::video::{Recording, StillTimes};
 
 /// Follow the marks of a recording and write their angles.
 #[derive(Debug, Args)]
@@ -20,11 +21,12 @@ Examples:
   track videos/kapton.mp4 --out angles.csv
   track pendulum.mp4 --out angles.csv --color red --color green --pivot 497,508
   track swing.mov --out angles.csv --config experiment.toml --overlay seen.mp4
+  track stills/ --rate 50 --out angles.csv
 
 Beside angles.csv stands angles.json: the source and its SHA-256, the options, the time stamps' gaps and jitter,
 the noise, and every warning. Exit code 0: done; 2: bad input, nothing written.")]
 pub struct TrackArgs {
-    /// The recording: MP4, MOV, AVI, MKV, …
+    /// The recording: MP4, MOV, AVI, MKV, …, or a folder of stills.
     video: PathBuf,
     /// The table of angles; `-` for standard output.
     #[arg(long, value_name = "CSV")]
@@ -56,6 +58,12 @@ pub struct TrackArgs {
     /// How a mark is represented by one point.
     #[arg(long, value_name = "HOW", default_value = "subpixel")]
     centroid: CentroidKind,
+    /// When the stills of a folder were taken: a number of seconds a line, or rows `file,t_s`; else times.csv among them.
+    #[arg(long, value_name = "FILE", conflicts_with = "rate")]
+    times: Option<PathBuf>,
+    /// Stills a second, where nothing says when each was taken.
+    #[arg(long, value_name = "HZ")]
+    rate: Option<f64>,
     /// Cores to use; all by default.
     #[arg(long, value_name = "N")]
     threads: Option<usize>,
@@ -107,7 +115,8 @@ impl TrackArgs {
             let Measurement { tracks, angles, timing, .. } = &measurement;
             let rate_hz = timing.real_rate_hz.or(timing.nominal_rate_hz);
             let overlay = Overlay { tracks, angles, pivot_px: options.rig.pivot_px, rate_hz };
-            overlay.write(&self.video, target, options.workers, &bar)?;
+            let recording = Recording::open(&self.video, &options.still_times)?;
+            overlay.write(recording, target, options.workers, &bar)?;
         }
         drop(bar);
         table.commit(angles::to_csv(&measurement.tracks, &measurement.angles).as_bytes())?;
@@ -141,6 +150,11 @@ impl TrackArgs {
                 AnglesFrom::Smoothed => AngleSource::Smoothed,
             },
             binary_centroid: self.centroid == CentroidKind::Binary,
+            still_times: match (&self.times, self.rate) {
+                (Some(file), _) => StillTimes::File(file.clone()),
+                (None, Some(rate_hz)) => StillTimes::Rate(rate_hz),
+                (None, None) => StillTimes::Beside,
+            },
             workers: self.threads.unwrap_or(defaults.workers),
         })
     }

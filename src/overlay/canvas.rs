@@ -108,6 +108,25 @@ impl Canvas {
         [self.picture.layout.width_px, self.picture.layout.height_px]
     }
 
+    /// How much luma varies in a rectangle, in tenths of the whole range: plain ground is 0.
+    pub fn spread(&self, least_px: [f64; 2], size_px: [f64; 2]) -> u64 {
+        let [width, height] = self.size_px();
+        let span = |k: usize, side: usize| {
+            let edge = |v: f64| v.clamp(0.0, side as f64) as usize;
+            edge(least_px[k])..edge(least_px[k] + size_px[k])
+        };
+        let luma = &self.picture.planes[0];
+        let (mut n, mut sum, mut squares) = (0.0, 0.0, 0.0);
+        for y in span(1, height) {
+            for code in &luma[y * width..][span(0, width)] {
+                let code = f64::from(*code);
+                (n, sum, squares) = (n + 1.0, sum + code, squares + code * code);
+            }
+        }
+        let n = f64::max(n, 1.0);
+        ((squares / n - (sum / n).powi(2)).max(0.0).sqrt() / 25.5) as u64
+    }
+
     fn copy_rows(&mut self, source: &Picture<'_>) {
         let (chroma_width, _) = self.picture.layout.chroma_size();
         let widths = [self.picture.layout.width_px, chroma_width, chroma_width];

@@ -5,7 +5,7 @@ use opencv::imgproc;
 
 use super::Look;
 use super::canvas::{Bounds, Canvas, Ink, Stencil};
-use super::lettering::{FULL, Lettering, SHIFT, fixed};
+use super::lettering::{FULL, SHIFT, fixed};
 use crate::error::Result;
 
 /// The rectangle of a measured mark.
@@ -13,7 +13,7 @@ const MEASURED: Ink = Ink::opaque([30, 90, 255]);
 /// The rectangle of a lost mark, where the filter takes it to be.
 const LOST: Ink = Ink::opaque([255, 170, 0]);
 const TRAIL: Ink = Ink::opaque([110, 190, 255]);
-const LINK: Ink = Ink::opaque([255, 255, 255]).at(0.6);
+const LINK: Ink = Ink::opaque([255, 255, 255]).at(0.8);
 const PIVOT: Ink = Ink::opaque([255, 255, 255]).at(0.9);
 /// Behind numbers and lines, so that they are seen on any ground.
 const SHADE: Ink = Ink::opaque([0, 0, 0]).at(0.55);
@@ -30,27 +30,29 @@ pub(super) struct Box {
 }
 
 /// A thin line from mark to mark.
-pub(super) fn links(canvas: &mut Canvas, look: &Look, nodes_px: &[[f64; 2]]) -> Result<()> {
-    let bounds = Bounds::around(nodes_px.iter().copied(), look.line_px + 2.0);
-    canvas.lay(bounds, LINK, |stencil| {
-        for pair in nodes_px.windows(2) {
-            let (from, to) = (within(stencil, pair[0]), within(stencil, pair[1]));
-            imgproc::line(&mut stencil.mat, from, to, FULL, look.thin(), imgproc::LINE_AA, SHIFT)?;
-        }
-        Ok(())
-    })
+pub(super) fn link(canvas: &mut Canvas, look: &Look, upper_px: [f64; 2], lower_px: [f64; 2]) -> Result<()> {
+    seamed(canvas, look, LINK, &[[upper_px, lower_px]])
 }
 
 /// A cross at the fixed, unmarked pivot.
 pub(super) fn pivot(canvas: &mut Canvas, look: &Look, [x, y]: [f64; 2]) -> Result<()> {
-    let arm = 4.0 * look.line_px;
-    canvas.lay(Bounds::around([[x, y]], arm + 3.0), PIVOT, |stencil| {
-        for (from, to) in [([x - arm, y], [x + arm, y]), ([x, y - arm], [x, y + arm])] {
-            let (from, to) = (within(stencil, from), within(stencil, to));
-            imgproc::line(&mut stencil.mat, from, to, FULL, look.thin(), imgproc::LINE_AA, SHIFT)?;
-        }
-        Ok(())
-    })
+    let arm = 5.0 * look.line_px;
+    seamed(canvas, look, PIVOT, &[[[x - arm, y], [x + arm, y]], [[x, y - arm], [x, y + arm]]])
+}
+
+/// Thin lines with a dark seam.
+fn seamed(canvas: &mut Canvas, look: &Look, ink: Ink, lines_px: &[[[f64; 2]; 2]]) -> Result<()> {
+    let bounds = Bounds::around(lines_px.iter().flatten().copied(), look.line_px + 4.0);
+    for (ink, width) in [(SHADE, look.thin() + 2), (ink, look.thin())] {
+        canvas.lay(bounds, ink, |stencil| {
+            for [from, to] in lines_px {
+                let (from, to) = (within(stencil, *from), within(stencil, *to));
+                imgproc::line(&mut stencil.mat, from, to, FULL, width, imgproc::LINE_AA, SHIFT)?;
+            }
+            Ok(())
+        })?;
+    }
+    Ok(())
 }
 
 /// Where a mark came from, fading with age; `None` is a gap.
@@ -84,7 +86,7 @@ pub(super) fn mark(canvas: &mut Canvas, look: &Look, number: usize, mark: Box) -
             }
         })?;
     }
-    let lettering = Lettering { height_px: look.letter_px, stroke_px: look.thin() };
+    let lettering = look.lettering();
     let gap = 2.0 * look.line_px;
     let [width, _] = canvas.size_px();
     // beside the upper right corner, on the other side where the picture ends

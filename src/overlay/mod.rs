@@ -13,6 +13,7 @@ mod panel;
 use std::path::Path;
 
 use canvas::Canvas;
+use lettering::Lettering;
 use marks::Box;
 use panel::Panel;
 
@@ -21,7 +22,7 @@ use crate::error::{Error, Result};
 use crate::experiment::Codec;
 use crate::progress::Progress;
 use crate::track::Tracks;
-use crate::video::{Container, VideoWriter, decode_one_by_one};
+use crate::video::{Recording, VideoWriter};
 
 /// How far back a trail reaches.
 const TRAIL_S: f64 = 1.0;
@@ -54,11 +55,15 @@ impl Look {
     /// For a picture of this width and height.
     fn for_size(size_px: [usize; 2]) -> Self {
         let side = size_px[0].max(size_px[1]) as f64;
-        Self { line_px: (side / 720.0).max(1.0), letter_px: (side / 90.0).clamp(7.0, 60.0).round() }
+        Self { line_px: (side / 720.0).max(1.0), letter_px: (side / 76.0).clamp(7.0, 60.0).round() }
     }
 
     fn thin(&self) -> i32 {
         (0.8 * self.line_px).round().max(1.0) as i32
+    }
+
+    fn lettering(&self) -> Lettering {
+        Lettering { height_px: self.letter_px, stroke_px: (self.letter_px / 8.0).round().max(1.0) as i32 }
     }
 
     fn thick(&self) -> i32 {
@@ -84,13 +89,11 @@ impl Overlay<'_> {
     ///
     /// # Errors
     /// Whatever decoding and encoding report, [`Error::Interrupted`].
-    pub fn write(&self, source: &Path, target: &Path, threads: usize, progress: &dyn Progress) -> Result<()> {
+    pub fn write(&self, mut source: Recording, target: &Path, threads: usize, progress: &dyn Progress) -> Result<()> {
         progress.begin("overlay", Some(self.tracks.t_s.len() as u64));
-        let mut container = Container::open(source)?;
-        let orientation = container.info.orientation;
+        let orientation = source.info().orientation;
         let mut film = Film { overlay: self, target, writer: None, frame: 0, last_pts: i64::MIN };
-        decode_one_by_one(
-            &mut container,
+        source.decode_one_by_one(
             threads,
             &|frame| (frame.t_s, Canvas::of(&frame.picture, orientation)),
             &mut |(t_s, canvas)| {
@@ -110,7 +113,7 @@ impl Overlay<'_> {
         let nodes: Vec<Option<[f64; 2]>> = self.pivot_px.map(Some).into_iter().chain(marked).collect();
         for pair in nodes.windows(2) {
             if let [Some(upper), Some(lower)] = *pair {
-                marks::links(canvas, look, &[upper, lower])?;
+                marks::link(canvas, look, upper, lower)?;
             }
         }
         for mark in 0..boxes.len() {
@@ -182,11 +185,10 @@ impl Film<'_> {
     }
 
     fn begin(overlay: &Overlay<'_>, target: &Path, canvas: &Canvas) -> Result<(VideoWriter, (Look, Panel))> {
-        let size = canvas.size_px();
-        let look = Look::for_size(size);
+        let look = Look::for_size(canvas.size_px());
         let everywhere: Vec<[f64; 2]> =
             overlay.tracks.marks.iter().flatten().filter_map(|p| p.measured).map(|m| m.position_px).collect();
-        let panel = Panel::new(&look, size, overlay.angles, &everywhere);
+        let panel = Panel::new(&look, canvas, overlay.angles, &everywhere);
         let rate_hz = overlay.rate_hz.filter(|r| (0.1..=1000.0).contains(r)).unwrap_or(USUAL_RATE_HZ);
         let writer = VideoWriter::create(target, &codec(), canvas.picture().layout, rate_hz)?;
         Ok((writer, (look, panel)))

@@ -8,7 +8,7 @@ use super::lettering::{FULL, Lettering};
 use crate::angles::{Angle, Angles};
 use crate::error::Result;
 
-const GROUND: Ink = Ink::opaque([8, 12, 20]).at(0.62);
+const GROUND: Ink = Ink::opaque([8, 12, 20]).at(0.86);
 const TEXT: Ink = Ink::opaque([240, 244, 250]);
 const ABSENT: Ink = Ink::opaque([255, 170, 0]);
 const SHADE: Ink = Ink::opaque([0, 0, 0]).at(0.6);
@@ -27,9 +27,10 @@ pub(super) struct Panel {
 }
 
 impl Panel {
-    /// In the corner of a picture of `size_px` that hides the fewest of `points_px`.
-    pub fn new(look: &Look, size_px: [usize; 2], angles: &Angles, points_px: &[[f64; 2]]) -> Self {
-        let lettering = Lettering { height_px: look.letter_px, stroke_px: look.thin() };
+    /// In the corner that hides the fewest of `points_px`, and of those the plainest one of the first picture.
+    pub fn new(look: &Look, first: &Canvas, angles: &Angles, points_px: &[[f64; 2]]) -> Self {
+        let size_px = first.size_px();
+        let lettering = look.lettering();
         let decimals = decimals(angles);
         let (padding_px, line_px) = (0.9 * look.letter_px, 1.9 * look.letter_px);
         let cells = angle_text(1, Some(&Angle { theta_rad: 0.0, sd_rad: 0.0 }), decimals).chars().count();
@@ -40,7 +41,7 @@ impl Panel {
         let hidden = |[left, top]: [f64; 2]| {
             let inside =
                 |p: &&[f64; 2]| (left..left + width_px).contains(&p[0]) && (top..top + height_px).contains(&p[1]);
-            points_px.iter().filter(inside).count()
+            (points_px.iter().filter(inside).count(), first.spread([left, top], [width_px, height_px]))
         };
         let [left_px, top_px] = corners.into_iter().min_by_key(|c| hidden(*c)).unwrap_or(corners[0]);
         Self { lettering, left_px, top_px, padding_px, width_px, height_px, line_px, decimals }
@@ -121,8 +122,11 @@ mod tests {
     fn the_panel_avoids_the_marks_and_shows_as_many_decimals_as_count() {
         let link = vec![Some(Angle { theta_rad: 0.0, sd_rad: 0.003f64.to_radians() })];
         let angles = Angles { t_s: vec![0.0], links: vec![link] };
+        let layout = crate::experiment::Render::default().codec.layout(640, 480);
+        let picture = crate::video::OwnedPicture::black(layout);
+        let canvas = Canvas::of(&picture.view(), crate::video::Orientation::default());
         let look = Look::for_size([640, 480]);
-        let panel = Panel::new(&look, [640, 480], &angles, &[[30.0, 30.0], [600.0, 30.0]]);
+        let panel = Panel::new(&look, &canvas, &angles, &[[30.0, 30.0], [600.0, 30.0]]);
         assert_eq!(panel.decimals, 3);
         assert!(panel.left_px < 320.0 && panel.top_px > 240.0, "{panel:?}");
     }
