@@ -6,6 +6,7 @@ use clap::{Args, ValueEnum};
 
 use super::Bar;
 use crate::angles::{self, AngleSource};
+use crate::detect::debug::DebugFolder;
 use crate::error::{Error, Result};
 use crate::experiment::{Experiment, MarkColour};
 use crate::measure::{Measurement, Options, measure};
@@ -37,6 +38,12 @@ pub struct TrackArgs {
     /// The recording with what was measured drawn into it: .mp4, .mov or .mkv.
     #[arg(long, value_name = "VIDEO")]
     overlay: Option<PathBuf>,
+    /// A folder for pictures of each step from frame to marks.
+    #[arg(long, value_name = "DIR")]
+    debug_frames: Option<PathBuf>,
+    /// How many frames are shown in it, evenly spread.
+    #[arg(long, value_name = "N", default_value_t = 8, requires = "debug_frames")]
+    debug_count: usize,
     /// Colour of the marks, a name or #rrggbb; once for all, or once a mark, top to bottom.
     #[arg(long, value_name = "COLOUR")]
     color: Vec<MarkColour>,
@@ -108,6 +115,7 @@ impl TrackArgs {
         let table = OutputFile::create(&self.out)?;
         let beside = self.sidecar_path().map(|path| OutputFile::create(&path)).transpose()?;
         self.overlay.as_deref().map(overlay::check_target).transpose()?;
+        let debug = self.debug_frames.as_deref().map(DebugFolder::create).transpose()?;
         let bar = Bar::new(self.quiet);
         let measurement = measure(&self.video, &options, &folder, &bar)?;
         let sidecar = Sidecar::new(&self.video, &options, &measurement)?;
@@ -117,6 +125,10 @@ impl TrackArgs {
             let overlay = Overlay { tracks, angles, pivot_px: options.rig.pivot_px, rate_hz };
             let recording = Recording::open(&self.video, &options.still_times)?;
             overlay.write(recording, target, options.workers, &bar)?;
+        }
+        if let Some(debug) = debug {
+            let recording = Recording::open(&self.video, &options.still_times)?;
+            debug.show(&recording, &measurement.hues, &measurement.tracks.t_s, self.debug_count, &bar)?;
         }
         drop(bar);
         table.commit(angles::to_csv(&measurement.tracks, &measurement.angles).as_bytes())?;
