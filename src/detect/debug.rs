@@ -222,11 +222,14 @@ fn draw(image: &mut RgbImage, number: usize, [x, y]: [f64; 2], area_px2: f64) ->
         let radius = (area_px2.max(0.0) / std::f64::consts::PI).sqrt();
         imgproc::circle(&mut mat, at(x, y), fixed(radius), blue, 1, imgproc::LINE_AA, SHIFT)?;
         let arm = 0.6 * radius + 2.0;
-        imgproc::line(&mut mat, at(x - arm, y), at(x + arm, y), white, 1, imgproc::LINE_AA, SHIFT)?;
-        imgproc::line(&mut mat, at(x, y - arm), at(x, y + arm), white, 1, imgproc::LINE_AA, SHIFT)?;
         let beside = Point::new((x + radius + 4.0) as i32, (y - 0.5 * radius) as i32);
         let (font, text) = (imgproc::FONT_HERSHEY_SIMPLEX, number.to_string());
-        imgproc::put_text(&mut mat, &text, beside, font, 0.55, white, 1, imgproc::LINE_AA, false)?;
+        // a dark seam first, so that white is seen on white
+        for (colour, width) in [(Scalar::all(0.0), 3), (white, 1)] {
+            imgproc::line(&mut mat, at(x - arm, y), at(x + arm, y), colour, width, imgproc::LINE_AA, SHIFT)?;
+            imgproc::line(&mut mat, at(x, y - arm), at(x, y + arm), colour, width, imgproc::LINE_AA, SHIFT)?;
+            imgproc::put_text(&mut mat, &text, beside, font, 0.6, colour, width, imgproc::LINE_AA, false)?;
+        }
     }
     for (to, from) in image.pixels_mut().zip(&pixels) {
         to.0 = [from[0], from[1], from[2]];

@@ -20,7 +20,7 @@ const SHADE: Ink = Ink::opaque([0, 0, 0]).at(0.55);
 
 /// A mark in one frame, as it is drawn.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Box {
+pub(super) struct Seen {
     /// Displayed pixels.
     pub centre_px: [f64; 2],
     /// Half a side.
@@ -71,7 +71,7 @@ pub(super) fn trail(canvas: &mut Canvas, look: &Look, steps_px: &[(f64, Option<[
 }
 
 /// The rectangle, whole where the mark was measured and dashed where it is lost, and the mark's number.
-pub(super) fn mark(canvas: &mut Canvas, look: &Look, number: usize, mark: Box) -> Result<()> {
+pub(super) fn mark(canvas: &mut Canvas, look: &Look, number: usize, mark: Seen) -> Result<()> {
     let ([x, y], half) = (mark.centre_px, mark.half_px);
     let ink = if mark.measured { MEASURED } else { LOST };
     let corners = [[x - half, y - half], [x + half, y - half], [x + half, y + half], [x - half, y + half]];

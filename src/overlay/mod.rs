@@ -14,7 +14,7 @@ use std::path::Path;
 
 use canvas::Canvas;
 use lettering::Lettering;
-use marks::Box;
+use marks::Seen;
 use panel::Panel;
 
 use crate::angles::{Angle, Angles};
@@ -108,23 +108,23 @@ impl Overlay<'_> {
     }
 
     fn draw(&self, canvas: &mut Canvas, look: &Look, panel: &Panel, frame: usize) -> Result<()> {
-        let boxes: Vec<Option<Box>> = (0..self.tracks.marks.len()).map(|m| self.box_of(m, frame, look)).collect();
-        let marked = boxes.iter().map(|b| b.map(|b| b.centre_px));
+        let seen: Vec<Option<Seen>> = (0..self.tracks.marks.len()).map(|m| self.seen_at(m, frame, look)).collect();
+        let marked = seen.iter().map(|s| s.map(|s| s.centre_px));
         let nodes: Vec<Option<[f64; 2]>> = self.pivot_px.map(Some).into_iter().chain(marked).collect();
         for pair in nodes.windows(2) {
             if let [Some(upper), Some(lower)] = *pair {
                 marks::link(canvas, look, upper, lower)?;
             }
         }
-        for mark in 0..boxes.len() {
+        for mark in 0..seen.len() {
             marks::trail(canvas, look, &self.trail_of(mark, frame))?;
         }
         if let Some(pivot) = self.pivot_px {
             marks::pivot(canvas, look, pivot)?;
         }
-        for (i, b) in boxes.iter().enumerate() {
-            if let Some(b) = b {
-                marks::mark(canvas, look, i + 1, *b)?;
+        for (i, mark) in seen.iter().enumerate() {
+            if let Some(mark) = mark {
+                marks::mark(canvas, look, i + 1, *mark)?;
             }
         }
         let angles: Vec<Option<Angle>> = self.angles.links.iter().map(|l| l.get(frame).copied().flatten()).collect();
@@ -132,14 +132,14 @@ impl Overlay<'_> {
     }
 
     /// Around the centroid, or around the filter's belief where the mark was not seen.
-    fn box_of(&self, mark: usize, frame: usize, look: &Look) -> Option<Box> {
+    fn seen_at(&self, mark: usize, frame: usize, look: &Look) -> Option<Seen> {
         let point = self.tracks.marks.get(mark)?.get(frame)?;
         let area_px2 = self.tracks.area_px2.get(mark).copied().unwrap_or(0.0).max(1.0);
         // a disc of that area, with air around it
         let half_px = 1.25 * (area_px2 / std::f64::consts::PI).sqrt() + 2.0 * look.line_px;
         match (point.measured, point.filtered) {
-            (Some(m), _) => Some(Box { centre_px: m.position_px, half_px, measured: true }),
-            (None, Some(f)) => Some(Box { centre_px: [f.state[0], f.state[1]], half_px, measured: false }),
+            (Some(m), _) => Some(Seen { centre_px: m.position_px, half_px, measured: true }),
+            (None, Some(f)) => Some(Seen { centre_px: [f.state[0], f.state[1]], half_px, measured: false }),
             (None, None) => None,
         }
     }
