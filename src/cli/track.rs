@@ -6,11 +6,14 @@ use clap::{Args, ValueEnum};
 
 use super::Bar;
 use crate::angles::{self, AngleSource};
+use crate::detect::debug::DebugFolder;
 use crate::error::{Error, Result};
 use crate::experiment::{Experiment, MarkColour};
 use crate::measure::{Measurement, Options, measure};
 use crate::output::OutputFile;
+use crate::overlay::{self, Overlay};
 use crate::sidecar::Sidecar;
+use crate::video::{Recording, StillTimes};
 
 /// Follow the marks of a recording and write their angles.
 #[derive(Debug, Args)]
@@ -19,11 +22,12 @@ Examples:
   track videos/kapton.mp4 --out angles.csv
   track pendulum.mp4 --out angles.csv --color red --color green --pivot 497,508
   track swing.mov --out angles.csv --config experiment.toml --overlay seen.mp4
+  track stills/ --rate 50 --out angles.csv
 
 Beside angles.csv stands angles.json: the source and its SHA-256, the options, the time stamps' gaps and jitter,
 the noise, and every warning. Exit code 0: done; 2: bad input, nothing written.")]
 pub struct TrackArgs {
-    /// The recording: MP4, MOV, AVI, MKV, …
+    /// The recording: MP4, MOV, AVI, MKV, …, or a folder of stills.
     video: PathBuf,
     /// The table of angles; `-` for standard output.
     #[arg(long, value_name = "CSV")]
@@ -31,6 +35,15 @@ pub struct TrackArgs {
     /// The experiment: marks, pivot, mirror, plumb line, lens.
     #[arg(long, value_name = "TOML")]
     config: Option<PathBuf>,
+    /// The recording with what was measured drawn into it: .mp4, .mov or .mkv.
+    #[arg(long, value_name = "VIDEO")]
+    overlay: Option<PathBuf>,
+    /// A folder for pictures of each step from frame to marks.
+    #[arg(long, value_name = "DIR")]
+    debug_frames: Option<PathBuf>,
+    /// How many frames are shown in it, evenly spread.
+    #[arg(long, value_name = "N", default_value_t = 8, requires = "debug_frames")]
+    debug_count: usize,
     /// Colour of the marks, a name or #rrggbb; once for all, or once a mark, top to bottom.
     #[arg(long, value_name = "COLOUR")]
     color: Vec<MarkColour>,
@@ -52,6 +65,12 @@ pub struct TrackArgs {
     /// How a mark is represented by one point.
     #[arg(long, value_name = "HOW", default_value = "subpixel")]
     centroid: CentroidKind,
+    /// When the stills of a folder were taken: a number of seconds a line, or rows `file,t_s`; else times.csv among them.
+    #[arg(long, value_name = "FILE", conflicts_with = "rate")]
+    times: Option<PathBuf>,
+    /// Stills a second, where nothing says when each was taken.
+    #[arg(long, value_name = "HZ")]
+    rate: Option<f64>,
     /// Cores to use; all by default.
     #[arg(long, value_name = "N")]
     threads: Option<usize>,
@@ -95,9 +114,22 @@ impl TrackArgs {
         let options = self.options(experiment)?;
         let table = OutputFile::create(&self.out)?;
         let beside = self.sidecar_path().map(|path| OutputFile::create(&path)).transpose()?;
+        self.overlay.as_deref().map(overlay::check_target).transpose()?;
+        let debug = self.debug_frames.as_deref().map(DebugFolder::create).transpose()?;
         let bar = Bar::new(self.quiet);
         let measurement = measure(&self.video, &options, &folder, &bar)?;
         let sidecar = Sidecar::new(&self.video, &options, &measurement)?;
+        if let Some(target) = &self.overlay {
+            let Measurement { tracks, angles, timing, .. } = &measurement;
+            let rate_hz = timing.real_rate_hz.or(timing.nominal_rate_hz);
+            let overlay = Overlay { tracks, angles, pivot_px: options.rig.pivot_px, rate_hz };
+            let recording = Recording::open(&self.video, &options.still_times)?;
+            overlay.write(recording, target, options.workers, &bar)?;
+        }
+        if let Some(debug) = debug {
+            let recording = Recording::open(&self.video, &options.still_times)?;
+            debug.show(&recording, &measurement.hues, &measurement.tracks.t_s, self.debug_count, &bar)?;
+        }
         drop(bar);
         table.commit(angles::to_csv(&measurement.tracks, &measurement.angles).as_bytes())?;
         if let Some(beside) = beside {
@@ -130,6 +162,11 @@ impl TrackArgs {
                 AnglesFrom::Smoothed => AngleSource::Smoothed,
             },
             binary_centroid: self.centroid == CentroidKind::Binary,
+            still_times: match (&self.times, self.rate) {
+                (Some(file), _) => StillTimes::File(file.clone()),
+                (None, Some(rate_hz)) => StillTimes::Rate(rate_hz),
+                (None, None) => StillTimes::Beside,
+            },
             workers: self.threads.unwrap_or(defaults.workers),
         })
     }
