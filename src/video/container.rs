@@ -60,11 +60,8 @@ impl Container {
     /// [`Error::Unreadable`], [`Error::EmptyFile`], [`Error::NotAVideo`], [`Error::NoVideoStream`],
     /// [`Error::NoDecoder`] and [`Error::PictureSize`].
     pub fn open(path: &Path) -> Result<Self> {
-        let file = std::fs::File::open(path).map_err(|e| Error::unreadable(path, e))?;
-        let bytes = file.metadata().map_err(|e| Error::unreadable(path, e))?.len();
-        if bytes == 0 {
-            return Err(Error::EmptyFile { path: path.to_owned() });
-        }
+        super::initialise();
+        check_file(path)?;
         // the prefix keeps names with a colon from being taken for a network protocol
         let mut url = std::ffi::OsString::from("file:");
         url.push(path);
@@ -131,6 +128,18 @@ impl Container {
     }
 }
 
+/// A file that can be read, with something in it. A pipe is none: it is read twice.
+fn check_file(path: &Path) -> Result<()> {
+    let failed = |e| Error::unreadable(path, e);
+    let kind = std::fs::metadata(path).map_err(failed)?;
+    if !kind.is_file() {
+        let detail = if kind.is_dir() { "it is a folder" } else { "it is a pipe or a device" }.to_owned();
+        return Err(Error::NotAVideo { path: path.to_owned(), detail });
+    }
+    std::fs::File::open(path).map_err(failed)?;
+    if kind.len() == 0 { Err(Error::EmptyFile { path: path.to_owned() }) } else { Ok(()) }
+}
+
 fn not_a_video(path: &Path, error: &ffmpeg::Error) -> Error {
     let detail = match error {
         ffmpeg::Error::InvalidData => {
@@ -183,7 +192,7 @@ fn stated_frames(input: &ffmpeg::format::context::Input, stream: &ffmpeg::Stream
     stated.or_else(|| {
         let seconds = input.duration() as f64 * 1e-6;
         let frames = seconds * ratio(stream.avg_frame_rate())?;
-        (frames >= 1.0 && frames < 1e9).then_some(frames as u64)
+        (1.0..1e9).contains(&frames).then_some(frames as u64)
     })
 }
 

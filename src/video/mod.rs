@@ -19,3 +19,12 @@ pub use timing::{Gap, Timing};
 
 /// Longest picture side that is measured.
 pub const MAX_SIDE_PX: u32 = 16384;
+
+/// Registers FFmpeg and keeps its own messages off the terminal: every failure is reported once, by [`Error`](crate::Error).
+fn initialise() {
+    static ONCE: std::sync::Once = std::sync::Once::new();
+    ONCE.call_once(|| {
+        let _ = ffmpeg_the_third::init();
+        ffmpeg_the_third::log::set_level(ffmpeg_the_third::log::Level::Quiet);
+    });
+}
