@@ -33,6 +33,8 @@ pub struct StreamInfo {
     pub nominal_rate_hz: Option<f64>,
     /// Seconds in one tick of the time stamps.
     pub tick_s: f64,
+    /// Places by which a frame may be shown after others that were decoded before it.
+    pub delay_frames: usize,
     /// Frames that the file states, if any; for progress only.
     pub stated_frames: Option<u64>,
 }
@@ -91,6 +93,7 @@ impl Container {
             pixel_aspect: pixel_aspect(&stream, &parameters, display_orientation(&stream)),
             nominal_rate_hz: ratio(stream.avg_frame_rate()).or_else(|| ratio(stream.rate())),
             tick_s: f64::from(time_base),
+            delay_frames: delay_frames(&parameters),
             stated_frames: stated_frames(&input, &stream),
         };
         let nal_length_bytes = nal_length(&parameters, codec);
@@ -194,6 +197,12 @@ fn stated_frames(input: &ffmpeg::format::context::Input, stream: &ffmpeg::Stream
         let frames = seconds * ratio(stream.avg_frame_rate())?;
         (1.0..1e9).contains(&frames).then_some(frames as u64)
     })
+}
+
+/// The codec's reordering depth.
+fn delay_frames(parameters: &Parameters) -> usize {
+    // SAFETY: the parameters are valid while borrowed; this is a plain field.
+    usize::try_from(unsafe { (*parameters.as_ptr()).video_delay }).unwrap_or(0)
 }
 
 /// From `avcC` and `hvcC` records: how NAL units are delimited.

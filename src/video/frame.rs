@@ -18,7 +18,9 @@ pub struct Frame<'a> {
     pub picture: Picture<'a>,
     /// Presentation time stamp of the container.
     pub t_s: f64,
-    /// The decoder reported damage in this frame.
+    /// The frame refers to no other.
+    pub key: bool,
+    /// The decoder reported damage in this frame, or refused a packet before it.
     pub damaged: bool,
 }
 

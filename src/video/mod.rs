@@ -1,6 +1,7 @@
 //! Frames with their time stamps: a container is split at key frames and decoded on all cores, in order.
 
 mod container;
+mod damage;
 mod decode;
 mod encode;
 mod frame;
@@ -10,6 +11,7 @@ mod segments;
 mod timing;
 
 pub use container::{Container, StreamInfo};
+pub use damage::{DamageSpread, Outcome};
 pub use decode::{Decoded, DecoderRecipe, StreamDecoder, decode_in_order};
 pub use encode::{TICKS_PER_SECOND, VideoWriter};
 pub use frame::Frame;
