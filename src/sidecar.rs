@@ -77,8 +77,9 @@ struct Mark {
     median_area_px2: f64,
     /// Root mean square stated standard deviation, the noise estimate.
     noise_px: [f64; 2],
-    /// Factor by which the track's own scatter corrected the stated standard deviation.
-    scatter_factor: [f64; 2],
+    /// Factors (x, y) by which the track's own scatter corrected the stated standard deviation.
+    scatter_factor_at_rest: [f64; 2],
+    scatter_factor_in_motion: [f64; 2],
     acceleration_psd_px2_s3: f64,
 }
 
@@ -248,7 +249,8 @@ impl Mark {
             partial_frames: points.iter().filter(|p| p.flags.contains(crate::track::Flags::PARTIAL)).count(),
             median_area_px2: m.tracks.area_px2[index],
             noise_px: [rms(0), rms(1)],
-            scatter_factor: m.tracks.scatter_factor[index],
+            scatter_factor_at_rest: m.tracks.scatter[index].resting,
+            scatter_factor_in_motion: m.tracks.scatter[index].moving,
             acceleration_psd_px2_s3: m.tracks.motion[index].acceleration_psd_px2_s3,
         }
     }

@@ -172,7 +172,7 @@ impl Default for Codec {
     fn default() -> Self {
         Self {
             name: CodecName::H264,
-            crf: 23.0,
+            crf: 18.0,
             preset: "medium".to_owned(),
             b_frames: None,
             gop: 60,
@@ -435,7 +435,7 @@ mod tests {
         let render = Render::default();
         assert_eq!(render.validate(), Ok(()));
         assert_eq!((render.width_px, render.height_px, render.fps), (1280, 720, 30.0));
-        assert_eq!((render.mark_diameter_px, render.codec.crf, render.codec.preset.as_str()), (22.0, 23.0, "medium"));
+        assert_eq!((render.mark_diameter_px, render.codec.crf, render.codec.preset.as_str()), (22.0, 18.0, "medium"));
     }
 
     #[test]

@@ -8,7 +8,7 @@ mod smooth;
 mod tracker;
 
 pub use kalman::{Belief, Measurement, Motion};
-pub use tracker::{FrameBlobs, MarkFound, MarkSlot, Sighting, Tracker, Tracks};
+pub use tracker::{FrameBlobs, MarkFound, MarkSlot, Scatter, Sighting, Tracker, Tracks};
 
 /// One mark in one frame.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -9,7 +9,7 @@
 use super::assign::assign;
 use super::choose::{Choice, Tracklet, choose};
 use super::kalman::{Belief, Measurement, Motion};
-use super::noise::scatter_factor;
+use super::noise::{REST_SHARE, moving_factor, resting_factor, speeds_px, variance_factor};
 use super::smooth::smooth;
 use super::{Filtered, Flags, Measured, Point};
 use nalgebra::{Matrix2, Vector2};
@@ -158,8 +158,8 @@ pub struct Tracks {
     pub marks: Vec<Vec<Point>>,
     /// The process noise each mark was filtered with.
     pub motion: Vec<Motion>,
-    /// Factors (x, y) by which each mark's stated standard deviations were multiplied to match its scatter.
-    pub scatter_factor: Vec<[f64; 2]>,
+    /// Factors by which each mark's stated standard deviations were multiplied to match its scatter.
+    pub scatter: Vec<Scatter>,
     /// Median area of each mark.
     pub area_px2: Vec<f64>,
     /// Frames that the decoder reported as damaged.
@@ -291,17 +291,50 @@ impl Tracker {
         let mut tracks = Tracks {
             marks: Vec::new(),
             motion: Vec::new(),
-            scatter_factor: Vec::new(),
+            scatter: Vec::new(),
             area_px2: Vec::new(),
             damaged_frames: self.damaged,
             other_candidates: choice.others,
             t_s: self.t_s,
         };
-        for points in self.points {
-            tracks.add_mark(points, self.step_s);
+        let scatters = scatters(&self.points, &tracks.t_s);
+        for (points, scatter) in self.points.into_iter().zip(scatters) {
+            tracks.add_mark(points, scatter, self.step_s);
         }
         (tracks, found)
     }
+}
+
+/// Factors (x, y) on the stated standard deviation of a mark.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Scatter {
+    /// At rest.
+    pub resting: [f64; 2],
+    /// In motion.
+    pub moving: [f64; 2],
+}
+
+/// The factors of all marks; a mark that never moves takes over what the moving ones show.
+fn scatters(marks: &[Vec<(Option<Measured>, Flags)>], t_s: &[f64]) -> Vec<Scatter> {
+    let tracks: Vec<Vec<Option<Measured>>> =
+        marks.iter().map(|points| points.iter().map(|(m, _)| *m).collect()).collect();
+    let speeds: Vec<Vec<f64>> = tracks.iter().map(|t| speeds_px(t)).collect();
+    let moving: Vec<[Option<f64>; 2]> =
+        tracks.iter().zip(&speeds).map(|(t, v)| [0, 1].map(|axis| moving_factor(t, v, t_s, axis))).collect();
+    let shown: Vec<f64> = moving.iter().flatten().flatten().copied().collect();
+    let usual = shown.iter().sum::<f64>() / shown.len().max(1) as f64;
+    tracks
+        .iter()
+        .zip(&speeds)
+        .zip(&moving)
+        .map(|((track, speed), moving)| {
+            let rest = |axis| resting_factor(track, speed, t_s, axis).unwrap_or(1.0);
+            Scatter {
+                resting: [0, 1].map(|axis| rest(axis).max(REST_SHARE * moving[axis].unwrap_or(usual)).max(1.0)),
+                moving: moving.map(|k| k.unwrap_or(usual).max(1.0)),
+            }
+        })
+        .collect()
 }
 
 /// How often a mark was seen.
@@ -314,15 +347,16 @@ pub struct MarkFound {
 }
 
 impl Tracks {
-    fn add_mark(&mut self, points: Vec<(Option<Measured>, Flags)>, step_s: f64) {
+    fn add_mark(&mut self, points: Vec<(Option<Measured>, Flags)>, scatter: Scatter, step_s: f64) {
         let (mut measured, mut flags): (Vec<_>, Vec<_>) = points.into_iter().unzip();
         let area = median(measured.iter().flatten().map(|m| f64::from(m.area_px2))).unwrap_or(0.0);
-        let factors = [0, 1].map(|axis| scatter_factor(&measured, &self.t_s, axis).unwrap_or(1.0).clamp(0.2, 50.0));
-        for (m, f) in measured.iter_mut().zip(&mut flags) {
+        let speeds = speeds_px(&measured);
+        for ((m, f), speed) in measured.iter_mut().zip(&mut flags).zip(speeds) {
             if let Some(m) = m {
-                m.covariance_px2[0] *= factors[0] * factors[0];
-                m.covariance_px2[1] *= factors[1] * factors[1];
-                m.covariance_px2[2] *= factors[0] * factors[1];
+                let [x, y] = [0, 1].map(|axis| variance_factor(speed, scatter.resting[axis], scatter.moving[axis]));
+                m.covariance_px2[0] *= x;
+                m.covariance_px2[1] *= y;
+                m.covariance_px2[2] *= (x * y).sqrt();
                 mind_area(m, f, area);
             }
         }
@@ -337,7 +371,7 @@ impl Tracks {
                 .collect(),
         );
         self.motion.push(motion);
-        self.scatter_factor.push(factors);
+        self.scatter.push(scatter);
         self.area_px2.push(area);
     }
 

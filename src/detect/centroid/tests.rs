@@ -82,7 +82,7 @@ fn a_disc_half_on_an_amber_strip_and_half_on_the_dark_is_not_drawn_to_either() {
 #[test]
 fn a_background_that_brightens_across_the_mark_does_not_move_it() {
     let (worst, mean) = errors(|x, _, t| [0.5 + 0.005 * (x - t[0]); 3]);
-    assert!(worst < 0.04 && mean[0].abs() < 0.03, "{worst} {mean:?}");
+    assert!(worst < 0.05 && mean[0].abs() < 0.04, "{worst} {mean:?}");
 }
 
 #[test]
@@ -91,5 +91,5 @@ fn a_dark_line_through_the_mark_and_a_distant_object_do_not_move_it() {
         let on_line = ((x - t[0]) * 0.6 - (y - t[1]) * 0.8).abs() < 0.8 && x > t[0];
         if on_line || x > t[0] + 24.0 { [0.05, 0.05, 0.4] } else { [0.85, 0.85, 0.85] }
     });
-    assert!(worst < 0.1 && mean[0].abs() < 0.03, "{worst} {mean:?}");
+    assert!(worst < 0.1 && mean[0].abs() < 0.04, "{worst} {mean:?}");
 }
