@@ -39,20 +39,24 @@ TOML
 render 720p 1280 720 2600 640 96 22 48
 render 1080p 1920 1080 3900 960 144 33 72
 
-# Seconds of one run.
+# Wall seconds and processor seconds of one run.
 seconds() {
-    local start=$EPOCHREALTIME
-    "$@" >/dev/null 2>&1
-    awk -v a="$start" -v b="$EPOCHREALTIME" 'BEGIN { printf "%.3f\n", b - a }'
+    local TIMEFORMAT='%R %U %S'
+    { time "$@" >/dev/null 2>&1; } 2>&1 | awk '{ print $1, $2 + $3 }'
 }
 run_track() { seconds "$target/release/track" "$1" --out "$clips/angles.csv" --quiet; }
 run_ffmpeg() { seconds ffmpeg -v error -i "$1" -f null -; }
 run_opencv() { seconds "$pipeline" "$1"; }
-median() { sort -n | awk '{ v[NR] = $1 } END { print (v[int((NR + 1) / 2)] + v[int(NR / 2) + 1]) / 2 }'; }
+# The median of an expression over the rounds; $1 $2 track, $3 $4 ffmpeg, $5 $6 opencv.
+median() {
+    awk "{ print $1 }" "$table" | sort -n |
+        awk '{ v[NR] = $1 } END { print (v[int((NR + 1) / 2)] + v[int(NR / 2) + 1]) / 2 }'
+}
 
 echo "$(nproc) cores, load $(cut -d ' ' -f 1 /proc/loadavg), $(ffmpeg -version | awk 'NR == 1 { print $1, $3 }'), OpenCV $(pkg-config --modversion opencv4)"
 echo "medians of $rounds rounds after a warm-up; the ratios are medians of each round's own"
-printf '%-6s %9s %9s %9s %14s %14s\n' clip track ffmpeg opencv track/ffmpeg track/opencv
+printf '%-16s %9s %9s %9s %14s %14s\n' clip track ffmpeg opencv track/ffmpeg track/opencv
+row() { printf '%-16s %7.2f s %7.2f s %7.2f s %14.3f %14.3f\n' "$@"; }
 for name in 720p 1080p; do
     clip=$clips/$name.mp4
     table=$clips/$name.times
@@ -60,12 +64,8 @@ for name in 720p 1080p; do
     for ((round = 0; round < rounds; round++)); do
         echo "$(run_track "$clip") $(run_ffmpeg "$clip") $(run_opencv "$clip")"
     done >"$table"
-    printf '%-6s %7.2f s %7.2f s %7.2f s %14.3f %14.3f\n' "$name" \
-        "$(awk '{ print $1 }' "$table" | median)" \
-        "$(awk '{ print $2 }' "$table" | median)" \
-        "$(awk '{ print $3 }' "$table" | median)" \
-        "$(awk '{ print $1 / $2 }' "$table" | median)" \
-        "$(awk '{ print $1 / $3 }' "$table" | median)"
+    row "$name, wall" "$(median '$1')" "$(median '$3')" "$(median '$5')" "$(median '$1 / $3')" "$(median '$1 / $5')"
+    row "$name, processor" "$(median '$2')" "$(median '$4')" "$(median '$6')" "$(median '$2 / $4')" "$(median '$2 / $6')"
 done
 
 # Peak resident memory in MB, from the kernel's own account while the program runs.
