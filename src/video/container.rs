@@ -68,9 +68,7 @@ impl Container {
         let mut url = std::ffi::OsString::from("file:");
         url.push(path);
         let input = ffmpeg::format::input(&url).map_err(|e| not_a_video(path, &e))?;
-        let stream = input
-            .streams()
-            .best(media::Type::Video)
+        let stream = main_video(&input)
             .ok_or_else(|| Error::NoVideoStream { path: path.to_owned(), found: describe_streams(&input) })?;
         let parameters = owned_parameters(&stream).map_err(|e| not_a_video(path, &e))?;
         let codec = parameters.id();
@@ -163,6 +161,16 @@ fn owned_parameters(stream: &ffmpeg::Stream<'_>) -> std::result::Result<Paramete
 fn describe_streams(input: &ffmpeg::format::context::Input) -> String {
     let kinds: Vec<String> = input.streams().map(|s| format!("{:?}", s.parameters().medium()).to_lowercase()).collect();
     if kinds.is_empty() { "no stream at all".to_owned() } else { format!("only {}", kinds.join(", ")) }
+}
+
+/// The video stream with the largest picture, the first of several; cover pictures do not count.
+fn main_video(input: &ffmpeg::format::context::Input) -> Option<ffmpeg::Stream<'_>> {
+    let picture = ffmpeg::format::stream::Disposition::ATTACHED_PIC;
+    let area = |s: &ffmpeg::Stream<'_>| u64::from(s.parameters().width()) * u64::from(s.parameters().height());
+    input
+        .streams()
+        .filter(|s| s.parameters().medium() == media::Type::Video && !s.disposition().contains(picture))
+        .max_by_key(|s| (area(s), std::cmp::Reverse(s.index())))
 }
 
 fn other_videos(input: &ffmpeg::format::context::Input, chosen: usize) -> usize {
