@@ -9,7 +9,7 @@ use crate::error::{Error, Result};
 use crate::experiment::{MarkColour, Rig};
 use crate::progress::Progress;
 use crate::track::{FrameBlobs, MarkSlot, Measured, Sighting, Tracker, Tracks};
-use crate::video::{Decoded, Frame, Orientation, Recording, StillTimes, StreamInfo, Timing};
+use crate::video::{DamageSpread, Decoded, Frame, Orientation, Outcome, Recording, StillTimes, StreamInfo, Timing};
 
 /// How a recording is measured.
 #[derive(Debug, Clone)]
@@ -85,15 +85,19 @@ pub fn measure(path: &Path, options: &Options, folder: &Path, progress: &dyn Pro
     let mut tracker = Tracker::new(slots.clone(), options.rig.pivot_px);
     progress.begin("tracking", stream.stated_frames);
     let view = View { orientation: stream.orientation, size: stream.stored_size_px, binary: options.binary_centroid };
-    let decoded =
-        recording.decode_in_order(options.workers, &|frame| view.frame_blobs(&detector, &frame), &mut |blobs| {
-            if progress.is_cancelled() {
-                return Err(Error::Interrupted);
-            }
-            progress.advance(1);
-            tracker.push(blobs?);
-            Ok(())
-        })?;
+    let mut spread = DamageSpread::new(stream.delay_frames);
+    let see = |frame: Frame<'_>| view.sightings(&detector, &frame);
+    let decoded = recording.decode_in_order(options.workers, &see, &mut |outcome| {
+        if progress.is_cancelled() {
+            return Err(Error::Interrupted);
+        }
+        progress.advance(1);
+        if let Some(certain) = spread.push(outcome?) {
+            tracker.push(frame_blobs(certain));
+        }
+        Ok(())
+    })?;
+    spread.finish().for_each(|certain| tracker.push(frame_blobs(certain)));
     if decoded.frames == 0 {
         return Err(Error::NoFrames { path: path.to_owned(), packets: decoded.packets });
     }
@@ -113,6 +117,12 @@ pub fn measure(path: &Path, options: &Options, folder: &Path, progress: &dyn Pro
     let angles = angles_from_tracks(&tracks, &calibration, options.rig.pivot_px, options.angle_source)?;
     let timing = Timing::audit(&tracks.t_s, stream.nominal_rate_hz, stream.tick_s);
     Ok(Measurement { stream, decoded, timing, hues, tracks, angles })
+}
+
+/// What was seen in a frame and when; nothing is measured in a damaged one.
+fn frame_blobs(frame: Outcome<(f64, Vec<Sighting>)>) -> FrameBlobs {
+    let (t_s, seen) = frame.value;
+    FrameBlobs { t_s, damaged: frame.damaged, sightings: if frame.damaged { Vec::new() } else { seen } }
 }
 
 /// One hue for each distinct colour, and each mark's hue.
@@ -155,10 +165,11 @@ struct View {
 }
 
 impl View {
-    fn frame_blobs(&self, detector: &Detector, frame: &Frame<'_>) -> Result<FrameBlobs> {
+    /// Time stamp and blobs of a frame, as displayed.
+    fn sightings(&self, detector: &Detector, frame: &Frame<'_>) -> Result<Outcome<(f64, Vec<Sighting>)>> {
         let blobs = if frame.damaged { Vec::new() } else { detector.detect(&frame.picture)? };
         let sightings = blobs.iter().map(|b| self.sighting(b)).collect();
-        Ok(FrameBlobs { t_s: frame.t_s, damaged: frame.damaged, sightings })
+        Ok(Outcome { key: frame.key, damaged: frame.damaged, value: (frame.t_s, sightings) })
     }
 
     fn sighting(&self, blob: &Blob) -> Sighting {

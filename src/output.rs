@@ -44,18 +44,28 @@ impl OutputFile {
         Ok(Self { path: path.to_owned(), sink })
     }
 
-    /// Writes everything and lets the file appear.
+    /// Writes everything; only a device shows it already.
     ///
     /// # Errors
     /// [`Error::Unwritable`]; nothing appears then.
-    pub fn commit(self, contents: &[u8]) -> Result<()> {
-        let failed = |e| Error::unwritable(&self.path, e);
+    pub fn write(&mut self, contents: &[u8]) -> Result<()> {
+        let written = match &mut self.sink {
+            Sink::StandardOutput => std::io::stdout().write_all(contents),
+            Sink::Device => std::fs::write(&self.path, contents),
+            Sink::Temporary(file) => file.write_all(contents),
+        };
+        written.map_err(|e| Error::unwritable(&self.path, e))
+    }
+
+    /// Lets what was written appear under its name.
+    ///
+    /// # Errors
+    /// [`Error::Unwritable`]; nothing appears then.
+    pub fn commit(self) -> Result<()> {
         match self.sink {
-            Sink::StandardOutput => std::io::stdout().write_all(contents).map_err(failed),
-            Sink::Device => std::fs::write(&self.path, contents).map_err(failed),
-            Sink::Temporary(mut file) => {
-                file.write_all(contents).and_then(|()| file.as_file().sync_all()).map_err(failed)?;
-                file.persist(&self.path).map(|_| ()).map_err(|e| Error::unwritable(&self.path, e.error))
+            Sink::StandardOutput | Sink::Device => Ok(()),
+            Sink::Temporary(file) => {
+                file.persist(&self.path).map(drop).map_err(|e| Error::unwritable(&self.path, e.error))
             }
         }
     }

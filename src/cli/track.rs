@@ -112,11 +112,13 @@ impl TrackArgs {
         let experiment = self.config.as_deref().map(Experiment::read).transpose()?.unwrap_or_default();
         let folder = self.config.as_deref().and_then(Path::parent).unwrap_or(Path::new("")).to_owned();
         let options = self.options(experiment)?;
-        let table = OutputFile::create(&self.out)?;
-        let beside = self.sidecar_path().map(|path| OutputFile::create(&path)).transpose()?;
+        self.keep_inputs()?;
         self.overlay.as_deref().map(overlay::check_target).transpose()?;
-        let debug = self.debug_frames.as_deref().map(DebugFolder::create).transpose()?;
+        // before the first temporary file, so that Ctrl-C leaves none behind
         let bar = Bar::new(self.quiet);
+        let mut table = OutputFile::create(&self.out)?;
+        let debug = self.debug_frames.as_deref().map(DebugFolder::create).transpose()?;
+        let mut beside = self.sidecar_path().map(|path| OutputFile::create(&path)).transpose()?;
         let measurement = measure(&self.video, &options, &folder, &bar)?;
         let sidecar = Sidecar::new(&self.video, &options, &measurement)?;
         if let Some(target) = &self.overlay {
@@ -131,10 +133,12 @@ impl TrackArgs {
             debug.show(&recording, &measurement.hues, &measurement.tracks.t_s, self.debug_count, &bar)?;
         }
         drop(bar);
-        table.commit(angles::to_csv(&measurement.tracks, &measurement.angles).as_bytes())?;
-        if let Some(beside) = beside {
-            beside.commit(sidecar.to_json().as_bytes())?;
+        if let Some(beside) = &mut beside {
+            beside.write(sidecar.to_json().as_bytes())?;
         }
+        table.write(angles::to_csv(&measurement.tracks, &measurement.angles).as_bytes())?;
+        table.commit()?;
+        beside.map_or(Ok(()), OutputFile::commit)?;
         if !self.quiet {
             self.report(&measurement, &sidecar);
         }
@@ -175,24 +179,36 @@ impl TrackArgs {
     fn marks(&self, configured: &[MarkColour], pivot: bool) -> Result<Vec<MarkColour>> {
         let given = if self.color.is_empty() { configured } else { &self.color };
         let usual = if pivot { 2 } else { 3 };
-        let marks = match given {
-            [] => vec![MarkColour::red(); self.markers.unwrap_or(usual)],
-            [one] if self.color.len() == 1 => vec![one.clone(); self.markers.unwrap_or(configured.len().max(usual))],
-            several => several.to_vec(),
+        let (colour, count) = match given {
+            [] => (Some(MarkColour::red()), self.markers.unwrap_or(usual)),
+            [one] if self.color.len() == 1 => (Some(one.clone()), self.markers.unwrap_or(configured.len().max(usual))),
+            several => (None, several.len()),
         };
-        if self.markers.is_some_and(|n| n != marks.len()) {
-            let message = format!("{} marks asked for, {} colours given", self.markers.unwrap_or(0), marks.len());
-            return Err(option("--markers", &message));
+        if let Some(wanted) = self.markers.filter(|wanted| *wanted != count) {
+            return Err(option("--markers", &format!("{wanted} marks asked for, {count} colours given")));
         }
-        let least = if pivot { 1 } else { 2 };
-        if !(least..=12).contains(&marks.len()) {
-            let message = format!(
-                "an angle needs {least} to 12 marks{}",
-                if pivot { " below the pivot" } else { " or a --pivot" }
-            );
-            return Err(option("--markers", &message));
+        let (least, help) = if pivot { (1, " below the pivot") } else { (2, " or a --pivot") };
+        if !(least..=12).contains(&count) {
+            return Err(option("--markers", &format!("an angle needs {least} to 12 marks{help}")));
         }
-        Ok(marks)
+        Ok(colour.map_or_else(|| given.to_vec(), |one| vec![one; count]))
+    }
+
+    /// No output may take the place of an input, nor one output that of the other.
+    fn keep_inputs(&self) -> Result<()> {
+        let refuse = |message: String| Err(option("--out", &message));
+        let beside = self.sidecar_path();
+        if beside.as_ref() == Some(&self.out) {
+            return refuse(format!("{} is the name of the account beside the table; use .csv", self.out.display()));
+        }
+        let inputs = [Some(&self.video), self.config.as_ref()];
+        let same = |a: &Path, b: &Path| a.canonicalize().is_ok_and(|a| b.canonicalize().is_ok_and(|b| a == b));
+        for output in [Some(&self.out), beside.as_ref()].into_iter().flatten() {
+            if inputs.iter().flatten().any(|input| same(input, output)) {
+                return refuse(format!("{} is an input and would be overwritten; use another name", output.display()));
+            }
+        }
+        Ok(())
     }
 
     fn sidecar_path(&self) -> Option<PathBuf> {

@@ -11,6 +11,8 @@ use crate::video::Picture;
 pub const LEAST_COMPONENT: f64 = 16.0;
 /// Where between saddle (0) and summit (1) the threshold lies; a blurred mark keeps more than this of its summit.
 const POSITION: f64 = 0.4;
+/// Share of the greatest persistence below which a summit is a ripple.
+const CLEAR_SHARE: f64 = 0.2;
 
 /// One summit of the colour component.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -115,11 +117,19 @@ impl Relief {
     }
 }
 
+/// The summits that stand out like the clearest one. What is left are ripples on top of a mark, and noise: where a
+/// mark is missing, a threshold between those would cut the others apart.
+fn clear_ones(summits: &[Summit]) -> &[Summit] {
+    let least = CLEAR_SHARE * summits.first().map_or(0.0, Summit::persistence);
+    &summits[..summits.partition_point(|s| s.persistence() >= least)]
+}
+
 /// The threshold, on the scale to 255, for `marks` marks of this hue seen in several pictures; `None` where no
 /// picture shows one.
 pub fn choose(pictures: &[Vec<Summit>], marks: usize) -> Option<f64> {
-    let full: Vec<f64> = pictures.iter().filter_map(|s| s.get(marks.max(1) - 1)).map(Summit::threshold).collect();
-    let any: Vec<f64> = pictures.iter().filter_map(|s| s.last()).map(Summit::threshold).collect();
+    let clear: Vec<&[Summit]> = pictures.iter().map(|summits| clear_ones(summits)).collect();
+    let full: Vec<f64> = clear.iter().filter_map(|s| s.get(marks.max(1) - 1)).map(Summit::threshold).collect();
+    let any: Vec<f64> = clear.iter().filter_map(|s| s.last()).map(Summit::threshold).collect();
     let mut thresholds = if full.is_empty() { any } else { full };
     thresholds.sort_by(f64::total_cmp);
     // the lower quartile: a mark seen once through blur or shade should still be found

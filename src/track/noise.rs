@@ -20,7 +20,7 @@ const SPEED_CLASSES: usize = 3;
 /// px a frame from which a mark counts as moving.
 const MOVING_PX: f64 = 0.5;
 /// What neighbouring errors have in common, which differences do not see, and the choice of the least result.
-const UNSEEN: f64 = 1.12;
+const UNSEEN: f64 = 1.30;
 /// Error at rest over error in motion, on rendered recordings.
 pub const REST_SHARE: f64 = 0.42;
 

@@ -33,6 +33,8 @@ pub struct StreamInfo {
     pub nominal_rate_hz: Option<f64>,
     /// Seconds in one tick of the time stamps.
     pub tick_s: f64,
+    /// Places by which a frame may be shown after others that were decoded before it.
+    pub delay_frames: usize,
     /// Frames that the file states, if any; for progress only.
     pub stated_frames: Option<u64>,
 }
@@ -60,11 +62,8 @@ impl Container {
     /// [`Error::Unreadable`], [`Error::EmptyFile`], [`Error::NotAVideo`], [`Error::NoVideoStream`],
     /// [`Error::NoDecoder`] and [`Error::PictureSize`].
     pub fn open(path: &Path) -> Result<Self> {
-        let file = std::fs::File::open(path).map_err(|e| Error::unreadable(path, e))?;
-        let bytes = file.metadata().map_err(|e| Error::unreadable(path, e))?.len();
-        if bytes == 0 {
-            return Err(Error::EmptyFile { path: path.to_owned() });
-        }
+        super::initialise();
+        check_file(path)?;
         // the prefix keeps names with a colon from being taken for a network protocol
         let mut url = std::ffi::OsString::from("file:");
         url.push(path);
@@ -94,6 +93,7 @@ impl Container {
             pixel_aspect: pixel_aspect(&stream, &parameters, display_orientation(&stream)),
             nominal_rate_hz: ratio(stream.avg_frame_rate()).or_else(|| ratio(stream.rate())),
             tick_s: f64::from(time_base),
+            delay_frames: delay_frames(&parameters),
             stated_frames: stated_frames(&input, &stream),
         };
         let nal_length_bytes = nal_length(&parameters, codec);
@@ -129,6 +129,18 @@ impl Container {
         let micros = self.input.duration();
         (micros > 0).then_some(micros as f64 * 1e-6)
     }
+}
+
+/// A file that can be read, with something in it. A pipe is none: it is read twice.
+fn check_file(path: &Path) -> Result<()> {
+    let failed = |e| Error::unreadable(path, e);
+    let kind = std::fs::metadata(path).map_err(failed)?;
+    if !kind.is_file() {
+        let detail = if kind.is_dir() { "it is a folder" } else { "it is a pipe or a device" }.to_owned();
+        return Err(Error::NotAVideo { path: path.to_owned(), detail });
+    }
+    std::fs::File::open(path).map_err(failed)?;
+    if kind.len() == 0 { Err(Error::EmptyFile { path: path.to_owned() }) } else { Ok(()) }
 }
 
 fn not_a_video(path: &Path, error: &ffmpeg::Error) -> Error {
@@ -183,8 +195,14 @@ fn stated_frames(input: &ffmpeg::format::context::Input, stream: &ffmpeg::Stream
     stated.or_else(|| {
         let seconds = input.duration() as f64 * 1e-6;
         let frames = seconds * ratio(stream.avg_frame_rate())?;
-        (frames >= 1.0 && frames < 1e9).then_some(frames as u64)
+        (1.0..1e9).contains(&frames).then_some(frames as u64)
     })
+}
+
+/// The codec's reordering depth.
+fn delay_frames(parameters: &Parameters) -> usize {
+    // SAFETY: the parameters are valid while borrowed; this is a plain field.
+    usize::try_from(unsafe { (*parameters.as_ptr()).video_delay }).unwrap_or(0)
 }
 
 /// From `avcC` and `hvcC` records: how NAL units are delimited.

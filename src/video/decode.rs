@@ -79,7 +79,8 @@ impl DecoderRecipe {
         context.set_threading(threading::Config { kind, count: threads, ..Default::default() });
         let mut decoder = context.decoder();
         set_packet_time_base(&mut decoder, self.time_base);
-        Ok(StreamDecoder { video: decoder.video()?, frame: ffmpeg::frame::Video::empty(), recipe: self.clone() })
+        let (video, frame) = (decoder.video()?, ffmpeg::frame::Video::empty());
+        Ok(StreamDecoder { video, frame, recipe: self.clone(), refused: false })
     }
 }
 
@@ -93,6 +94,8 @@ pub struct StreamDecoder {
     video: ffmpeg::decoder::Video,
     frame: ffmpeg::frame::Video,
     recipe: DecoderRecipe,
+    /// A packet was refused since the last frame.
+    refused: bool,
 }
 
 impl StreamDecoder {
@@ -105,9 +108,10 @@ impl StreamDecoder {
     ) -> (Decoded, ControlFlow<()>) {
         let mut decoded = Decoded::default();
         let mut flow = ControlFlow::Continue(());
+        self.refused = false;
         while let Some(packet) = packets() {
             if self.video.send_packet(&packet).is_err() {
-                decoded.damaged_packets += 1;
+                self.refuse(&mut decoded);
             }
             flow = self.receive(&mut decoded, on_frame);
             if flow.is_break() {
@@ -132,10 +136,15 @@ impl StreamDecoder {
                 Err(ffmpeg::Error::Other { errno }) if errno == libc::EAGAIN => break,
                 Err(ffmpeg::Error::Eof) => break,
                 // with threads of its own a decoder reports a damaged packet here, frames later
-                Err(_) => decoded.damaged_packets += 1,
+                Err(_) => self.refuse(decoded),
             }
         }
         ControlFlow::Continue(())
+    }
+
+    fn refuse(&mut self, decoded: &mut Decoded) {
+        decoded.damaged_packets += 1;
+        self.refused = true;
     }
 
     fn hand_on(
@@ -161,7 +170,8 @@ impl StreamDecoder {
         on_frame(Frame {
             picture: samples.picture(),
             t_s: stamp as f64 * numerator / denominator,
-            damaged: frame::is_damaged(&self.frame),
+            key: self.frame.is_key(),
+            damaged: std::mem::take(&mut self.refused) || frame::is_damaged(&self.frame),
         })
     }
 }

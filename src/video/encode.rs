@@ -3,7 +3,6 @@
 use std::ffi::OsString;
 use std::io;
 use std::path::{Path, PathBuf};
-use std::sync::Once;
 
 use ffmpeg::codec::{self, encoder};
 use ffmpeg::ffi;
@@ -44,7 +43,7 @@ impl VideoWriter {
     /// # Errors
     /// [`Error::Unwritable`] for the folder or the file, [`Error::Encode`] for an unknown extension, or a codec that refuses the options.
     pub fn create(target: &Path, codec: &Codec, layout: Layout, fps: f64) -> Result<Self> {
-        initialise();
+        super::initialise();
         let refused = |detail: String| Error::Encode { path: target.to_owned(), detail };
         let avi = container(target).map_err(refused)? == Container::Avi;
         let temporary = temporary_beside(target)?;
@@ -367,15 +366,6 @@ fn write_error(target: &Path, error: ffmpeg::Error) -> Error {
         ffmpeg::Error::Other { errno } => Error::unwritable(target, io::Error::from_raw_os_error(errno)),
         other => Error::Encode { path: target.to_owned(), detail: other.to_string() },
     }
-}
-
-/// Registers FFmpeg and keeps its own messages off the terminal: every failure is reported once, by [`Error`].
-fn initialise() {
-    static ONCE: Once = Once::new();
-    ONCE.call_once(|| {
-        let _ = ffmpeg::init();
-        ffmpeg::log::set_level(ffmpeg::log::Level::Fatal);
-    });
 }
 
 /// The encoder wants more pictures before it gives a packet.

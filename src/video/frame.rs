@@ -18,7 +18,9 @@ pub struct Frame<'a> {
     pub picture: Picture<'a>,
     /// Presentation time stamp of the container.
     pub t_s: f64,
-    /// The decoder reported damage in this frame.
+    /// The frame refers to no other.
+    pub key: bool,
+    /// The decoder reported damage in this frame, or refused a packet before it.
     pub damaged: bool,
 }
 
@@ -77,11 +79,6 @@ fn describe(format: Pixel) -> Option<(u32, u32, u32, u32, bool, Packing)> {
         Pixel::GBRP | Pixel::GBRAP => (8, 0, 0, 0, true, PlanarGbr),
         _ => return None,
     })
-}
-
-/// Whether pictures of this format can be measured.
-pub fn is_supported(format: Pixel) -> bool {
-    describe(format).is_some()
 }
 
 /// The samples of a frame: the decoder's own where they can be used as they lie, else a converted copy.

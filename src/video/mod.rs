@@ -2,6 +2,7 @@
 //! a folder of stills is read likewise.
 
 mod container;
+mod damage;
 mod decode;
 mod encode;
 mod frame;
@@ -14,6 +15,7 @@ mod stills;
 mod timing;
 
 pub use container::{Container, StreamInfo};
+pub use damage::{DamageSpread, Outcome};
 pub use decode::{Decoded, DecoderRecipe, StreamDecoder, decode_in_order, decode_one_by_one};
 pub use encode::{TICKS_PER_SECOND, VideoWriter};
 pub use frame::Frame;
@@ -26,3 +28,12 @@ pub use timing::{Gap, Timing};
 
 /// Longest picture side that is measured.
 pub const MAX_SIDE_PX: u32 = 16384;
+
+/// Registers FFmpeg and keeps its own messages off the terminal: every failure is reported once, by [`Error`](crate::Error).
+fn initialise() {
+    static ONCE: std::sync::Once = std::sync::Once::new();
+    ONCE.call_once(|| {
+        let _ = ffmpeg_the_third::init();
+        ffmpeg_the_third::log::set_level(ffmpeg_the_third::log::Level::Quiet);
+    });
+}

@@ -68,6 +68,7 @@ impl Stills {
             stream: 0,
             streams: 1,
             other_videos: 0,
+            delay_frames: 0,
             container: "stills".to_owned(),
             codec: codec_of(&files[0]).unwrap_or_default().to_owned(),
             stored_size_px: (width as usize, height as usize),
@@ -142,14 +143,14 @@ impl Stills {
     /// Shows one still, unless it cannot be read.
     pub fn show(&self, index: usize, see: &mut dyn FnMut(&Frame<'_>)) {
         if let Some(Still::Whole(picture)) = self.files.get(index).map(|_| self.read(index)) {
-            see(&Frame { picture: picture.view(), t_s: self.t_s[index], damaged: false });
+            see(&Frame { picture: picture.view(), t_s: self.t_s[index], damaged: false, key: true });
         }
     }
 
     fn measured<T>(&self, index: usize, measure: &(dyn Fn(Frame<'_>) -> T + Sync)) -> (Option<T>, Decoded) {
         let mut one = Decoded { frames: 1, ..Decoded::default() };
         let value = |picture: &OwnedPicture, damaged| {
-            Some(measure(Frame { picture: picture.view(), t_s: self.t_s[index], damaged }))
+            Some(measure(Frame { picture: picture.view(), t_s: self.t_s[index], damaged, key: true }))
         };
         match self.read(index) {
             Still::Whole(picture) => (value(&picture, false), one),
