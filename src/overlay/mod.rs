@@ -80,8 +80,9 @@ pub fn check_target(target: &Path) -> Result<()> {
     VideoWriter::create(target, &codec(), layout, USUAL_RATE_HZ).map(|_| ())
 }
 
+/// No look-ahead: the encoder holds a few pictures, not forty.
 fn codec() -> Codec {
-    Codec { crf: 20.0, preset: "veryfast".to_owned(), ..Codec::default() }
+    Codec { crf: 22.0, preset: "superfast".to_owned(), b_frames: Some(0), ..Codec::default() }
 }
 
 impl Overlay<'_> {

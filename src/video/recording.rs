@@ -13,7 +13,7 @@ use crate::error::{Error, Result};
 /// A recording, opened.
 pub enum Recording {
     /// One file.
-    Container(Box<Container>),
+    Container(Container),
     /// A folder.
     Stills(Stills),
 }
@@ -31,7 +31,7 @@ impl Recording {
             return Stills::open(path, times).map(Self::Stills);
         }
         let option = match times {
-            StillTimes::Beside => return Container::open(path).map(|c| Self::Container(Box::new(c))),
+            StillTimes::Beside => return Container::open(path).map(Self::Container),
             StillTimes::File(_) => "--times",
             StillTimes::Rate(_) => "--rate",
         };

@@ -120,9 +120,9 @@ impl Stills {
             let mut decoded = Decoded { packets: count as u64, segments: 1, ..Decoded::default() };
             let mut sent = 0;
             for next in 0..count {
-                for index in sent..count.min(next + 2 * workers) {
-                    let _ = todo.send(index);
-                    sent = index + 1;
+                while sent < count.min(next + 2 * workers) {
+                    let _ = todo.send(sent);
+                    sent += 1;
                 }
                 while !early.contains_key(&next) {
                     // only a worker that panicked leaves nothing to receive, and the scope passes its panic on
