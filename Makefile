@@ -16,10 +16,11 @@ setup:
 demo: setup
 	cargo build --release
 	@mkdir -p demo
-	$(TRACK) videos/kapton.mp4 --out demo/angles.csv
+	$(TRACK) videos/kapton.mp4 --out demo/angles.csv --overlay demo/overlay.mp4
 	@echo
 	@echo 'From a synthetic recording of a swinging Kapton strip, 25 s:'
 	@echo '  demo/angles.csv   time, three marks in pixels, two angles with their standard deviations'
+	@echo '  demo/overlay.mp4  the recording with all of it drawn in'
 	@echo '  demo/angles.json  where they come from: source, options, time stamps, noise, warnings'
 
 test: setup

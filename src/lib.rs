@@ -7,6 +7,7 @@
 //! | track | `track` | blobs → one track a mark |
 //! | calibrate | `calibrate` | pixels, y down → metres, y up |
 //! | angles | `angles` | tracks → θ₁, θ₂ with standard deviations |
+//! | overlay | `overlay` | recording, tracks and angles → a video that shows them |
 //! | model | `model` | the forward model of the swing |
 //! | synth | `synth` | exact swings, rendered recordings with known truth |
 
@@ -20,6 +21,7 @@ pub mod experiment;
 pub mod measure;
 pub mod model;
 pub mod output;
+pub mod overlay;
 pub mod progress;
 pub mod sidecar;
 pub mod synth;

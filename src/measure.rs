@@ -9,9 +9,7 @@ use crate::error::{Error, Result};
 use crate::experiment::{MarkColour, Rig};
 use crate::progress::Progress;
 use crate::track::{FrameBlobs, MarkSlot, Measured, Sighting, Tracker, Tracks};
-use crate::video::{
-    Container, DamageSpread, Decoded, DecoderRecipe, Frame, Orientation, Outcome, StreamInfo, Timing, decode_in_order,
-};
+use crate::video::{DamageSpread, Decoded, Frame, Orientation, Outcome, Recording, StillTimes, StreamInfo, Timing};
 
 /// How a recording is measured.
 #[derive(Debug, Clone)]
@@ -26,6 +24,8 @@ pub struct Options {
     pub angle_source: AngleSource,
     /// The mean of the binary mask instead of the sub-pixel centroid, for comparison.
     pub binary_centroid: bool,
+    /// When the stills of a folder were taken.
+    pub still_times: StillTimes,
     /// Cores.
     pub workers: usize,
 }
@@ -38,6 +38,7 @@ impl Default for Options {
             threshold: None,
             angle_source: AngleSource::default(),
             binary_centroid: false,
+            still_times: StillTimes::default(),
             workers: std::thread::available_parallelism().map_or(1, std::num::NonZero::get),
         }
     }
@@ -69,26 +70,24 @@ impl Measurement {
 
 /// Pictures from which the thresholds are chosen.
 const SAMPLE_PICTURES: usize = 6;
-/// Frames decoded after a seek to get one whole picture.
-const SAMPLE_FRAMES: usize = 2;
 
 /// Measures a recording. Paths in the rig are relative to `folder`.
 ///
 /// # Errors
 /// Whatever makes the recording unusable; see [`Error`].
 pub fn measure(path: &Path, options: &Options, folder: &Path, progress: &dyn Progress) -> Result<Measurement> {
-    let mut container = Container::open(path)?;
-    let stream = container.info.clone();
+    let mut recording = Recording::open(path, &options.still_times)?;
+    let stream = recording.info().clone();
     let calibration = Calibration::new(&options.rig, stream.pixel_aspect, folder)?;
     let (hues, slots) = hues_of(&options.marks);
-    let (hues, strongest) = calibrate_thresholds(path, hues, options.threshold)?;
+    let (hues, strongest) = calibrate_thresholds(&recording, hues, options.threshold)?;
     let detector = Detector::new(hues.clone());
     let mut tracker = Tracker::new(slots.clone(), options.rig.pivot_px);
     progress.begin("tracking", stream.stated_frames);
     let view = View { orientation: stream.orientation, size: stream.stored_size_px, binary: options.binary_centroid };
     let mut spread = DamageSpread::new(stream.delay_frames);
     let see = |frame: Frame<'_>| view.sightings(&detector, &frame);
-    let decoded = decode_in_order(&mut container, options.workers, &see, &mut |outcome| {
+    let decoded = recording.decode_in_order(options.workers, &see, &mut |outcome| {
         if progress.is_cancelled() {
             return Err(Error::Interrupted);
         }
@@ -143,10 +142,10 @@ fn hues_of(marks: &[MarkColour]) -> (Vec<Hue>, Vec<MarkSlot>) {
 
 /// Looks at pictures spread over the recording and chooses the threshold of each hue. Returns the strongest
 /// component of each as well.
-fn calibrate_thresholds(path: &Path, mut hues: Vec<Hue>, fixed: Option<f64>) -> Result<(Vec<Hue>, Vec<f64>)> {
+fn calibrate_thresholds(recording: &Recording, mut hues: Vec<Hue>, fixed: Option<f64>) -> Result<(Vec<Hue>, Vec<f64>)> {
     let colours: Vec<MarkColour> = hues.iter().map(|h| h.colour.clone()).collect();
     let mut calibration = detect::Calibration::new(hues.len());
-    sample_pictures(path, &mut |frame| calibration.see(&frame.picture, &colours))?;
+    recording.sample(SAMPLE_PICTURES, &mut |frame| calibration.see(&frame.picture, &colours))?;
     let strongest = (0..hues.len()).map(|i| calibration.strongest(i)).collect();
     for (index, hue) in hues.iter_mut().enumerate() {
         let chosen = calibration.threshold(index, hue.marks);
@@ -156,34 +155,6 @@ fn calibrate_thresholds(path: &Path, mut hues: Vec<Hue>, fixed: Option<f64>) -> 
         hue.threshold = fixed.unwrap_or(hue.threshold);
     }
     Ok((hues, strongest))
-}
-
-/// Shows pictures at even distances through the recording; where seeking fails, fewer of them.
-fn sample_pictures(path: &Path, see: &mut dyn FnMut(&Frame<'_>)) -> Result<()> {
-    let mut container = Container::open(path)?;
-    let recipe = DecoderRecipe::new(&container);
-    let duration_s = container.stated_duration_s().unwrap_or(0.0);
-    let mut decoder = recipe.decoder(1).map_err(|e| Error::NotAVideo {
-        path: path.to_owned(),
-        detail: format!("the {} decoder cannot be opened: {e}", container.info.codec),
-    })?;
-    for sample in 0..SAMPLE_PICTURES {
-        if sample > 0
-            && (duration_s <= 0.0 || container.seek(duration_s * sample as f64 / SAMPLE_PICTURES as f64).is_err())
-        {
-            break;
-        }
-        let mut last_of_sample = 0;
-        let _ = decoder.decode(&mut || container.next_packet().ok().flatten(), &mut |frame| {
-            last_of_sample += 1;
-            if last_of_sample == SAMPLE_FRAMES {
-                see(&frame);
-                return std::ops::ControlFlow::Break(());
-            }
-            std::ops::ControlFlow::Continue(())
-        });
-    }
-    Ok(())
 }
 
 /// From stored to displayed pixels.

@@ -9,7 +9,7 @@ use crate::angles::AngleSource;
 use crate::error::{Error, Result};
 use crate::measure::{Measurement, Options};
 use crate::track::Point;
-use crate::video::Timing;
+use crate::video::{Timing, stills_in};
 
 /// The file, ready to be written.
 #[derive(Debug, Serialize)]
@@ -34,6 +34,8 @@ struct Source {
     file: String,
     bytes: u64,
     sha256: String,
+    /// What the digest is taken over.
+    sha256_of: &'static str,
 }
 
 #[derive(Debug, Serialize)]
@@ -150,14 +152,21 @@ impl Sidecar {
     fn find_warnings(&self, m: &Measurement) -> Vec<String> {
         let mut warnings = m.timing.warnings();
         let damage = &self.damage;
+        let stills = m.stream.container == "stills";
         if damage.damaged_packets > 0 || !damage.damaged_frames.is_empty() {
             let at = damage.damaged_frames.first().map(|f| m.timing_at(*f));
             warnings.push(format!(
-                "the file is damaged: {} packets refused, {} frames not measured{}; the rest is measured",
+                "the {} damaged: {} {} refused, {} frames not measured{}; the rest is measured",
+                if stills { "stills are" } else { "file is" },
                 damage.damaged_packets,
+                if stills { "stills" } else { "packets" },
                 damage.damaged_frames.len(),
                 at.map(|t| format!(", the first at {t:.3} s")).unwrap_or_default()
             ));
+        }
+        if stills && damage.frames_of_another_size > 0 {
+            let n = damage.frames_of_another_size;
+            warnings.push(format!("{n} stills have another size than the first and were left out"));
         }
         if let Some(error) = &damage.read_error {
             warnings.push(format!(
@@ -191,22 +200,35 @@ impl Sidecar {
 
 impl Source {
     fn read(path: &Path) -> Result<Self> {
-        let failed = |e| Error::unreadable(path, e);
-        let mut file = std::fs::File::open(path).map_err(failed)?;
+        let (files, sha256_of) = if path.is_dir() {
+            (stills_in(path)?, "the bytes of the stills, one after the other in order")
+        } else {
+            (vec![path.to_owned()], "the file")
+        };
         let mut digest = Sha256::new();
-        let mut buffer = vec![0u8; 1 << 20];
         let mut bytes = 0;
-        loop {
-            let n = std::io::Read::read(&mut file, &mut buffer).map_err(failed)?;
-            if n == 0 {
-                break;
-            }
-            bytes += n as u64;
-            digest.update(&buffer[..n]);
+        for file in &files {
+            bytes += digest_file(file, &mut digest)?;
         }
         let sha256 = digest.finalize().iter().map(|b| format!("{b:02x}")).collect();
         let file = path.file_name().map(|n| n.to_string_lossy().into_owned()).unwrap_or_default();
-        Ok(Self { file, bytes, sha256 })
+        Ok(Self { file, bytes, sha256, sha256_of })
+    }
+}
+
+/// Adds a file to a digest; returns its length.
+fn digest_file(path: &Path, digest: &mut Sha256) -> Result<u64> {
+    let failed = |e| Error::unreadable(path, e);
+    let mut file = std::fs::File::open(path).map_err(failed)?;
+    let mut buffer = vec![0u8; 1 << 20];
+    let mut bytes = 0;
+    loop {
+        let n = std::io::Read::read(&mut file, &mut buffer).map_err(failed)?;
+        if n == 0 {
+            return Ok(bytes);
+        }
+        bytes += n as u64;
+        digest.update(&buffer[..n]);
     }
 }
 

@@ -6,11 +6,14 @@ use clap::{Args, ValueEnum};
 
 use super::Bar;
 use crate::angles::{self, AngleSource};
+use crate::detect::debug::DebugFolder;
 use crate::error::{Error, Result};
 use crate::experiment::{Experiment, MarkColour};
 use crate::measure::{Measurement, Options, measure};
 use crate::output::OutputFile;
+use crate::overlay::{self, Overlay};
 use crate::sidecar::Sidecar;
+use crate::video::{Recording, StillTimes};
 
 /// Follow the marks of a recording and write their angles.
 #[derive(Debug, Args)]
@@ -19,11 +22,12 @@ Examples:
   track videos/kapton.mp4 --out angles.csv
   track pendulum.mp4 --out angles.csv --color red --color green --pivot 497,508
   track swing.mov --out angles.csv --config experiment.toml --overlay seen.mp4
+  track stills/ --rate 50 --out angles.csv
 
 Beside angles.csv stands angles.json: the source and its SHA-256, the options, the time stamps' gaps and jitter,
 the noise, and every warning. Exit code 0: done; 2: bad input, nothing written.")]
 pub struct TrackArgs {
-    /// The recording: MP4, MOV, AVI, MKV, …
+    /// The recording: MP4, MOV, AVI, MKV, …, or a folder of stills.
     video: PathBuf,
     /// The table of angles; `-` for standard output.
     #[arg(long, value_name = "CSV")]
@@ -31,6 +35,15 @@ pub struct TrackArgs {
     /// The experiment: marks, pivot, mirror, plumb line, lens.
     #[arg(long, value_name = "TOML")]
     config: Option<PathBuf>,
+    /// The recording with what was measured drawn into it: .mp4, .mov or .mkv.
+    #[arg(long, value_name = "VIDEO")]
+    overlay: Option<PathBuf>,
+    /// A folder for pictures of each step from frame to marks.
+    #[arg(long, value_name = "DIR")]
+    debug_frames: Option<PathBuf>,
+    /// How many frames are shown in it, evenly spread.
+    #[arg(long, value_name = "N", default_value_t = 8, requires = "debug_frames")]
+    debug_count: usize,
     /// Colour of the marks, a name or #rrggbb; once for all, or once a mark, top to bottom.
     #[arg(long, value_name = "COLOUR")]
     color: Vec<MarkColour>,
@@ -52,6 +65,12 @@ pub struct TrackArgs {
     /// How a mark is represented by one point.
     #[arg(long, value_name = "HOW", default_value = "subpixel")]
     centroid: CentroidKind,
+    /// When the stills of a folder were taken: a number of seconds a line, or rows `file,t_s`; else times.csv among them.
+    #[arg(long, value_name = "FILE", conflicts_with = "rate")]
+    times: Option<PathBuf>,
+    /// Stills a second, where nothing says when each was taken.
+    #[arg(long, value_name = "HZ")]
+    rate: Option<f64>,
     /// Cores to use; all by default.
     #[arg(long, value_name = "N")]
     threads: Option<usize>,
@@ -98,15 +117,28 @@ impl TrackArgs {
         let bar = Bar::new(self.quiet);
         let mut table = OutputFile::create(&self.out)?;
         let mut beside = self.sidecar_path().map(|path| OutputFile::create(&path)).transpose()?;
+        self.overlay.as_deref().map(overlay::check_target).transpose()?;
+        let debug = self.debug_frames.as_deref().map(DebugFolder::create).transpose()?;
         let measurement = measure(&self.video, &options, &folder, &bar)?;
         let sidecar = Sidecar::new(&self.video, &options, &measurement)?;
+        if let Some(target) = &self.overlay {
+            let Measurement { tracks, angles, timing, .. } = &measurement;
+            let rate_hz = timing.real_rate_hz.or(timing.nominal_rate_hz);
+            let overlay = Overlay { tracks, angles, pivot_px: options.rig.pivot_px, rate_hz };
+            let recording = Recording::open(&self.video, &options.still_times)?;
+            overlay.write(recording, target, options.workers, &bar)?;
+        }
+        if let Some(debug) = debug {
+            let recording = Recording::open(&self.video, &options.still_times)?;
+            debug.show(&recording, &measurement.hues, &measurement.tracks.t_s, self.debug_count, &bar)?;
+        }
         drop(bar);
         if let Some(beside) = &mut beside {
             beside.write(sidecar.to_json().as_bytes())?;
         }
         table.write(angles::to_csv(&measurement.tracks, &measurement.angles).as_bytes())?;
-        table.commit()?;
-        beside.map_or(Ok(()), OutputFile::commit)?;
+        table.appear()?;
+        beside.map_or(Ok(()), OutputFile::appear)?;
         if !self.quiet {
             self.report(&measurement, &sidecar);
         }
@@ -134,6 +166,11 @@ impl TrackArgs {
                 AnglesFrom::Smoothed => AngleSource::Smoothed,
             },
             binary_centroid: self.centroid == CentroidKind::Binary,
+            still_times: match (&self.times, self.rate) {
+                (Some(file), _) => StillTimes::File(file.clone()),
+                (None, Some(rate_hz)) => StillTimes::Rate(rate_hz),
+                (None, None) => StillTimes::Beside,
+            },
             workers: self.threads.unwrap_or(defaults.workers),
         })
     }
@@ -159,16 +196,19 @@ impl TrackArgs {
 
     /// No output may take the place of an input, nor one output that of the other.
     fn keep_inputs(&self) -> Result<()> {
-        let refuse = |message: String| Err(option("--out", &message));
         let beside = self.sidecar_path();
         if beside.as_ref() == Some(&self.out) {
-            return refuse(format!("{} is the name of the account beside the table; use .csv", self.out.display()));
+            let message = format!("{} is the name of the account beside the table; use .csv", self.out.display());
+            return Err(option("--out", &message));
         }
-        let inputs = [Some(&self.video), self.config.as_ref()];
+        let inputs = [Some(&self.video), self.config.as_ref(), self.times.as_ref()];
+        let outputs = [("--out", Some(&self.out)), ("--out", beside.as_ref()), ("--overlay", self.overlay.as_ref())];
         let same = |a: &Path, b: &Path| a.canonicalize().is_ok_and(|a| b.canonicalize().is_ok_and(|b| a == b));
-        for output in [Some(&self.out), beside.as_ref()].into_iter().flatten() {
+        for (name, output) in outputs {
+            let Some(output) = output else { continue };
             if inputs.iter().flatten().any(|input| same(input, output)) {
-                return refuse(format!("{} is an input and would be overwritten; use another name", output.display()));
+                let message = format!("{} is an input and would be overwritten; use another name", output.display());
+                return Err(option(name, &message));
             }
         }
         Ok(())

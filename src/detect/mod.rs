@@ -4,6 +4,7 @@
 mod blobs;
 mod centroid;
 mod component;
+pub mod debug;
 mod threshold;
 
 pub use blobs::Blob;
@@ -58,16 +59,19 @@ impl Detector {
     pub fn detect(&self, picture: &Picture<'_>) -> Result<Vec<Blob>> {
         let mut blobs = Vec::new();
         for (index, hue) in self.hues.iter().enumerate() {
-            let target = Target {
-                hue: index as u8,
-                axis: HueAxis::new(&hue.colour, picture.layout.matrix),
-                threshold: from_255(hue.threshold),
-                thin: hue.thin,
-                least_samples: least_samples(picture, self.least_area_px2) as u32,
-            };
-            blobs::find(picture, &target, &mut blobs)?;
+            blobs::find(picture, &self.target(index, hue, picture), &mut blobs)?;
         }
         Ok(blobs)
+    }
+
+    fn target(&self, index: usize, hue: &Hue, picture: &Picture<'_>) -> Target {
+        Target {
+            hue: index as u8,
+            axis: HueAxis::new(&hue.colour, picture.layout.matrix),
+            threshold: from_255(hue.threshold),
+            thin: hue.thin,
+            least_samples: least_samples(picture, self.least_area_px2) as u32,
+        }
     }
 }
 

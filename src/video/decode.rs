@@ -202,6 +202,26 @@ pub fn decode_in_order<T: Send>(
     }
 }
 
+/// As [`decode_in_order`], by one decoder with `threads` threads of its own: a value is handed on before the next
+/// frame is decoded, so that values as large as pictures never pile up.
+///
+/// # Errors
+/// As [`decode_in_order`].
+pub fn decode_one_by_one<T>(
+    container: &mut Container,
+    threads: usize,
+    measure: &(dyn Fn(Frame<'_>) -> T + Sync),
+    sink: &mut dyn FnMut(T) -> Result<()>,
+) -> Result<Decoded> {
+    let recipe = DecoderRecipe::new(container);
+    let mut segmenter = Segmenter::new(container);
+    let decoded = whole(container, &mut segmenter, &recipe, threads.max(1), measure, sink)?;
+    match decoded.unsupported_format {
+        Some(format) => Err(Error::PixelFormat { path: container.path().to_owned(), format }),
+        None => Ok(decoded),
+    }
+}
+
 fn cannot_open(container: &Container, error: &ffmpeg::Error) -> Error {
     Error::NotAVideo {
         path: container.path().to_owned(),

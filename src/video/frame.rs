@@ -81,11 +81,6 @@ fn describe(format: Pixel) -> Option<(u32, u32, u32, u32, bool, Packing)> {
     })
 }
 
-/// Whether pictures of this format can be measured.
-pub fn is_supported(format: Pixel) -> bool {
-    describe(format).is_some()
-}
-
 /// The samples of a frame: the decoder's own where they can be used as they lie, else a converted copy.
 pub enum Samples<'a> {
     /// The decoder's planes.

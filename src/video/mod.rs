@@ -1,4 +1,5 @@
-//! Frames with their time stamps: a container is split at key frames and decoded on all cores, in order.
+//! Frames with their time stamps: a container is split at key frames and decoded on all cores, in order;
+//! a folder of stills is read likewise.
 
 mod container;
 mod damage;
@@ -7,16 +8,22 @@ mod encode;
 mod frame;
 mod orientation;
 mod picture;
+mod recording;
 mod segments;
+mod still_times;
+mod stills;
 mod timing;
 
 pub use container::{Container, StreamInfo};
 pub use damage::{DamageSpread, Outcome};
-pub use decode::{Decoded, DecoderRecipe, StreamDecoder, decode_in_order};
+pub use decode::{Decoded, DecoderRecipe, StreamDecoder, decode_in_order, decode_one_by_one};
 pub use encode::{TICKS_PER_SECOND, VideoWriter};
 pub use frame::Frame;
 pub use orientation::Orientation;
 pub use picture::{Layout, Matrix, OwnedPicture, Picture, Plane};
+pub use recording::Recording;
+pub use still_times::StillTimes;
+pub use stills::{Stills, stills_in};
 pub use timing::{Gap, Timing};
 
 /// Longest picture side that is measured.

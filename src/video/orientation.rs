@@ -54,6 +54,14 @@ impl Orientation {
         [x - least(0), y - least(1)]
     }
 
+    /// The inverse of [`Orientation::point`].
+    pub fn stored_point(self, [x, y]: [f64; 2], size: (usize, usize)) -> [f64; 2] {
+        let origin = self.point([0.0, 0.0], size);
+        let [a, b, c, d] = [self.a, self.b, self.c, self.d].map(f64::from);
+        let (dx, dy) = (x - origin[0], y - origin[1]);
+        [a * dx + b * dy, c * dx + d * dy]
+    }
+
     /// Degrees clockwise by which the stored picture is turned for display, for reports; mirrorings report their turn.
     pub fn degrees(self) -> i32 {
         match (self.a, self.b) {
@@ -80,6 +88,7 @@ mod tests {
         assert_eq!(o.point([0.0, 0.0], (4, 3)), [2.0, 0.0]);
         assert_eq!(o.point([3.0, 0.0], (4, 3)), [2.0, 3.0]);
         assert_eq!(o.degrees(), 90);
+        assert_eq!(o.stored_point(o.point([1.0, 2.0], (4, 3)), (4, 3)), [1.0, 2.0]);
     }
 
     #[test]

@@ -1,0 +1,171 @@
+//! What is measured: a container, or a folder of stills.
+
+use std::ops::ControlFlow;
+use std::path::Path;
+
+use super::container::{Container, StreamInfo};
+use super::decode::{self, Decoded, DecoderRecipe};
+use super::frame::Frame;
+use super::still_times::StillTimes;
+use super::stills::Stills;
+use crate::error::{Error, Result};
+
+/// A recording, opened.
+pub enum Recording {
+    /// One file.
+    Container(Box<Container>),
+    /// A folder.
+    Stills(Box<Stills>),
+}
+
+/// Frames decoded after a seek to get one whole picture.
+const SAMPLE_FRAMES: usize = 2;
+
+impl Recording {
+    /// Opens a file, or a folder of stills with their times.
+    ///
+    /// # Errors
+    /// As [`Container::open`] and [`Stills::open`]; [`Error::Option`] for times given to a file, which has its own.
+    pub fn open(path: &Path, times: &StillTimes) -> Result<Self> {
+        if path.is_dir() {
+            return Stills::open(path, times).map(|s| Self::Stills(Box::new(s)));
+        }
+        let option = match times {
+            StillTimes::Beside => return Container::open(path).map(|c| Self::Container(Box::new(c))),
+            StillTimes::File(_) => "--times",
+            StillTimes::Rate(_) => "--rate",
+        };
+        let message = format!("is for a folder of stills; {} carries its own time stamps", path.display());
+        Err(Error::Option { option: option.to_owned(), message })
+    }
+
+    /// The file or folder.
+    pub fn path(&self) -> &Path {
+        match self {
+            Self::Container(container) => container.path(),
+            Self::Stills(stills) => stills.path(),
+        }
+    }
+
+    /// Its stream.
+    pub fn info(&self) -> &StreamInfo {
+        match self {
+            Self::Container(container) => &container.info,
+            Self::Stills(stills) => &stills.info,
+        }
+    }
+
+    /// Every frame once, on all cores, in order; see [`decode::decode_in_order`].
+    ///
+    /// # Errors
+    /// As there.
+    pub fn decode_in_order<T: Send>(
+        &mut self,
+        workers: usize,
+        measure: &(dyn Fn(Frame<'_>) -> T + Sync),
+        sink: &mut dyn FnMut(T) -> Result<()>,
+    ) -> Result<Decoded> {
+        match self {
+            Self::Container(container) => decode::decode_in_order(container, workers, measure, sink),
+            Self::Stills(stills) => stills.decode_in_order(workers, measure, sink),
+        }
+    }
+
+    /// Every frame once, in order, a few at a time; see [`decode::decode_one_by_one`].
+    ///
+    /// # Errors
+    /// As there.
+    pub fn decode_one_by_one<T: Send>(
+        &mut self,
+        threads: usize,
+        measure: &(dyn Fn(Frame<'_>) -> T + Sync),
+        sink: &mut dyn FnMut(T) -> Result<()>,
+    ) -> Result<Decoded> {
+        match self {
+            Self::Container(container) => decode::decode_one_by_one(container, threads, measure, sink),
+            Self::Stills(stills) => stills.decode_in_order(threads, measure, sink),
+        }
+    }
+
+    /// Shows `count` pictures at even distances; where seeking fails, fewer of them.
+    ///
+    /// # Errors
+    /// As [`Container::open`]; [`Error::NotAVideo`] where no decoder can be opened.
+    pub fn sample(&self, count: usize, see: &mut dyn FnMut(&Frame<'_>)) -> Result<()> {
+        match self {
+            Self::Container(container) => sample_container(container.path(), count, see),
+            Self::Stills(stills) => {
+                let stills_count = stills.files().len();
+                let mut indices: Vec<usize> = (0..count).map(|i| i * stills_count / count).collect();
+                indices.dedup();
+                indices.into_iter().for_each(|i| stills.show(i, see));
+                Ok(())
+            }
+        }
+    }
+
+    /// Shows the frame with this very time stamp; says whether there is one.
+    ///
+    /// # Errors
+    /// As [`Recording::sample`].
+    pub fn show(&self, t_s: f64, see: &mut dyn FnMut(&Frame<'_>)) -> Result<bool> {
+        match self {
+            Self::Container(container) => {
+                // a seek may land behind a frame that is shown early: then everything is decoded
+                Ok(show_container(container.path(), t_s, true, see)?
+                    || show_container(container.path(), t_s, false, see)?)
+            }
+            Self::Stills(stills) => {
+                let index = stills.stamps_s().iter().position(|t| *t == t_s);
+                index.into_iter().for_each(|i| stills.show(i, see));
+                Ok(index.is_some())
+            }
+        }
+    }
+}
+
+fn no_decoder(container: &Container, error: &ffmpeg_the_third::Error) -> Error {
+    Error::NotAVideo {
+        path: container.path().to_owned(),
+        detail: format!("the {} decoder cannot be opened: {error}", container.info.codec),
+    }
+}
+
+fn sample_container(path: &Path, count: usize, see: &mut dyn FnMut(&Frame<'_>)) -> Result<()> {
+    let mut container = Container::open(path)?;
+    let duration_s = container.stated_duration_s().unwrap_or(0.0);
+    let mut decoder = DecoderRecipe::new(&container).decoder(1).map_err(|e| no_decoder(&container, &e))?;
+    for sample in 0..count {
+        if sample > 0 && (duration_s <= 0.0 || container.seek(duration_s * sample as f64 / count as f64).is_err()) {
+            break;
+        }
+        let mut last_of_sample = 0;
+        let _ = decoder.decode(&mut || container.next_packet().ok().flatten(), &mut |frame| {
+            last_of_sample += 1;
+            if last_of_sample == SAMPLE_FRAMES {
+                see(&frame);
+                return ControlFlow::Break(());
+            }
+            ControlFlow::Continue(())
+        });
+    }
+    Ok(())
+}
+
+fn show_container(path: &Path, t_s: f64, seek: bool, see: &mut dyn FnMut(&Frame<'_>)) -> Result<bool> {
+    let mut container = Container::open(path)?;
+    let mut decoder = DecoderRecipe::new(&container).decoder(1).map_err(|e| no_decoder(&container, &e))?;
+    if seek && container.seek(t_s).is_err() {
+        return Ok(false);
+    }
+    let mut shown = false;
+    let _ = decoder.decode(&mut || container.next_packet().ok().flatten(), &mut |frame| {
+        if frame.t_s == t_s {
+            see(&frame);
+            shown = true;
+        }
+        let passed = seek && frame.t_s > t_s;
+        if shown || passed { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
+    });
+    Ok(shown)
+}
