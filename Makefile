@@ -20,7 +20,7 @@ demo: setup
 	@echo
 	@echo 'From a synthetic recording of a swinging Kapton strip, 25 s:'
 	@echo '  demo/angles.csv   time, three marks in pixels, two angles with their standard deviations'
-	@echo '  demo/overlay.mp4  the recording with marks, trails and angles drawn in'
+	@echo '  demo/overlay.mp4  the recording with all of it drawn in'
 	@echo '  demo/angles.json  where they come from: source, options, time stamps, noise, warnings'
 
 test: setup

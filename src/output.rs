@@ -8,7 +8,7 @@ use tempfile::NamedTempFile;
 
 use crate::error::{Error, Result};
 
-/// An output that appears only when it is [committed](OutputFile::commit).
+/// An output that appears only when it is finished.
 #[derive(Debug)]
 pub struct OutputFile {
     path: PathBuf,
@@ -44,7 +44,16 @@ impl OutputFile {
         Ok(Self { path: path.to_owned(), sink })
     }
 
-    /// Writes everything; only a device shows it already.
+    /// Writes everything and lets it appear.
+    ///
+    /// # Errors
+    /// [`Error::Unwritable`]; nothing appears then.
+    pub fn commit(mut self, contents: &[u8]) -> Result<()> {
+        self.write(contents)?;
+        self.appear()
+    }
+
+    /// Writes everything, to appear later together with others; only a device shows it already.
     ///
     /// # Errors
     /// [`Error::Unwritable`]; nothing appears then.
@@ -61,7 +70,7 @@ impl OutputFile {
     ///
     /// # Errors
     /// [`Error::Unwritable`]; nothing appears then.
-    pub fn commit(self) -> Result<()> {
+    pub fn appear(self) -> Result<()> {
         match self.sink {
             Sink::StandardOutput | Sink::Device => Ok(()),
             Sink::Temporary(file) => {

@@ -136,7 +136,7 @@ fn a_missing_file_a_folder_a_pipe() {
     let bench = Bench::with("other.txt", b"");
     bench.refuses_with("missing.mp4", &[], "missing.mp4: cannot be read: No such file");
     std::fs::create_dir(bench.path("empty")).unwrap();
-    bench.refuses_with("empty", &[], "empty: ");
+    bench.refuses_with("empty", &[], "empty: holds no PNG, JPEG, TIFF, BMP or PNM stills");
     assert!(Command::new("mkfifo").arg(bench.path("pipe.mp4")).status().unwrap().success());
     let output = bench.command("pipe.mp4", &[]).output().unwrap();
     assert!(bench.one_line_of_refusal(&output).contains("pipe.mp4: not a video that can be opened: it is a pipe"));
@@ -146,7 +146,7 @@ fn a_missing_file_a_folder_a_pipe() {
 fn a_file_that_may_not_be_read() {
     use std::os::unix::fs::PermissionsExt;
     let bench = Bench::with("secret.mp4", &CLIP);
-    std::fs::set_permissions(bench.path("secret.mp4"), std::fs::Permissions::from_mode(0)).unwrap();
+    std::fs::set_permissions(bench.path("secret.mp4"), std::fs::Permissions::from_mode(0o0)).unwrap();
     if std::fs::File::open(bench.path("secret.mp4")).is_ok() {
         eprintln!("skipped: this user may read everything");
         return;
@@ -309,6 +309,8 @@ fn an_output_never_takes_the_place_of_an_input() {
     std::os::unix::fs::symlink("clip.mp4", bench.path("link.csv")).unwrap();
     bench.refuses_with("clip.mp4", &["--out", "clip.mp4"], "clip.mp4 is an input and would be overwritten");
     bench.refuses_with("clip.mp4", &["--out", "./link.csv"], "link.csv is an input and would be overwritten");
+    let overlay = ["--overlay", "clip.mp4"];
+    bench.refuses_with("clip.mp4", &overlay, "--overlay: clip.mp4 is an input and would be overwritten");
     let config = ["--config", "rig.toml", "--out", "rig.toml"];
     bench.refuses_with("clip.mp4", &config, "rig.toml is an input and would be overwritten");
     bench.refuses_with("clip.mp4", &["--out", "angles.json"], "--out: angles.json is the name of the account");

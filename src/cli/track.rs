@@ -119,6 +119,8 @@ impl TrackArgs {
         let mut table = OutputFile::create(&self.out)?;
         let debug = self.debug_frames.as_deref().map(DebugFolder::create).transpose()?;
         let mut beside = self.sidecar_path().map(|path| OutputFile::create(&path)).transpose()?;
+        self.overlay.as_deref().map(overlay::check_target).transpose()?;
+        let debug = self.debug_frames.as_deref().map(DebugFolder::create).transpose()?;
         let measurement = measure(&self.video, &options, &folder, &bar)?;
         let sidecar = Sidecar::new(&self.video, &options, &measurement)?;
         if let Some(target) = &self.overlay {
@@ -137,8 +139,8 @@ impl TrackArgs {
             beside.write(sidecar.to_json().as_bytes())?;
         }
         table.write(angles::to_csv(&measurement.tracks, &measurement.angles).as_bytes())?;
-        table.commit()?;
-        beside.map_or(Ok(()), OutputFile::commit)?;
+        table.appear()?;
+        beside.map_or(Ok(()), OutputFile::appear)?;
         if !self.quiet {
             self.report(&measurement, &sidecar);
         }
@@ -196,16 +198,19 @@ impl TrackArgs {
 
     /// No output may take the place of an input, nor one output that of the other.
     fn keep_inputs(&self) -> Result<()> {
-        let refuse = |message: String| Err(option("--out", &message));
         let beside = self.sidecar_path();
         if beside.as_ref() == Some(&self.out) {
-            return refuse(format!("{} is the name of the account beside the table; use .csv", self.out.display()));
+            let message = format!("{} is the name of the account beside the table; use .csv", self.out.display());
+            return Err(option("--out", &message));
         }
-        let inputs = [Some(&self.video), self.config.as_ref()];
+        let inputs = [Some(&self.video), self.config.as_ref(), self.times.as_ref()];
+        let outputs = [("--out", Some(&self.out)), ("--out", beside.as_ref()), ("--overlay", self.overlay.as_ref())];
         let same = |a: &Path, b: &Path| a.canonicalize().is_ok_and(|a| b.canonicalize().is_ok_and(|b| a == b));
-        for output in [Some(&self.out), beside.as_ref()].into_iter().flatten() {
+        for (name, output) in outputs {
+            let Some(output) = output else { continue };
             if inputs.iter().flatten().any(|input| same(input, output)) {
-                return refuse(format!("{} is an input and would be overwritten; use another name", output.display()));
+                let message = format!("{} is an input and would be overwritten; use another name", output.display());
+                return Err(option(name, &message));
             }
         }
         Ok(())

@@ -15,7 +15,7 @@ pub enum Recording {
     /// One file.
     Container(Container),
     /// A folder.
-    Stills(Stills),
+    Stills(Box<Stills>),
 }
 
 /// Frames decoded after a seek to get one whole picture.
@@ -28,7 +28,7 @@ impl Recording {
     /// As [`Container::open`] and [`Stills::open`]; [`Error::Option`] for times given to a file, which has its own.
     pub fn open(path: &Path, times: &StillTimes) -> Result<Self> {
         if path.is_dir() {
-            return Stills::open(path, times).map(Self::Stills);
+            return Stills::open(path, times).map(|s| Self::Stills(Box::new(s)));
         }
         let option = match times {
             StillTimes::Beside => return Container::open(path).map(Self::Container),

@@ -76,6 +76,7 @@ impl Stills {
             pixel_aspect: 1.0,
             nominal_rate_hz: if let StillTimes::Rate(rate_hz) = times { Some(*rate_hz) } else { None },
             tick_s: 0.0,
+            delay_frames: 0,
             stated_frames: Some(packets),
         };
         Ok(Self { folder: folder.to_owned(), files, t_s, info })
@@ -143,14 +144,14 @@ impl Stills {
     /// Shows one still, unless it cannot be read.
     pub fn show(&self, index: usize, see: &mut dyn FnMut(&Frame<'_>)) {
         if let Some(Still::Whole(picture)) = self.files.get(index).map(|_| self.read(index)) {
-            see(&Frame { picture: picture.view(), t_s: self.t_s[index], damaged: false, key: true });
+            see(&Frame { picture: picture.view(), t_s: self.t_s[index], key: true, damaged: false });
         }
     }
 
     fn measured<T>(&self, index: usize, measure: &(dyn Fn(Frame<'_>) -> T + Sync)) -> (Option<T>, Decoded) {
         let mut one = Decoded { frames: 1, ..Decoded::default() };
         let value = |picture: &OwnedPicture, damaged| {
-            Some(measure(Frame { picture: picture.view(), t_s: self.t_s[index], damaged, key: true }))
+            Some(measure(Frame { picture: picture.view(), t_s: self.t_s[index], key: true, damaged }))
         };
         match self.read(index) {
             Still::Whole(picture) => (value(&picture, false), one),

@@ -137,7 +137,7 @@ impl Outline {
 fn fast_atan2(y: f32, x: f32) -> f32 {
     let (ax, ay) = (x.abs(), y.abs());
     let t = ax.min(ay) / ax.max(ay).max(1e-12);
-    let a = t * (0.785_398_2 + 0.273 * (1.0 - t));
+    let a = t * (std::f32::consts::FRAC_PI_4 + 0.273 * (1.0 - t));
     let octant = if ay > ax { std::f32::consts::FRAC_PI_2 - a } else { a };
     let half = if x < 0.0 { std::f32::consts::PI - octant } else { octant };
     if y < 0.0 { std::f32::consts::TAU - half } else { half }

@@ -194,7 +194,7 @@ fn median(values: &mut [f32]) -> f32 {
     let middle = values.len() / 2;
     let (below, m, _) = values.select_nth_unstable_by(middle, f32::total_cmp);
     let m = *m;
-    if below.len() == middle && values.len() % 2 == 0 {
+    if below.len() == middle && values.len().is_multiple_of(2) {
         let under = values[..middle].iter().copied().fold(f32::MIN, f32::max);
         return 0.5 * (m + under);
     }

@@ -33,7 +33,7 @@ fn paint(width: usize, height: usize, colour: impl Fn(f64, f64) -> [f64; 3]) -> 
     let (cw, ch) = layout.chroma_size();
     for y in 0..ch {
         for x in 0..cw {
-            for plane in 1..3 {
+            for plane in [1, 2] {
                 let at = |dx: i64, row: usize| {
                     let column = (2 * x as i64 + dx).clamp(0, width as i64 - 1) as usize;
                     full[row.min(height - 1) * width + column][plane]
