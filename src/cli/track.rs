@@ -113,11 +113,9 @@ impl TrackArgs {
         let folder = self.config.as_deref().and_then(Path::parent).unwrap_or(Path::new("")).to_owned();
         let options = self.options(experiment)?;
         self.keep_inputs()?;
-        self.overlay.as_deref().map(overlay::check_target).transpose()?;
         // before the first temporary file, so that Ctrl-C leaves none behind
         let bar = Bar::new(self.quiet);
         let mut table = OutputFile::create(&self.out)?;
-        let debug = self.debug_frames.as_deref().map(DebugFolder::create).transpose()?;
         let mut beside = self.sidecar_path().map(|path| OutputFile::create(&path)).transpose()?;
         self.overlay.as_deref().map(overlay::check_target).transpose()?;
         let debug = self.debug_frames.as_deref().map(DebugFolder::create).transpose()?;

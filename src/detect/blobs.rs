@@ -127,16 +127,17 @@ impl Mask {
         let (width, height) = (region.right - region.left, region.bottom - region.top);
         let mut component = Vec::with_capacity(width * height);
         for y in region.top..region.bottom {
-            component.extend((region.left..region.right).map(|x| axis.at(picture, x, y)));
+            axis.row(picture, y, region.left..region.right, &mut component);
         }
         let mut bytes = vec![0u8; width * height];
-        let at = |x: usize, y: usize| i32::from(component[y * width + x]);
-        for y in 0..height {
-            for x in 0..width {
-                let (l, r) = (x.saturating_sub(1), (x + 1).min(width - 1));
-                let (u, d) = (y.saturating_sub(1), (y + 1).min(height - 1));
-                let smooth = 4 * at(x, y) + at(l, y) + at(r, y) + at(x, u) + at(x, d);
-                bytes[y * width + x] = if smooth > 8 * i32::from(threshold) { 255 } else { 0 };
+        // the outermost samples stay outside: the region has a margin
+        for y in 1..height.saturating_sub(1) {
+            let row = |y: usize| &component[y * width..(y + 1) * width];
+            let (above, here, below) = (row(y - 1), row(y), row(y + 1));
+            let out = &mut bytes[y * width..(y + 1) * width];
+            for x in 1..width.saturating_sub(1) {
+                let sides = i32::from(here[x - 1]) + i32::from(here[x + 1]) + i32::from(above[x]) + i32::from(below[x]);
+                out[x] = if 4 * i32::from(here[x]) + sides > 8 * i32::from(threshold) { 255 } else { 0 };
             }
         }
         let mut mask = Self { region, bytes };

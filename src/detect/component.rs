@@ -55,6 +55,17 @@ impl HueAxis {
         self.of(code(&picture.cb), code(&picture.cr))
     }
 
+    /// The components of chroma row `y` in `columns`, added to `row`.
+    pub(super) fn row(self, picture: &Picture<'_>, y: usize, columns: std::ops::Range<usize>, row: &mut Vec<i16>) {
+        if picture.wide() || picture.cb.step != 1 {
+            row.extend(columns.map(|x| self.at(picture, x, y)));
+            return;
+        }
+        let cb = &picture.cb.bytes[y * picture.cb.stride..][columns.clone()];
+        let cr = &picture.cr.bytes[y * picture.cr.stride..][columns];
+        row.extend(cb.iter().zip(cr).map(|(b, r)| self.of(*b, *r)));
+    }
+
     /// Largest component in each run of [`BLOCK`] samples of chroma row `y`.
     pub(super) fn block_maxima(self, picture: &Picture<'_>, y: usize, maxima: &mut [i16]) {
         let (width, _) = picture.layout.chroma_size();

@@ -129,9 +129,7 @@ impl DebugFolder {
             let mut bytes = Cursor::new(Vec::new());
             let encoded = picture.write_to(&mut bytes, ImageFormat::Png);
             encoded.map_err(|e| Error::unwritable(&path, std::io::Error::other(e)))?;
-            let mut file = OutputFile::create(&path)?;
-            file.write(bytes.get_ref())?;
-            file.commit()?;
+            OutputFile::create(&path)?.commit(bytes.get_ref())?;
         }
         Ok(())
     }

@@ -45,7 +45,8 @@ impl Relief {
     /// Of a picture.
     pub fn new(picture: &Picture<'_>, axis: HueAxis) -> Self {
         let (width, height) = picture.layout.chroma_size();
-        let heights = (0..height).flat_map(|y| (0..width).map(move |x| axis.at(picture, x, y))).collect();
+        let mut heights = Vec::with_capacity(width * height);
+        (0..height).for_each(|y| axis.row(picture, y, 0..width, &mut heights));
         Self { width, heights }
     }
 

@@ -76,7 +76,6 @@ impl Stills {
             pixel_aspect: 1.0,
             nominal_rate_hz: if let StillTimes::Rate(rate_hz) = times { Some(*rate_hz) } else { None },
             tick_s: 0.0,
-            delay_frames: 0,
             stated_frames: Some(packets),
         };
         Ok(Self { folder: folder.to_owned(), files, t_s, info })
