@@ -91,7 +91,8 @@ impl Surroundings {
         for (index, sector) in self.sectors.iter_mut().enumerate() {
             for (k, level) in sector.background.iter_mut().enumerate() {
                 let mut near = [n - 2, n - 1, 0, 1, 2].map(|d| before[(index + d) % n][k]);
-                *level = median(&mut near);
+                near.sort_unstable_by(f32::total_cmp);
+                *level = near[2];
             }
         }
     }
@@ -161,9 +162,9 @@ fn has_edge(sectors: &[Sector], channel: usize, noise: f32) -> bool {
     let n = sectors.len();
     let mut levels: Vec<f32> = sectors.iter().map(|s| s.background[channel]).collect();
     let half = (n / 16).max(1);
-    let mid =
-        |from: usize| median(&mut (0..half).map(|i| sectors[(from + i) % n].background[channel]).collect::<Vec<_>>());
-    let steepest = (0..n).map(|i| (mid(i) - mid((i + half) % n)).abs()).fold(0.0, f32::max);
+    let level = |i: usize| sectors[i % n].background[channel];
+    let mid = |from: usize| (from..from + half).map(level).sum::<f32>() / half as f32;
+    let steepest = (0..n).map(|i| (mid(i) - mid(i + half)).abs()).fold(0.0, f32::max);
     levels.sort_by(f32::total_cmp);
     let range = levels[n * 9 / 10] - levels[n / 10];
     steepest > 0.5 * range && steepest > 4.0 * noise
