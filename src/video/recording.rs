@@ -13,7 +13,7 @@ use crate::error::{Error, Result};
 /// A recording, opened.
 pub enum Recording {
     /// One file.
-    Container(Container),
+    Container(Box<Container>),
     /// A folder.
     Stills(Box<Stills>),
 }
@@ -31,7 +31,7 @@ impl Recording {
             return Stills::open(path, times).map(|s| Self::Stills(Box::new(s)));
         }
         let option = match times {
-            StillTimes::Beside => return Container::open(path).map(Self::Container),
+            StillTimes::Beside => return Container::open(path).map(|c| Self::Container(Box::new(c))),
             StillTimes::File(_) => "--times",
             StillTimes::Rate(_) => "--rate",
         };
