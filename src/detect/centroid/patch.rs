@@ -11,7 +11,7 @@ pub struct Sample {
     pub dx_px: f32,
     /// Downwards.
     pub dy_px: f32,
-    /// From the outline's centre; 0 deep inside the mark.
+    /// From the outline's centre.
     pub distance_px: f32,
     /// Sector of the outline.
     pub sector: u16,
@@ -53,8 +53,6 @@ impl Patch {
     fn gather(&mut self, picture: &Picture<'_>, outline: &Outline, reach: f32, component: &[f32]) {
         let wide = picture.wide();
         let scale = 1.0 / f32::from(1u16 << (picture.layout.bits - 8)) / f32::from(1u16 << picture.layout.low_bits);
-        // inside every boundary nothing depends on the direction: such pixels stand at the centre
-        let core = (outline.radii_px.iter().copied().fold(f32::MAX, f32::min) - 2.0 * outline.band_px).max(0.0);
         self.samples.reserve(self.width * self.height);
         for j in 0..self.height {
             let dy = ((self.top + j) as f64 - outline.centre_px[1]) as f32;
@@ -64,8 +62,7 @@ impl Patch {
                 if square <= reach * reach {
                     let luma = f32::from(picture.luma.code(wide, self.left + i, self.top + j)) * scale;
                     let levels = [luma, component[j * self.width + i]];
-                    let (distance_px, sector) =
-                        if square < core * core { (0.0, 0) } else { (square.sqrt(), outline.sector(dx, dy) as u16) };
+                    let (distance_px, sector) = (square.sqrt(), outline.sector(dx, dy) as u16);
                     self.samples.push(Sample { dx_px: dx, dy_px: dy, distance_px, sector, levels });
                 }
             }
