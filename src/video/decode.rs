@@ -196,10 +196,7 @@ pub fn decode_in_order<T: Send>(
     } else {
         whole(container, &mut segmenter, &recipe, workers.max(1), measure, sink)?
     };
-    match decoded.unsupported_format {
-        Some(format) => Err(Error::PixelFormat { path: container.path().to_owned(), format }),
-        None => Ok(decoded),
-    }
+    all_supported(container, decoded)
 }
 
 /// As [`decode_in_order`], by one decoder with `threads` threads of its own: a value is handed on before the next
@@ -216,13 +213,18 @@ pub fn decode_one_by_one<T>(
     let recipe = DecoderRecipe::new(container);
     let mut segmenter = Segmenter::new(container);
     let decoded = whole(container, &mut segmenter, &recipe, threads.max(1), measure, sink)?;
+    all_supported(container, decoded)
+}
+
+fn all_supported(container: &Container, decoded: Decoded) -> Result<Decoded> {
     match decoded.unsupported_format {
         Some(format) => Err(Error::PixelFormat { path: container.path().to_owned(), format }),
         None => Ok(decoded),
     }
 }
 
-fn cannot_open(container: &Container, error: &ffmpeg::Error) -> Error {
+/// A decoder that cannot be opened for a container.
+pub(super) fn cannot_open(container: &Container, error: &ffmpeg::Error) -> Error {
     Error::NotAVideo {
         path: container.path().to_owned(),
         detail: format!("the {} decoder cannot be opened: {error}", container.info.codec),

@@ -124,17 +124,10 @@ impl Recording {
     }
 }
 
-fn no_decoder(container: &Container, error: &ffmpeg_the_third::Error) -> Error {
-    Error::NotAVideo {
-        path: container.path().to_owned(),
-        detail: format!("the {} decoder cannot be opened: {error}", container.info.codec),
-    }
-}
-
 fn sample_container(path: &Path, count: usize, see: &mut dyn FnMut(&Frame<'_>)) -> Result<()> {
     let mut container = Container::open(path)?;
     let duration_s = container.stated_duration_s().unwrap_or(0.0);
-    let mut decoder = DecoderRecipe::new(&container).decoder(1).map_err(|e| no_decoder(&container, &e))?;
+    let mut decoder = DecoderRecipe::new(&container).decoder(1).map_err(|e| decode::cannot_open(&container, &e))?;
     for sample in 0..count {
         if sample > 0 && (duration_s <= 0.0 || container.seek(duration_s * sample as f64 / count as f64).is_err()) {
             break;
@@ -154,7 +147,7 @@ fn sample_container(path: &Path, count: usize, see: &mut dyn FnMut(&Frame<'_>)) 
 
 fn show_container(path: &Path, t_s: f64, seek: bool, see: &mut dyn FnMut(&Frame<'_>)) -> Result<bool> {
     let mut container = Container::open(path)?;
-    let mut decoder = DecoderRecipe::new(&container).decoder(1).map_err(|e| no_decoder(&container, &e))?;
+    let mut decoder = DecoderRecipe::new(&container).decoder(1).map_err(|e| decode::cannot_open(&container, &e))?;
     if seek && container.seek(t_s).is_err() {
         return Ok(false);
     }
