@@ -7,6 +7,7 @@
 //! | track | `track` | blobs → one track a mark |
 //! | calibrate | `calibrate` | pixels, y down → metres, y up |
 //! | angles | `angles` | tracks → θ₁, θ₂ with standard deviations |
+//! | series | [`series`] | angles.csv → the same as numbers, checked |
 //! | overlay | `overlay` | recording, tracks and angles → a video that shows them |
 //! | model | `model` | the forward model of the swing |
 //! | synth | `synth` | exact swings, rendered recordings with known truth |
@@ -23,6 +24,7 @@ pub mod model;
 pub mod output;
 pub mod overlay;
 pub mod progress;
+pub mod series;
 pub mod sidecar;
 pub mod synth;
 pub mod track;

@@ -1,0 +1,496 @@
+//! The reader of angle tables: what `track`, `simulate` or another program wrote.
+//!
+//! Only `t_s` and `theta1_rad`, `theta2_rad`, … are needed, in any order among any other columns. An empty field is a missing value.
+
+use std::io::Read as _;
+use std::ops::Range;
+use std::path::{Path, PathBuf};
+
+use crate::error::{Error, Result};
+
+/// Fewest rows, and fewest values of each angle, from which anything can be said.
+pub const FEWEST_ROWS: usize = 8;
+
+/// An angle that varies by less than this (rad) does not swing; the best encoders resolve ten times more.
+const STILL_RAD: f64 = 1e-6;
+
+/// Consecutive swings beyond a full turn that no hanging chain makes.
+const IMPOSSIBLE_SWINGS: usize = 4;
+
+/// The angles of one recording as a table of numbers.
+#[derive(Debug, Clone, PartialEq)]
+pub struct AngleSeries {
+    /// Where the table came from, for messages.
+    pub path: PathBuf,
+    /// Time stamps, increasing.
+    pub t_s: Vec<f64>,
+    /// Angle of each link in each row, `[link][row]`; absent where it was not measured.
+    pub theta_rad: Vec<Vec<Option<f64>>>,
+    /// Its standard deviation where the table states one that is positive.
+    pub sd_rad: Vec<Vec<Option<f64>>>,
+}
+
+impl AngleSeries {
+    /// Reads and checks a table; `-` is standard input. A byte order mark and CRLF line ends are accepted.
+    ///
+    /// # Errors
+    /// [`Error::Unreadable`], [`Error::EmptyFile`], or [`Error::Table`] with the line: missing columns, fields that are not numbers, NaN or
+    /// infinity, times that do not increase, fewer than [`FEWEST_ROWS`] rows, an angle that never changes, degrees.
+    pub fn read(path: &Path) -> Result<Self> {
+        let (name, bytes) = if path.as_os_str() == "-" {
+            let name = PathBuf::from("standard input");
+            let mut bytes = Vec::new();
+            std::io::stdin().lock().read_to_end(&mut bytes).map_err(|e| Error::unreadable(&name, e))?;
+            (name, bytes)
+        } else {
+            (path.to_owned(), std::fs::read(path).map_err(|e| Error::unreadable(path, e))?)
+        };
+        Self::parse(&bytes, &name)
+    }
+
+    /// Reads and checks the bytes of a table; `path` only appears in errors.
+    ///
+    /// # Errors
+    /// As [`AngleSeries::read`].
+    pub fn parse(bytes: &[u8], path: &Path) -> Result<Self> {
+        if bytes.is_empty() {
+            return Err(Error::EmptyFile { path: path.to_owned() });
+        }
+        let table = Table { path };
+        let text = std::str::from_utf8(bytes)
+            .map_err(|_| table.refuse(None, "is not UTF-8 text; save the table as plain CSV"))?
+            .trim_start_matches('\u{feff}');
+        let mut reader = csv::ReaderBuilder::new().trim(csv::Trim::All).flexible(true).from_reader(text.as_bytes());
+        let header = reader.headers().map_err(|e| table.refuse(None, &e.to_string()))?.clone();
+        let columns = Columns::of(&header, &table)?;
+        let links = columns.theta.len();
+        let mut series = Self {
+            path: path.to_owned(),
+            t_s: Vec::new(),
+            theta_rad: vec![Vec::new(); links],
+            sd_rad: vec![Vec::new(); links],
+        };
+        for record in reader.records() {
+            let record = record.map_err(|e| table.refuse(e.position().map(csv::Position::line), &e.to_string()))?;
+            series.push(&Row { record: &record, header: &header, table: &table }, &columns)?;
+        }
+        series.check(&table)?;
+        Ok(series)
+    }
+
+    fn push(&mut self, row: &Row, columns: &Columns) -> Result<()> {
+        let (fields, named) = (row.record.len(), row.header.len());
+        if fields != named {
+            return Err(row.refuse(&format!("{fields} fields where the header names {named} columns")));
+        }
+        let t_s = row.number(columns.t)?.ok_or_else(|| row.refuse("t_s is empty; every row needs its time"))?;
+        if let Some(before) = self.t_s.last().filter(|before| **before >= t_s) {
+            return Err(row.refuse(&if *before == t_s {
+                format!("t_s = {t_s} stands twice; keep one row an instant")
+            } else {
+                format!("t_s = {t_s} follows {before}; sort the rows by time")
+            }));
+        }
+        self.t_s.push(t_s);
+        for (link, column) in columns.theta.iter().enumerate() {
+            self.theta_rad[link].push(row.number(*column)?);
+            let sd = columns.sd[link].and_then(|c| row.record[c].parse().ok());
+            self.sd_rad[link].push(sd.filter(|sd: &f64| sd.is_finite() && *sd > 0.0));
+        }
+        Ok(())
+    }
+
+    fn check(&self, table: &Table) -> Result<()> {
+        let rows = self.len();
+        if rows == 0 {
+            return Err(table.refuse(None, "holds a header and no row; measure the recording again"));
+        }
+        if rows < FEWEST_ROWS {
+            let only = if rows == 1 { "one row".to_owned() } else { format!("{rows} rows") };
+            return Err(table.refuse(None, &format!("holds {only}; a swing needs at least {FEWEST_ROWS}")));
+        }
+        for (link, theta) in self.theta_rad.iter().enumerate() {
+            let name = format!("theta{}_rad", link + 1);
+            let values: Vec<f64> = theta.iter().copied().flatten().collect();
+            if values.len() < FEWEST_ROWS {
+                let message = format!(
+                    "{name} has {} value{} in {rows} rows; at least {FEWEST_ROWS} are needed",
+                    values.len(),
+                    if values.len() == 1 { "" } else { "s" }
+                );
+                return Err(table.refuse(None, &message));
+            }
+            let (low, high) =
+                values.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), v| (l.min(*v), h.max(*v)));
+            if high - low <= STILL_RAD {
+                let message = format!("{name} stays at {low}: nothing swings; check the marks and the column");
+                return Err(table.refuse(None, &message));
+            }
+            if let Some(swing) = impossible_swing(&values) {
+                let message = format!(
+                    "{name} swings to and fro by {swing:.0} in one go, {:.1} full turns if radians: looks like degrees; multiply by π/180",
+                    swing / std::f64::consts::TAU
+                );
+                return Err(table.refuse(None, &message));
+            }
+        }
+        Ok(())
+    }
+
+    /// Number of links.
+    pub fn links(&self) -> usize {
+        self.theta_rad.len()
+    }
+
+    /// Number of rows.
+    pub fn len(&self) -> usize {
+        self.t_s.len()
+    }
+
+    /// Whether there is no row; never so after reading.
+    pub fn is_empty(&self) -> bool {
+        self.t_s.is_empty()
+    }
+
+    /// From the first time stamp to the last.
+    pub fn duration_s(&self) -> f64 {
+        self.t_s.last().unwrap_or(&0.0) - self.t_s.first().unwrap_or(&0.0)
+    }
+
+    /// Median step between rows.
+    pub fn step_s(&self) -> f64 {
+        let mut steps: Vec<f64> = self.t_s.windows(2).map(|pair| pair[1] - pair[0]).collect();
+        if steps.is_empty() {
+            return 0.0;
+        }
+        let middle = steps.len() / 2;
+        *steps.select_nth_unstable_by(middle, f64::total_cmp).1
+    }
+
+    /// Half the rate of the median step: a motion beyond it cannot be told from a slower one.
+    pub fn nyquist_hz(&self) -> f64 {
+        0.5 / self.step_s()
+    }
+
+    /// Share of the steps that differ from the median step by more than 5 %.
+    pub fn irregular_share(&self) -> f64 {
+        let step_s = self.step_s();
+        let odd = self.t_s.windows(2).filter(|pair| (pair[1] - pair[0] - step_s).abs() > 0.05 * step_s).count();
+        odd as f64 / self.t_s.len().saturating_sub(1).max(1) as f64
+    }
+
+    /// Rows of a stretch of time, its end excluded.
+    pub fn rows(&self, from_s: f64, until_s: f64) -> Range<usize> {
+        let from = self.t_s.partition_point(|t| *t < from_s);
+        from..self.t_s.partition_point(|t| *t < until_s).max(from)
+    }
+
+    /// The rows of a range, unchecked otherwise.
+    #[must_use]
+    pub fn slice(&self, rows: Range<usize>) -> Self {
+        let part = |columns: &[Vec<Option<f64>>]| columns.iter().map(|c| c[rows.clone()].to_vec()).collect();
+        Self {
+            path: self.path.clone(),
+            t_s: self.t_s[rows.clone()].to_vec(),
+            theta_rad: part(&self.theta_rad),
+            sd_rad: part(&self.sd_rad),
+        }
+    }
+}
+
+/// The size of a swing that no hanging chain makes in radians, if the values hold it.
+///
+/// A pendulum turns back only below its upper equilibrium, so between two turning points it covers less than a full turn; a chaotic chain may
+/// whirl over the top, but not again and again to one side and as far back. Values with four consecutive swings of more than 2π each between
+/// turning points are therefore not radians. Movements below one unit are left out as noise. One-way whirling of any length is legal.
+fn impossible_swing(values: &[f64]) -> Option<f64> {
+    let swings = swings_beyond(values, 1.0);
+    swings
+        .windows(IMPOSSIBLE_SWINGS)
+        .map(|few| few.iter().copied().fold(f64::INFINITY, f64::min))
+        .filter(|least| *least > std::f64::consts::TAU)
+        .max_by(f64::total_cmp)
+}
+
+/// The distances between consecutive turning points that are at least `least` apart.
+fn swings_beyond(values: &[f64], least: f64) -> Vec<f64> {
+    let Some(first) = values.first() else { return Vec::new() };
+    // the values' extremes since the last turning point
+    let (mut low, mut high, mut last) = (*first, *first, None);
+    let mut rising: Option<bool> = None;
+    let mut swings = Vec::new();
+    for value in values {
+        (low, high) = (low.min(*value), high.max(*value));
+        let turned = match rising {
+            None if high - low >= least => Some(*value == high),
+            Some(true) if high - value >= least => Some(false),
+            Some(false) if value - low >= least => Some(true),
+            _ => None,
+        };
+        if let Some(now_rising) = turned {
+            let turning_point = if now_rising { low } else { high };
+            if let Some(before) = last.replace(turning_point) {
+                swings.push(f64::abs(turning_point - before));
+            }
+            rising = Some(now_rising);
+            (low, high) = (*value, *value);
+        }
+    }
+    swings
+}
+
+/// Where each quantity stands.
+struct Columns {
+    t: usize,
+    theta: Vec<usize>,
+    sd: Vec<Option<usize>>,
+}
+
+impl Columns {
+    fn of(header: &csv::StringRecord, table: &Table) -> Result<Self> {
+        let names: Vec<&str> = header.iter().collect();
+        let position = |name: &str| names.iter().position(|n| *n == name);
+        let need = |name: &str| position(name).ok_or_else(|| table.refuse(Some(1), &missing(name, &names)));
+        let t = need("t_s")?;
+        let highest = names.iter().filter_map(|n| n.strip_prefix("theta")?.strip_suffix("_rad")?.parse::<usize>().ok());
+        let links = highest.filter(|link| (1..=99).contains(link)).max().unwrap_or(1);
+        let theta = (1..=links).map(|link| need(&format!("theta{link}_rad"))).collect::<Result<Vec<_>>>()?;
+        let sd = (1..=links).map(|link| position(&format!("theta{link}_sd_rad"))).collect();
+        let used = std::iter::once(t).chain(theta.iter().copied());
+        for name in used.map(|column| names[column]) {
+            if names.iter().filter(|n| **n == name).count() > 1 {
+                return Err(table.refuse(Some(1), &format!("two columns are called `{name}`; rename one")));
+            }
+        }
+        Ok(Self { t, theta, sd })
+    }
+}
+
+/// What to say about a column that is not there.
+fn missing(name: &str, names: &[&str]) -> String {
+    let list = names.join(", ");
+    if let [only] = names
+        && let Some((_, word)) = [(';', "semicolons"), ('\t', "tabs")].into_iter().find(|(c, _)| only.contains(*c))
+    {
+        return format!("fields are separated by {word}; separate them by commas, with a point in the numbers");
+    }
+    if names.iter().all(|n| n.parse::<f64>().is_ok()) {
+        return format!("no header, the first row is {list}; put t_s,theta1_rad,theta2_rad above it");
+    }
+    let degrees = name.replace("_rad", "_deg");
+    if degrees != name && names.contains(&degrees.as_str()) {
+        return format!("no column `{name}` but `{degrees}`; multiply it by π/180 and rename it");
+    }
+    let nearest = names.iter().max_by(|a, b| strsim::jaro_winkler(name, a).total_cmp(&strsim::jaro_winkler(name, b)));
+    let hint = nearest
+        .filter(|n| strsim::jaro_winkler(name, n) > 0.5)
+        .map(|n| format!("; is it `{n}`? Then rename it"))
+        .unwrap_or_default();
+    format!("no column `{name}` among {list}{hint}")
+}
+
+struct Table<'a> {
+    path: &'a Path,
+}
+
+impl Table<'_> {
+    fn refuse(&self, line: Option<u64>, message: &str) -> Error {
+        Error::Table { path: self.path.to_owned(), line, message: message.to_owned() }
+    }
+}
+
+struct Row<'a> {
+    record: &'a csv::StringRecord,
+    header: &'a csv::StringRecord,
+    table: &'a Table<'a>,
+}
+
+impl Row<'_> {
+    fn number(&self, column: usize) -> Result<Option<f64>> {
+        let text = &self.record[column];
+        if text.is_empty() {
+            return Ok(None);
+        }
+        let name = &self.header[column];
+        let value: f64 = text.parse().map_err(|_| self.refuse(&format!("{name} = `{text}` is not a number")))?;
+        if !value.is_finite() {
+            return Err(self.refuse(&format!("{name} = {text}; leave a missing value's field empty")));
+        }
+        Ok(Some(value))
+    }
+
+    fn refuse(&self, message: &str) -> Error {
+        self.table.refuse(self.record.position().map(csv::Position::line), message)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::fmt::Write as _;
+
+    use super::*;
+
+    fn parse(text: &str) -> Result<AngleSeries> {
+        AngleSeries::parse(text.as_bytes(), Path::new("a.csv"))
+    }
+
+    fn refusal(text: &str) -> String {
+        parse(text).unwrap_err().to_string()
+    }
+
+    /// A table of one angle, a row every 0.1 s.
+    fn table(angle: impl Fn(f64) -> f64, rows: usize) -> String {
+        let mut text = "t_s,theta1_rad\n".to_owned();
+        for row in 0..rows {
+            let t = 0.1 * row as f64;
+            let _ = writeln!(text, "{t:.3},{:.6}", angle(t));
+        }
+        text
+    }
+
+    fn swing(t: f64) -> f64 {
+        0.3 * (6.0 * t).cos()
+    }
+
+    #[test]
+    fn columns_in_any_order_with_gaps_and_strange_deviations_are_read() {
+        let mut text = "flags,theta2_rad,theta1_sd_rad,t_s,frame,theta1_rad\r\n".to_owned();
+        for (row, sd) in ["0.01", "-0.02", "nan", "", "0", "0.01", "x", "0.02", ""].iter().enumerate() {
+            let theta2 = if row == 3 { String::new() } else { format!("0.{row}") };
+            let _ = write!(text, "lost:m2,{theta2},{sd},{row},0,-0.{row}\r\n");
+        }
+        let series = AngleSeries::parse(format!("\u{feff}{text}").as_bytes(), Path::new("a.csv")).unwrap();
+        assert_eq!((series.links(), series.len()), (2, 9));
+        assert_eq!(series.theta_rad[0][2], Some(-0.2));
+        assert_eq!(series.theta_rad[1][3], None);
+        assert_eq!(series.sd_rad[0], [Some(0.01), None, None, None, None, Some(0.01), None, Some(0.02), None]);
+        assert_eq!(series.sd_rad[1], [None; 9]);
+        assert_eq!((series.step_s(), series.nyquist_hz(), series.duration_s()), (1.0, 0.5, 8.0));
+        assert_eq!(series.rows(2.0, 4.0), 2..4);
+        assert_eq!(series.slice(2..4).theta_rad[1], [Some(0.2), None]);
+    }
+
+    #[test]
+    fn times_that_do_not_increase_are_named_with_their_line() {
+        let text = table(swing, 9);
+        assert_eq!(
+            refusal(&text.replace("\n0.400,", "\n0.300,")),
+            "a.csv:6: t_s = 0.3 stands twice; keep one row an instant"
+        );
+        assert_eq!(
+            refusal(&text.replace("\n0.400,", "\n0.250,")),
+            "a.csv:6: t_s = 0.25 follows 0.3; sort the rows by time"
+        );
+        assert_eq!(refusal(&text.replace("\n0.400,", "\n,")), "a.csv:6: t_s is empty; every row needs its time");
+        assert_eq!(
+            refusal(&text.replace("\n0.400,", "\ninf,")),
+            "a.csv:6: t_s = inf; leave a missing value's field empty"
+        );
+    }
+
+    #[test]
+    fn values_that_are_no_numbers_are_named_with_their_line() {
+        let rows = ["0,0.1", "1,NaN"];
+        let text = |second: &str| format!("t_s,theta1_rad\n{}\n{second}\n", rows[0]);
+        assert_eq!(refusal(&text(rows[1])), "a.csv:3: theta1_rad = NaN; leave a missing value's field empty");
+        assert_eq!(refusal(&text("1,-inf")), "a.csv:3: theta1_rad = -inf; leave a missing value's field empty");
+        assert_eq!(refusal(&text("1,12°")), "a.csv:3: theta1_rad = `12°` is not a number");
+        assert_eq!(refusal(&text("1")), "a.csv:3: 1 fields where the header names 2 columns");
+        assert_eq!(refusal(&text("1,2,3")), "a.csv:3: 3 fields where the header names 2 columns");
+    }
+
+    #[test]
+    fn tables_too_short_are_refused() {
+        assert_eq!(refusal(""), "a.csv: the file is empty (0 bytes); record or copy it again");
+        assert_eq!(refusal("t_s,theta1_rad\n"), "a.csv: holds a header and no row; measure the recording again");
+        assert_eq!(refusal(&table(swing, 1)), "a.csv: holds one row; a swing needs at least 8");
+        assert_eq!(refusal(&table(swing, 7)), "a.csv: holds 7 rows; a swing needs at least 8");
+        let gaps = "t_s,theta1_rad\n0,\n1,\n2,\n3,0.1\n4,\n5,\n6,\n7,\n";
+        assert_eq!(refusal(gaps), "a.csv: theta1_rad has 1 value in 8 rows; at least 8 are needed");
+    }
+
+    #[test]
+    fn missing_columns_are_named_with_those_that_are_there() {
+        assert_eq!(
+            refusal("time,theta1_rad\n"),
+            "a.csv:1: no column `t_s` among time, theta1_rad; is it `time`? Then rename it"
+        );
+        assert_eq!(
+            refusal("t_s,theta_1\n"),
+            "a.csv:1: no column `theta1_rad` among t_s, theta_1; is it `theta_1`? Then rename it"
+        );
+        assert_eq!(refusal("x,y\n"), "a.csv:1: no column `t_s` among x, y");
+        assert!(refusal("t_s,theta1_rad,theta3_rad\n").starts_with("a.csv:1: no column `theta2_rad` among t_s,"));
+        assert_eq!(
+            refusal("t_s,theta1_deg\n"),
+            "a.csv:1: no column `theta1_rad` but `theta1_deg`; multiply it by π/180 and rename it"
+        );
+        assert_eq!(
+            refusal("t_s;theta1_rad\n0;1\n"),
+            "a.csv:1: fields are separated by semicolons; separate them by commas, with a point in the numbers"
+        );
+        assert_eq!(
+            refusal("0.0,0.1\n0.1,0.2\n"),
+            "a.csv:1: no header, the first row is 0.0, 0.1; put t_s,theta1_rad,theta2_rad above it"
+        );
+        assert_eq!(refusal("t_s,t_s,theta1_rad\n"), "a.csv:1: two columns are called `t_s`; rename one");
+        let utf16 = AngleSeries::parse(&[0xff, 0xfe, 0x74, 0x00], Path::new("a.csv")).unwrap_err().to_string();
+        assert_eq!(utf16, "a.csv: is not UTF-8 text; save the table as plain CSV");
+    }
+
+    #[test]
+    fn an_angle_that_never_changes_is_refused() {
+        assert_eq!(
+            refusal(&table(|_| 0.25, 20)),
+            "a.csv: theta1_rad stays at 0.25: nothing swings; check the marks and the column"
+        );
+    }
+
+    #[test]
+    fn degrees_are_refused_and_large_swings_in_radians_are_not() {
+        let degrees = table(|t| 24.0 * (-0.05 * t).exp() * (6.0 * t).cos() + 3.0, 200);
+        let message = refusal(&degrees);
+        assert!(message.ends_with("full turns if radians: looks like degrees; multiply by π/180"), "{message}");
+        assert!(message.starts_with("a.csv: theta1_rad swings to and fro by 4"), "{message}");
+        parse(&table(|t| 3.1 * (6.0 * t).cos(), 200)).unwrap();
+    }
+
+    #[test]
+    fn a_pendulum_that_whirls_and_then_swings_is_legal() {
+        let whirl = |t: f64| if t < 10.0 { 7.0 * t } else { 70.0 + 2.5 * (5.0 * (t - 10.0)).sin() };
+        parse(&table(whirl, 400)).unwrap();
+        // the outer link of a chaotic pendulum: over the top one way, then the other, then it hangs
+        let outer = |t: f64| if t < 9.0 { 5.0 * (2.0 * t).sin() } else { 2.0 * (5.0 * t).sin() };
+        parse(&table(outer, 60)).unwrap();
+    }
+
+    #[test]
+    fn real_recordings_are_read_in_radians_and_refused_in_degrees() {
+        let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../shared/data");
+        for (file, links) in [("multiarm_double.csv", 2), ("multiarm_single.csv", 1), ("video_pendulum.csv", 1)] {
+            let path = folder.join(file);
+            if !path.exists() {
+                println!("skipped: {} is not there", path.display());
+                continue;
+            }
+            let series = AngleSeries::read(&path).unwrap();
+            assert_eq!(series.links(), links, "{file}");
+            let mut text = "t_s,theta1_rad\n".to_owned();
+            for (t, theta) in series.t_s.iter().zip(&series.theta_rad[0]) {
+                let _ = writeln!(text, "{t},{}", theta.map(|a| a.to_degrees().to_string()).unwrap_or_default());
+            }
+            assert!(refusal(&text).contains("looks like degrees"), "{file}");
+        }
+    }
+
+    #[test]
+    fn a_real_chaotic_pendulum_in_radians_is_legal() {
+        let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../shared/data/chaotic_pendulum_log.csv");
+        if !path.exists() {
+            println!("skipped: {} is not there", path.display());
+            return;
+        }
+        let text = std::fs::read_to_string(path).unwrap().replace("theta2_rel_rad", "theta2_rad");
+        assert_eq!(parse(&text).unwrap().links(), 2);
+    }
+}
