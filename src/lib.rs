@@ -19,6 +19,7 @@ pub mod cli;
 pub mod detect;
 pub mod error;
 pub mod experiment;
+pub mod fit;
 pub mod measure;
 pub mod model;
 pub mod output;

@@ -12,7 +12,9 @@
 //! | [`integrate`] | step after step, from reversal to reversal |
 //! | [`trajectory`] | the motion at every instant, with its sensitivities |
 //! | [`observe`] | the angles between marks |
+//! | [`camera`] | what a camera makes of them |
 
+pub mod camera;
 pub mod chain;
 pub mod collocation;
 pub mod effects;
@@ -27,6 +29,7 @@ pub mod step;
 mod tests;
 pub mod trajectory;
 
+pub use camera::Camera;
 pub use chain::Chain;
 pub use effects::Effect;
 pub use forward::ForwardModel;

@@ -2,7 +2,7 @@
 
 use std::fmt;
 
-/// A coefficient of the equations of motion.
+/// A coefficient of the equations of motion, or of the camera.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub enum Parameter {
     /// K, the joint's spring.
@@ -39,6 +39,16 @@ pub enum Parameter {
     SupportCosine,
     /// Frequency of the pivot's motion.
     SupportFrequency,
+    /// ε of the camera's clock.
+    TimeBase,
+    /// Time of the frames missing at one instant.
+    DroppedFrames,
+    /// Common offset of the angles.
+    CameraTilt,
+    /// Common gain of the angles.
+    AngleGain,
+    /// θ₂ is sampled later than θ₁.
+    DifferentialLag,
 }
 
 impl Parameter {
@@ -62,6 +72,11 @@ impl Parameter {
             Self::SupportSine => "support_motion.sine_m",
             Self::SupportCosine => "support_motion.cosine_m",
             Self::SupportFrequency => "support_motion.frequency_hz",
+            Self::TimeBase => "time_base",
+            Self::DroppedFrames => "dropped_frames",
+            Self::CameraTilt => "camera_tilt",
+            Self::AngleGain => "angle_gain",
+            Self::DifferentialLag => "differential_lag",
         }
     }
 
@@ -70,7 +85,7 @@ impl Parameter {
         match self {
             Self::JointStiffness | Self::HingeStiffness => "N m/rad",
             Self::JointDamping | Self::HingeViscous => "N m s/rad",
-            Self::RestCurl | Self::HysteresisYield => "rad",
+            Self::RestCurl | Self::HysteresisYield | Self::CameraTilt => "rad",
             Self::BendingStiffness => "N m2",
             Self::JointCubicStiffness => "N m/rad3",
             Self::HysteresisTorque | Self::HingeCoulomb => "N m",
@@ -80,15 +95,68 @@ impl Parameter {
             Self::SideForce => "m/s2",
             Self::SupportSine | Self::SupportCosine => "m",
             Self::SupportFrequency => "Hz",
+            Self::TimeBase | Self::AngleGain => "1",
+            Self::DroppedFrames | Self::DifferentialLag => "s",
         }
     }
 
     /// Whether nature allows only values from zero upwards.
     pub fn is_not_negative(self) -> bool {
-        !matches!(
-            self,
-            Self::RestCurl | Self::JointCubicStiffness | Self::SideForce | Self::SupportSine | Self::SupportCosine
-        )
+        match self {
+            Self::RestCurl
+            | Self::JointCubicStiffness
+            | Self::SideForce
+            | Self::SupportSine
+            | Self::SupportCosine
+            | Self::TimeBase
+            | Self::DroppedFrames
+            | Self::CameraTilt
+            | Self::AngleGain
+            | Self::DifferentialLag => false,
+            Self::JointStiffness
+            | Self::JointDamping
+            | Self::BendingStiffness
+            | Self::HysteresisTorque
+            | Self::HysteresisYield
+            | Self::HingeViscous
+            | Self::HingeCoulomb
+            | Self::HingeStiffness
+            | Self::AirLinear
+            | Self::AirQuadratic
+            | Self::AddedMass
+            | Self::SupportFrequency => true,
+        }
+    }
+
+    /// Every parameter.
+    pub const ALL: [Self; 22] = [
+        Self::JointStiffness,
+        Self::JointDamping,
+        Self::RestCurl,
+        Self::BendingStiffness,
+        Self::JointCubicStiffness,
+        Self::HysteresisTorque,
+        Self::HysteresisYield,
+        Self::HingeViscous,
+        Self::HingeCoulomb,
+        Self::HingeStiffness,
+        Self::AirLinear,
+        Self::AirQuadratic,
+        Self::AddedMass,
+        Self::SideForce,
+        Self::SupportSine,
+        Self::SupportCosine,
+        Self::SupportFrequency,
+        Self::TimeBase,
+        Self::DroppedFrames,
+        Self::CameraTilt,
+        Self::AngleGain,
+        Self::DifferentialLag,
+    ];
+
+    /// The parameter of a name in files.
+    pub fn from_id(id: &str) -> Option<Self> {
+        Self::ALL.into_iter().find(|p| p.id() == id)
     }
 }
 

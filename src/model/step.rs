@@ -29,6 +29,21 @@ pub struct Step {
     pub slopes: Option<Slopes>,
 }
 
+/// A place in a step, with the polynomial's weights there.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct StepPlace {
+    tau: f64,
+    angle: Weights,
+    rate: Weights,
+}
+
+impl StepPlace {
+    /// At τ = 0 … 1.
+    pub fn at(tau: f64) -> Self {
+        Self { tau, angle: RADAU.angle_weights(tau), rate: RADAU.rate_weights(tau) }
+    }
+}
+
 /// Derivatives with parameters and initial values, one column each.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Slopes {
@@ -70,6 +85,25 @@ impl Step {
     /// Accelerations at the end.
     pub fn last_acceleration(&self) -> &[f64] {
         &self.stages[(STAGES - 1) * self.rate.len()..]
+    }
+
+    /// Adds `factor` times ∂θ of one link at a place of the step to `row`.
+    pub fn add_angle_slopes(&self, link: usize, at: &StepPlace, factor: f64, row: &mut [f64]) {
+        let Some(slopes) = &self.slopes else { return };
+        let (m, h) = (self.rate.len(), self.length_s);
+        for (column, value) in row.iter_mut().enumerate() {
+            let stages = slopes.stages.column(column);
+            let bent: f64 = at.angle.iter().enumerate().map(|(k, w)| w * stages[k * m + link]).sum();
+            *value +=
+                factor * (slopes.theta[(link, column)] + h * at.tau * slopes.rate[(link, column)] + h * h * bent);
+        }
+    }
+
+    /// θ and ω of one link at a place of the step.
+    pub fn link(&self, link: usize, at: &StepPlace) -> (f64, f64) {
+        let h = self.length_s;
+        let theta = self.theta_rad[link] + h * at.tau * self.rate[link] + h * h * self.sum(&at.angle, link);
+        (theta, self.rate[link] + h * self.sum(&at.rate, link))
     }
 
     /// Derivatives of θ and of the rates at τ.

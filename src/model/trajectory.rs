@@ -125,7 +125,8 @@ impl Trajectory {
         &self.steps
     }
 
-    fn step_at(&self, t_s: f64) -> Option<(&Step, f64)> {
+    /// The step that holds an instant, and τ in it; `None` for a motion of no length.
+    pub fn step_at(&self, t_s: f64) -> Option<(&Step, f64)> {
         let t_s = t_s.clamp(self.from_s, self.until_s);
         let after = self.steps.partition_point(|s| s.from_s <= t_s);
         let step = self.steps.get(after.saturating_sub(1))?;

@@ -3,18 +3,13 @@
 use crate::error::Result;
 use crate::experiment::Experiment;
 use crate::model::observe::chord_angles_rad;
-use crate::model::{ForwardModel, State, Trajectory};
+use crate::model::{Camera, ForwardModel, State, Trajectory};
 
 /// A swing as the camera sees it, in the undistorted picture.
 ///
-/// The camera effects of `[model.effects]` enter here. The angle seen of link i at stamp t is
-///
-/// ```text
-/// φᵢ(t) = (1 + angle_gain) θᵢ((1 + time_base) t + [i > 1] differential_lag) + camera_tilt + render.tilt_rad
-/// ```
-///
-/// `dropped_frames` of `[model.effects]` are missing without a trace in the stamps: from the middle of the recording on, the motion is that
-/// much further than the stamps say. (Those of `[render]` leave a gap in the stamps.)
+/// The camera effects of `[model.effects]` enter here, see [`Camera`]; `render.tilt_rad` adds to the tilt. `dropped_frames` of
+/// `[model.effects]` are missing without a trace in the stamps: from the middle of the recording on, the motion is that much further than the
+/// stamps say. (Those of `[render]` leave a gap in the stamps.)
 #[derive(Debug)]
 pub struct Swing {
     model: ForwardModel,
@@ -23,12 +18,7 @@ pub struct Swing {
     hinge_px: [f64; 2],
     scale_px_per_m: f64,
     mirrored: bool,
-    tilt_rad: f64,
-    gain: f64,
-    rate: f64,
-    lag_s: f64,
-    jump_s: f64,
-    jump_at_s: f64,
+    camera: Camera,
 }
 
 impl Swing {
@@ -39,12 +29,11 @@ impl Swing {
     pub fn of(experiment: &Experiment) -> Result<Self> {
         let model = ForwardModel::of(experiment)?;
         let (render, effects) = (&experiment.render, &experiment.model.effects);
-        let rate = 1.0 + effects.time_base.unwrap_or(0.0);
-        let lag_s = effects.differential_lag.unwrap_or(0.0);
-        let jump_s = effects.dropped_frames.unwrap_or(0.0);
+        let mut camera = Camera::of(effects, 0.0, render.start_s + 0.5 * render.duration_s);
+        camera.tilt_rad += render.tilt_rad;
         // Jitter, exposure and rolling shutter together reach less than two frames beyond the last stamp.
         let last_stamp_s = render.start_s + render.duration_s + 2.0 / render.fps;
-        let until_s = rate.max(0.0) * last_stamp_s + lag_s.max(0.0) + jump_s.max(0.0);
+        let until_s = (0..2).map(|link| camera.true_time_s(last_stamp_s, link)).fold(0.0, f64::max);
         let release = State::released(model.chain(), &experiment.model.release_rad)?;
         let trajectory = Trajectory::swing(&model, &release, 0.0, until_s)?;
         Ok(Self {
@@ -54,34 +43,30 @@ impl Swing {
             hinge_px: experiment.rig.pivot_px.unwrap_or(render.hinge_px),
             scale_px_per_m: render.scale_px_per_m,
             mirrored: experiment.rig.mirrored,
-            tilt_rad: effects.camera_tilt.unwrap_or(0.0) + render.tilt_rad,
-            gain: 1.0 + effects.angle_gain.unwrap_or(0.0),
-            rate,
-            lag_s,
-            jump_s,
-            jump_at_s: render.start_s + 0.5 * render.duration_s,
+            camera,
         })
     }
 
     /// φ at a stamp, top to bottom: what a perfect measurement reads.
     pub fn angles_rad(&self, t_s: f64) -> Vec<f64> {
         let chords = |t_s: f64| chord_angles_rad(self.model.chain(), &self.trajectory.at(t_s).theta_rad);
-        let upper = chords(self.true_time_s(t_s));
-        let lower = if self.lag_s == 0.0 { None } else { Some(chords(self.true_time_s(t_s) + self.lag_s)) };
+        let times = |link: usize| self.camera.true_time_s(t_s, link);
+        let upper = chords(times(0));
+        let lower = if self.camera.lag_s == 0.0 { None } else { Some(chords(times(1))) };
         let theta = |i: usize| match &lower {
             Some(angles) if i > 0 => angles[i],
             _ => upper[i],
         };
-        (0..self.lengths_m.len()).map(|i| self.gain * theta(i) + self.tilt_rad).collect()
+        (0..self.lengths_m.len()).map(|i| self.camera.seen_rad(theta(i))).collect()
     }
 
     /// The hinge, the joints and the tip at a stamp, in the undistorted picture.
     pub fn nodes_px(&self, t_s: f64) -> Vec<[f64; 2]> {
-        let pivot_px = self.scale_px_per_m * self.model.pivot_m(self.true_time_s(t_s));
+        let pivot_px = self.scale_px_per_m * self.model.pivot_m(self.camera.true_time_s(t_s, 0));
         let side = if self.mirrored { -1.0 } else { 1.0 };
         let mut node = [
-            self.hinge_px[0] + side * pivot_px * self.tilt_rad.cos(),
-            self.hinge_px[1] - pivot_px * self.tilt_rad.sin(),
+            self.hinge_px[0] + side * pivot_px * self.camera.tilt_rad.cos(),
+            self.hinge_px[1] - pivot_px * self.camera.tilt_rad.sin(),
         ];
         let mut nodes = vec![node];
         for (length_m, angle_rad) in self.lengths_m.iter().zip(self.angles_rad(t_s)) {
@@ -94,16 +79,12 @@ impl Swing {
 
     /// Roll of the picture: anticlockwise, or clockwise in a mirror.
     pub fn roll_rad(&self) -> f64 {
-        if self.mirrored { -self.tilt_rad } else { self.tilt_rad }
+        if self.mirrored { -self.camera.tilt_rad } else { self.camera.tilt_rad }
     }
 
     /// The hinge at rest, in the undistorted picture.
     pub fn hinge_px(&self) -> [f64; 2] {
         self.hinge_px
-    }
-
-    fn true_time_s(&self, t_s: f64) -> f64 {
-        self.rate * t_s + if t_s >= self.jump_at_s { self.jump_s } else { 0.0 }
     }
 }
 

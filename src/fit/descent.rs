@@ -1,0 +1,213 @@
+//! Least squares by the method of Levenberg and Marquardt, with lower bounds and Huber's weights.
+//!
+//! The residuals come in blocks, each of which depends on a few of the variables; so a fit with many initial states stays small.
+
+use nalgebra::{DMatrix, DVector};
+
+/// Some residuals, in units of their standard deviation, and their derivatives with the variables in `columns`.
+#[derive(Debug, Clone)]
+pub struct Block {
+    /// Which variables.
+    pub columns: Vec<usize>,
+    /// r.
+    pub residual: DVector<f64>,
+    /// ∂r, one column each of `columns`.
+    pub slopes: DMatrix<f64>,
+    /// Whether outliers are expected here.
+    pub robust: bool,
+}
+
+/// Settings.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Descent {
+    /// Residuals beyond this many standard deviations count linearly; infinite for plain least squares.
+    pub huber: f64,
+    /// Most steps, failed ones included.
+    pub most_steps: usize,
+    /// It has converged when the next step promises less than this part of the mean square (χ² of about one is then this many variances).
+    pub enough: f64,
+}
+
+impl Default for Descent {
+    fn default() -> Self {
+        Self { huber: f64::INFINITY, most_steps: 60, enough: 1e-5 }
+    }
+}
+
+/// How it ended.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Ending {
+    /// No step promises anything more.
+    Converged,
+    /// After the most steps.
+    LostPatience,
+    /// No step makes it better, though one should.
+    Stuck,
+}
+
+/// Where it ended.
+#[derive(Debug, Clone)]
+pub struct Outcome {
+    /// The variables.
+    pub x: Vec<f64>,
+    /// Σ r², with Huber's weights.
+    pub cost: f64,
+    /// The blocks there.
+    pub blocks: Vec<Block>,
+    /// JᵀJ, weighted.
+    pub normal: DMatrix<f64>,
+    /// Steps taken.
+    pub steps: usize,
+    /// How.
+    pub ending: Ending,
+}
+
+impl Outcome {
+    /// Number of residuals.
+    pub fn residuals(&self) -> usize {
+        self.blocks.iter().map(|b| b.residual.len()).sum()
+    }
+}
+
+struct Normals {
+    cost: f64,
+    matrix: DMatrix<f64>,
+    gradient: DVector<f64>,
+}
+
+impl Descent {
+    /// Descends from `x`. `evaluate` gives the blocks at a place, or `None` where there are none. `lower` holds a bound each variable.
+    ///
+    /// Returns `None` where even the start cannot be evaluated.
+    pub fn run(
+        &self,
+        x: Vec<f64>,
+        lower: &[f64],
+        mut evaluate: impl FnMut(&[f64]) -> Option<Vec<Block>>,
+    ) -> Option<Outcome> {
+        let mut x = x;
+        let mut blocks = evaluate(&x)?;
+        let mut normals = self.normals(&blocks, x.len());
+        let (mut damping, mut growth) = (1e-4, 2.0);
+        let mut ending = Ending::LostPatience;
+        let mut steps = 0;
+        while steps < self.most_steps {
+            steps += 1;
+            let held: Vec<bool> = (0..x.len()).map(|i| x[i] <= lower[i] && normals.gradient[i] > 0.0).collect();
+            let Some(step) = damped_step(&normals, &held, damping) else {
+                damping *= 10.0;
+                continue;
+            };
+            let mut moved: Vec<f64> = x.iter().zip(step.iter()).map(|(x, s)| x + s).collect();
+            moved.iter_mut().zip(lower).for_each(|(x, low)| *x = x.max(*low));
+            let taken = DVector::from_iterator(x.len(), moved.iter().zip(&x).map(|(new, old)| new - old));
+            let promised = -2.0 * normals.gradient.dot(&taken) - taken.dot(&(&normals.matrix * &taken));
+            let mean_square = normals.cost / blocks.iter().map(|b| b.residual.len()).sum::<usize>().max(1) as f64;
+            if !(promised > self.enough * mean_square) {
+                ending = Ending::Converged;
+                break;
+            }
+            let trial = evaluate(&moved).map(|blocks| (self.normals(&blocks, x.len()), blocks));
+            match trial {
+                Some((trial, trial_blocks)) if trial.cost < normals.cost => {
+                    let gain = (normals.cost - trial.cost) / promised;
+                    damping = (damping * (1.0 - (2.0 * gain - 1.0).powi(3)).max(0.1)).max(1e-12);
+                    growth = 2.0;
+                    (x, blocks, normals) = (moved, trial_blocks, trial);
+                }
+                _ => {
+                    damping *= growth;
+                    growth *= 2.0;
+                    if damping > 1e12 {
+                        ending = Ending::Stuck;
+                        break;
+                    }
+                }
+            }
+        }
+        Some(Outcome { x, cost: normals.cost, blocks, normal: normals.matrix, steps, ending })
+    }
+
+    fn normals(&self, blocks: &[Block], count: usize) -> Normals {
+        let mut normals = Normals { cost: 0.0, matrix: DMatrix::zeros(count, count), gradient: DVector::zeros(count) };
+        for block in blocks {
+            let mut residual = block.residual.clone();
+            let mut slopes = block.slopes.clone();
+            for row in 0..residual.len() {
+                let size = residual[row].abs();
+                if block.robust && size > self.huber {
+                    normals.cost += self.huber * (2.0 * size - self.huber);
+                    let weight = (self.huber / size).sqrt();
+                    residual[row] *= weight;
+                    slopes.row_mut(row).scale_mut(weight);
+                } else {
+                    normals.cost += size * size;
+                }
+            }
+            let gradient = slopes.tr_mul(&residual);
+            let square = slopes.tr_mul(&slopes);
+            for (a, i) in block.columns.iter().enumerate() {
+                normals.gradient[*i] += gradient[a];
+                for (b, j) in block.columns.iter().enumerate() {
+                    normals.matrix[(*i, *j)] += square[(a, b)];
+                }
+            }
+        }
+        normals
+    }
+}
+
+/// Solves (N + λ diag N) step = −gradient, variables that are held left out.
+fn damped_step(normals: &Normals, held: &[bool], damping: f64) -> Option<DVector<f64>> {
+    let count = held.len();
+    let scale: Vec<f64> = (0..count).map(|i| normals.matrix[(i, i)].max(1e-300).sqrt()).collect();
+    let matrix = DMatrix::from_fn(count, count, |i, j| {
+        if held[i] || held[j] {
+            return f64::from(u8::from(i == j));
+        }
+        let extra = if i == j { damping } else { 0.0 };
+        normals.matrix[(i, j)] / (scale[i] * scale[j]) + extra
+    });
+    let right = DVector::from_fn(count, |i, _| if held[i] { 0.0 } else { -normals.gradient[i] / scale[i] });
+    let solved = matrix.cholesky()?.solve(&right);
+    solved.iter().all(|v| v.is_finite()).then(|| DVector::from_fn(count, |i, _| solved[i] / scale[i]))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Rosenbrock's valley as two residuals.
+    fn valley(x: &[f64]) -> Option<Vec<Block>> {
+        Some(vec![Block {
+            columns: vec![0, 1],
+            residual: DVector::from_vec(vec![10.0 * (x[1] - x[0] * x[0]), 1.0 - x[0]]),
+            slopes: DMatrix::from_row_slice(2, 2, &[-20.0 * x[0], 10.0, -1.0, 0.0]),
+            robust: true,
+        }])
+    }
+
+    #[test]
+    fn it_walks_down_the_curved_valley() {
+        let settings = Descent { enough: 1e-12, ..Descent::default() };
+        let outcome = settings.run(vec![-1.2, 1.0], &[f64::NEG_INFINITY; 2], valley).unwrap();
+        assert!((outcome.x[0] - 1.0).abs() < 1e-6 && (outcome.x[1] - 1.0).abs() < 1e-6, "{outcome:?}");
+    }
+
+    #[test]
+    fn a_bound_holds_and_lets_go() {
+        let outcome = Descent::default().run(vec![3.0, 4.0], &[f64::NEG_INFINITY, 2.25], valley).unwrap();
+        assert!((outcome.x[1] - 2.25).abs() < 1e-9 && (outcome.x[0] - 1.5).abs() < 2e-3, "{outcome:?}");
+    }
+
+    #[test]
+    fn one_wild_value_does_not_carry_the_mean_away() {
+        let values = [1.0, 1.1, 0.9, 1.05, 0.95, 50.0];
+        let mean = |x: &[f64]| {
+            let residual = DVector::from_iterator(6, values.iter().map(|v| (x[0] - v) / 0.1));
+            Some(vec![Block { columns: vec![0], residual, slopes: DMatrix::from_element(6, 1, 10.0), robust: true }])
+        };
+        let robust = Descent { huber: 2.0, ..Descent::default() }.run(vec![0.0], &[-9.0], mean).unwrap();
+        assert!((robust.x[0] - 1.04).abs() < 0.01, "{robust:?}");
+    }
+}

@@ -1,0 +1,254 @@
+//! Standard deviations and 95 % intervals of fitted parameters, and what the data do not determine.
+
+use nalgebra::{DMatrix, DVector, SymmetricEigen};
+
+use super::Problem;
+use super::descent::Outcome;
+use super::problem::stacked;
+use crate::model::Parameter;
+
+/// 95 % of a normal distribution lie within this many standard deviations.
+const Z95: f64 = 1.959_964;
+/// χ² of one degree of freedom: 95 % lie below.
+const CHI2_95: f64 = Z95 * Z95;
+/// Lags over which residuals are tested for correlation, and their χ² at 0.1 %.
+const LAGS: usize = 10;
+const CHI2_LAGS: f64 = 29.59;
+/// A combination of parameters is not determined when its logarithm is less certain than this.
+const UNDETERMINED: f64 = 1.0;
+
+/// A fitted parameter.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Estimate {
+    /// Which.
+    pub parameter: Parameter,
+    /// Least squares.
+    pub value: f64,
+    /// Standard deviation, from the curvature of the least squares.
+    pub sd: f64,
+    /// 95 % interval; from the profile of the likelihood where the curvature alone would mislead, or a bound cuts it.
+    pub low: f64,
+    /// Upper end.
+    pub high: f64,
+    /// Whether the bound holds it.
+    pub at_bound: bool,
+}
+
+impl Estimate {
+    /// Whether the interval excludes zero.
+    pub fn is_determined(&self) -> bool {
+        self.low > 0.0 || self.high < 0.0
+    }
+}
+
+/// What is known about the parameters.
+#[derive(Debug, Clone)]
+pub(super) struct Uncertainty {
+    pub estimates: Vec<Estimate>,
+    pub correlation: DMatrix<f64>,
+    pub undetermined: Vec<Vec<(Parameter, f64)>>,
+    pub coloured: bool,
+}
+
+/// From the blocks at the minimum:
+///
+/// ```text
+/// white residuals      cov = s² (JᵀJ)⁻¹                                   s² = Σr²/(N − p)
+/// correlated           cov = (JᵀJ)⁻¹ [Σₗ wₗ Σₜ gₜ gₜ₊ₗᵀ] (JᵀJ)⁻¹          gₜ = Jₜᵀ rₜ,  w Bartlett's (Newey and West 1987)
+/// ```
+pub(super) fn uncertainty(problem: &Problem<'_>, outcome: &Outcome) -> Uncertainty {
+    let free = problem.free.len();
+    let (residual, slopes) = stacked(&outcome.blocks, outcome.x.len());
+    let lower = problem.lower();
+    let held: Vec<bool> = (0..outcome.x.len()).map(|i| i < free && outcome.x[i] <= lower[i]).collect();
+    let freedom = residual.len().saturating_sub(outcome.x.len()).max(1) as f64;
+    let variance = residual.norm_squared() / freedom;
+    let inverse = inverse_of(&slopes.tr_mul(&slopes));
+    let coloured = is_coloured(problem, outcome);
+    let white = &inverse * variance;
+    let covariance = if coloured { widened(problem, outcome, &slopes, &residual, &inverse, &white) } else { white };
+    let sd: Vec<f64> = (0..outcome.x.len()).map(|i| covariance[(i, i)].max(0.0).sqrt()).collect();
+    let correlation = DMatrix::from_fn(free, free, |i, j| covariance[(i, j)] / (sd[i] * sd[j]).max(1e-300));
+    let estimates = (0..free)
+        .map(|i| {
+            let profile = Profile { problem, outcome, inverse: &inverse, variance, index: i, sd: sd[i], lower: lower[i] };
+            Estimate {
+                parameter: problem.free[i],
+                value: outcome.x[i],
+                sd: sd[i],
+                low: profile.end(-1.0),
+                high: profile.end(1.0),
+                at_bound: held[i],
+            }
+        })
+        .collect();
+    Uncertainty { estimates, correlation, undetermined: undetermined(problem, outcome, &covariance), coloured }
+}
+
+/// The inverse of JᵀJ, scaled to a unit diagonal first; directions without any information get a very large variance.
+fn inverse_of(normal: &DMatrix<f64>) -> DMatrix<f64> {
+    let n = normal.nrows();
+    let scale = DVector::from_fn(n, |i, _| 1.0 / normal[(i, i)].max(1e-300).sqrt());
+    let unit = DMatrix::from_fn(n, n, |i, j| normal[(i, j)] * scale[i] * scale[j]);
+    let eigen = SymmetricEigen::new(unit);
+    let values = eigen.eigenvalues.map(|v| 1.0 / v.max(1e-14));
+    let inverse = &eigen.eigenvectors * DMatrix::from_diagonal(&values) * eigen.eigenvectors.transpose();
+    DMatrix::from_fn(n, n, |i, j| inverse[(i, j)] * scale[i] * scale[j])
+}
+
+/// Ljung and Box's test of the residuals of every angle, at 0.1 %.
+fn is_coloured(problem: &Problem<'_>, outcome: &Outcome) -> bool {
+    outcome.blocks.iter().enumerate().any(|(record, block)| {
+        links_of(problem, record).into_iter().any(|rows| {
+            let r: Vec<f64> = rows.map(|row| block.residual[row]).collect();
+            let n = r.len();
+            if n < 5 * LAGS {
+                return false;
+            }
+            let power: f64 = r.iter().map(|v| v * v).sum();
+            let part = |lag: usize| (lag..n).map(|i| r[i] * r[i - lag]).sum::<f64>() / power;
+            let q: f64 = (1..=LAGS).map(|lag| part(lag).powi(2) / (n - lag) as f64).sum::<f64>() * (n * (n + 2)) as f64;
+            q > CHI2_LAGS
+        })
+    })
+}
+
+/// The rows of each angle in a recording's block.
+fn links_of(problem: &Problem<'_>, record: usize) -> Vec<std::ops::Range<usize>> {
+    let mut first = 0;
+    let data = &problem.records[record];
+    data.theta_rad
+        .iter()
+        .map(|angles| {
+            let count = angles.iter().flatten().count();
+            first += count;
+            first - count..first
+        })
+        .collect()
+}
+
+fn widened(
+    problem: &Problem<'_>,
+    outcome: &Outcome,
+    slopes: &DMatrix<f64>,
+    residual: &DVector<f64>,
+    inverse: &DMatrix<f64>,
+    white: &DMatrix<f64>,
+) -> DMatrix<f64> {
+    let variables = outcome.x.len();
+    let mut middle = DMatrix::zeros(variables, variables);
+    let mut first = 0;
+    for (record, block) in outcome.blocks.iter().enumerate() {
+        let data = &problem.records[record];
+        let step_s = (data.t_s[data.len() - 1] - data.t_s[0]) / (data.len() - 1).max(1) as f64;
+        let pace_rad_s = problem.model(&outcome.x[..problem.free.len()]).map_or(9.0, |(model, _)| model.pace_rad_s());
+        // a swing and a half
+        let lags = (1.5 * std::f64::consts::TAU / pace_rad_s / step_s).ceil() as usize;
+        // the angles of one instant belong together
+        let mut scores = DMatrix::<f64>::zeros(variables, data.len());
+        for (link, rows) in links_of(problem, record).into_iter().enumerate() {
+            let measured = (0..data.len()).filter(|row| data.theta_rad[link][*row].is_some());
+            for (row, instant) in rows.zip(measured) {
+                let at = first + row;
+                for i in 0..variables {
+                    scores[(i, instant)] += slopes[(at, i)] * residual[at];
+                }
+            }
+        }
+        middle += &scores * scores.transpose();
+        for lag in 1..=lags.min(data.len() / 4) {
+            let weight = 1.0 - lag as f64 / (lags + 1) as f64;
+            let count = data.len() - lag;
+            let product: DMatrix<f64> = scores.columns(lag, count) * scores.columns(0, count).transpose();
+            middle += (&product + product.transpose()) * weight;
+        }
+        first += block.residual.len();
+    }
+    let robust = inverse * middle * inverse;
+    // never narrower than white residuals of the same size
+    let factor = DVector::from_fn(variables, |i, _| (robust[(i, i)] / white[(i, i)].max(1e-300)).max(1.0).sqrt());
+    DMatrix::from_fn(variables, variables, |i, j| white[(i, j)] * factor[i] * factor[j])
+}
+
+/// How the least squares rise when one parameter is moved, all others following.
+struct Profile<'a, 'b> {
+    problem: &'a Problem<'b>,
+    outcome: &'a Outcome,
+    inverse: &'a DMatrix<f64>,
+    variance: f64,
+    index: usize,
+    /// With correlated residuals wider than the curvature's.
+    sd: f64,
+    lower: f64,
+}
+
+impl Profile<'_, '_> {
+    /// The end of the 95 % interval towards one side.
+    fn end(&self, side: f64) -> f64 {
+        let value = self.outcome.x[self.index];
+        let curved = (self.inverse[(self.index, self.index)] * self.variance).sqrt();
+        let widening = (self.sd / curved.max(1e-300)).max(1.0);
+        let limit = CHI2_95 * self.variance * widening * widening;
+        let quadratic = value + side * Z95 * self.sd;
+        if side < 0.0 && quadratic <= self.lower {
+            // the bound cuts it, unless the profile rises before
+            let rise = self.rise(self.lower);
+            return if rise <= limit { self.lower } else { self.search(value, self.lower, limit) };
+        }
+        // along the line of the curvature the rise is at least the profile's
+        let rise = self.rise(quadratic);
+        if (rise / limit - 1.0).abs() < 0.1 {
+            return quadratic;
+        }
+        let outer = if rise > limit { quadratic } else { value + side * 4.0 * Z95 * self.sd };
+        self.search(value, outer.max(self.lower), limit)
+    }
+
+    /// The place between `inside` and `outer` where the rise is the limit; `outer` where it is not reached.
+    fn search(&self, inside: f64, outer: f64, limit: f64) -> f64 {
+        let (mut inside, mut outer) = (inside, outer);
+        if self.rise(outer) < limit {
+            return outer;
+        }
+        for _ in 0..6 {
+            let middle = 0.5 * (inside + outer);
+            if self.rise(middle) < limit {
+                inside = middle;
+            } else {
+                outer = middle;
+            }
+        }
+        0.5 * (inside + outer)
+    }
+
+    /// Σr² with the parameter at a value and all others at their best on the line of the curvature, less that at the minimum.
+    fn rise(&self, at: f64) -> f64 {
+        let step = at - self.outcome.x[self.index];
+        let own = self.inverse[(self.index, self.index)];
+        let lower = self.problem.lower();
+        let moved: Vec<f64> = (0..self.outcome.x.len())
+            .map(|i| (self.outcome.x[i] + step * self.inverse[(i, self.index)] / own).max(lower[i]))
+            .collect();
+        let cost = |blocks: Vec<super::descent::Block>| blocks.iter().map(|b| b.residual.norm_squared()).sum::<f64>();
+        self.problem.blocks(&moved).map_or(f64::INFINITY, |blocks| cost(blocks) - self.outcome.cost)
+    }
+}
+
+/// Directions in the logarithms of the parameters that are less certain than a factor e.
+fn undetermined(problem: &Problem<'_>, outcome: &Outcome, covariance: &DMatrix<f64>) -> Vec<Vec<(Parameter, f64)>> {
+    let free = problem.free.len();
+    if free == 0 {
+        return Vec::new();
+    }
+    let size = |i: usize| outcome.x[i].abs().max(1e-300);
+    let relative = DMatrix::from_fn(free, free, |i, j| covariance[(i, j)] / (size(i) * size(j)));
+    let clamped = relative.map(|v| v.clamp(-1e12, 1e12));
+    let eigen = SymmetricEigen::new(clamped);
+    (0..free)
+        .filter(|k| eigen.eigenvalues[*k].max(0.0).sqrt() > UNDETERMINED)
+        .map(|k| {
+            let shares = (0..free).map(|i| (problem.free[i], eigen.eigenvectors[(i, k)]));
+            shares.filter(|(_, share)| share.abs() > 0.1).collect()
+        })
+        .collect()
+}

@@ -1,0 +1,192 @@
+//! Trajectory least squares: the forward model's parameters from one or several recordings of one specimen.
+//!
+//! | file | holds |
+//! |---|---|
+//! | [`record`] | the angles of a recording |
+//! | [`predict`] | what the model says the camera sees |
+//! | [`problem`] | what is fitted to what |
+//! | [`shooting`] | multiple shooting: start values that cannot be out of step |
+//! | [`descent`] | Levenberg–Marquardt with bounds |
+//! | [`interval`] | standard deviations and 95 % intervals |
+//! | [`verdict`] | does the model reproduce the recording? |
+//!
+//! Output error: the motion from the first row on is the model's own, and the residual is what the recording shows beyond it. Each recording's
+//! initial angles and rates are free.
+
+pub mod descent;
+pub mod interval;
+pub mod predict;
+pub mod problem;
+pub mod record;
+pub mod shooting;
+pub mod verdict;
+
+use crate::error::{Error, Result};
+use crate::experiment::Experiment;
+use crate::model::Parameter;
+
+pub use descent::{Descent, Ending};
+pub use interval::Estimate;
+pub use predict::Prediction;
+pub use problem::Problem;
+pub use record::Record;
+pub use verdict::Verdict;
+
+/// Residuals beyond this many standard deviations of their neighbours are outliers.
+const OUTLIER: f64 = 6.0;
+
+/// A fitted model.
+#[derive(Debug, Clone)]
+pub struct Fit {
+    /// The free parameters.
+    pub estimates: Vec<Estimate>,
+    /// Correlation of every pair of them.
+    pub correlation: nalgebra::DMatrix<f64>,
+    /// Combinations of parameters that the recordings do not determine: the logarithmic share of each parameter.
+    pub undetermined: Vec<Vec<(Parameter, f64)>>,
+    /// Angles between marks and their rates at each recording's first row.
+    pub starts: Vec<Vec<f64>>,
+    /// What each recording shows beyond the model.
+    pub residuals: Vec<Residuals>,
+    /// Rows left out as outliers, of each recording: link and row.
+    pub outliers: Vec<Vec<(usize, usize)>>,
+    /// Steps of the last descent.
+    pub steps: usize,
+    /// How it ended.
+    pub ending: Ending,
+    /// Whether the residuals are correlated in time, so that the intervals are widened.
+    pub coloured: bool,
+}
+
+/// The residuals of one recording.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Residuals {
+    /// Stamp, measured, predicted and predicted rate of every value, `[link]`.
+    pub values: Vec<Vec<Residual>>,
+    /// Root mean square of each angle.
+    pub rmse_rad: Vec<f64>,
+    /// Noise of each angle: what is left when the model may start anew every swing or two.
+    pub noise_rad: Vec<f64>,
+}
+
+/// One measured angle beside the model's.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Residual {
+    /// Stamp.
+    pub t_s: f64,
+    /// Measured angle.
+    pub measured_rad: f64,
+    /// The model's.
+    pub predicted_rad: f64,
+    /// The model's rate.
+    pub rate_rad_s: f64,
+}
+
+impl Residual {
+    /// Measured less predicted.
+    pub fn left_rad(&self) -> f64 {
+        self.measured_rad - self.predicted_rad
+    }
+}
+
+impl Fit {
+    /// The estimate of a parameter.
+    pub fn estimate(&self, parameter: Parameter) -> Option<&Estimate> {
+        self.estimates.iter().find(|e| e.parameter == parameter)
+    }
+}
+
+/// Fits the free parameters and every recording's start.
+///
+/// The start values of the parameters are those of `experiment.model`. First multiple shooting ([`shooting`]), then whole recordings as one motion
+/// each, with outliers left out.
+///
+/// # Errors
+/// [`Error::Option`], [`Error::Simulation`]: see [`Problem::new`]; and where no motion near the start values can be integrated.
+pub fn fit(records: &[Record], experiment: &Experiment, free: &[Parameter]) -> Result<Fit> {
+    let mut problem = Problem::new(records, experiment, free)?;
+    let start = shooting::multiple_shooting(&mut problem)?;
+    let noise_rad = problem.noise_rad.clone();
+    problem.learn_noise(&[], 0);
+    let refused = || Error::Simulation { detail: "no motion near the start values follows the recording; check [specimen] and [model]".into() };
+    let lower = problem.lower();
+    let robust = Descent { huber: 4.0, most_steps: 30, enough: 1e-3 };
+    let first = robust.run(start, &lower, |x| problem.blocks(x)).ok_or_else(refused)?;
+    let (kept, outliers) = without_outliers(&problem, &first.x)?;
+    let problem = Problem { records: &kept, ..problem };
+    let outcome = Descent { most_steps: 30, ..Descent::default() }.run(first.x, &lower, |x| problem.blocks(x)).ok_or_else(refused)?;
+    let uncertainty = interval::uncertainty(&problem, &outcome);
+    let residuals = residuals(&problem, &outcome.x, &noise_rad)?;
+    let (marks, free) = (problem.marks(), problem.free.len());
+    Ok(Fit {
+        starts: outcome.x[free..].chunks(2 * marks).map(<[f64]>::to_vec).collect(),
+        estimates: uncertainty.estimates,
+        correlation: uncertainty.correlation,
+        undetermined: uncertainty.undetermined,
+        coloured: uncertainty.coloured,
+        residuals,
+        outliers,
+        steps: first.steps + outcome.steps,
+        ending: outcome.ending,
+    })
+}
+
+/// The recordings without values that stand out from their neighbours: by more than six robust standard deviations from the median residual
+/// of the seven around. A misfit of the model moves neighbours together and is no outlier.
+fn without_outliers(problem: &Problem<'_>, x: &[f64]) -> Result<(Vec<Record>, Vec<Vec<(usize, usize)>>)> {
+    let mut kept = problem.records.to_vec();
+    let mut outliers = vec![Vec::new(); kept.len()];
+    for (index, record) in kept.iter_mut().enumerate() {
+        let prediction = problem.predict(index, x)?;
+        let block = problem.block(index, &prediction, Vec::new());
+        for link in 0..record.links() {
+            let own: Vec<(usize, f64)> = (prediction.values.iter().zip(block.residual.iter()))
+                .filter(|(value, _)| value.link == link)
+                .map(|(value, r)| (value.row, *r))
+                .collect();
+            let apart: Vec<f64> = (0..own.len())
+                .map(|i| {
+                    let around = &own[i.saturating_sub(3)..(i + 4).min(own.len())];
+                    own[i].1 - median(around.iter().map(|a| a.1).collect())
+                })
+                .collect();
+            let scale = 1.4826 * median(apart.iter().map(|a| a.abs()).collect());
+            for ((row, _), apart) in own.iter().zip(&apart) {
+                if apart.abs() > OUTLIER * scale.max(f64::MIN_POSITIVE) && *row > 0 {
+                    record.theta_rad[link][*row] = None;
+                    outliers[index].push((link, *row));
+                }
+            }
+        }
+    }
+    Ok((kept, outliers))
+}
+
+fn residuals(problem: &Problem<'_>, x: &[f64], noise_rad: &[Vec<f64>]) -> Result<Vec<Residuals>> {
+    (0..problem.records.len())
+        .map(|index| {
+            let record = &problem.records[index];
+            let mut values = vec![Vec::new(); record.links()];
+            for value in problem.predict(index, x)?.values {
+                if let Some(measured_rad) = record.theta_rad[value.link][value.row] {
+                    let t_s = record.t_s[value.row];
+                    let (predicted_rad, rate_rad_s) = (value.predicted_rad, value.rate_rad_s);
+                    values[value.link].push(Residual { t_s, measured_rad, predicted_rad, rate_rad_s });
+                }
+            }
+            let rms = |of: &Vec<Residual>| {
+                (of.iter().map(|r| r.left_rad().powi(2)).sum::<f64>() / of.len().max(1) as f64).sqrt()
+            };
+            let rmse_rad = values.iter().map(rms).collect();
+            Ok(Residuals { rmse_rad, values, noise_rad: noise_rad[index].clone() })
+        })
+        .collect()
+}
+
+fn median(mut values: Vec<f64>) -> f64 {
+    if values.is_empty() {
+        return 0.0;
+    }
+    let middle = values.len() / 2;
+    *values.select_nth_unstable_by(middle, f64::total_cmp).1
+}

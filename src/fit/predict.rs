@@ -1,0 +1,169 @@
+//! What the model says the camera sees, with derivatives.
+
+use std::ops::Range;
+
+use nalgebra::DMatrix;
+
+use super::Record;
+use crate::error::{Error, Result};
+use crate::model::integrate::Directions;
+use crate::model::observe::{chord_angles_rad, chord_slopes, links_from_chords};
+use crate::model::step::StepPlace;
+use crate::model::{Accuracy, Camera, ForwardModel, Parameter, State, Trajectory};
+
+/// The angles predicted for some rows, and their derivatives.
+#[derive(Debug, Clone)]
+pub struct Prediction {
+    /// One entry a measured value, link after link.
+    pub values: Vec<Value>,
+    /// ∂angle: a row each value; columns are the parameters, then the angles between marks at the start, then their rates.
+    pub slopes: DMatrix<f64>,
+    /// Angles between marks and their rates where the next stretch begins, with derivatives of each (columns as above).
+    pub end: (Vec<f64>, DMatrix<f64>),
+}
+
+/// One measured value and its prediction.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Value {
+    /// Which angle.
+    pub link: usize,
+    /// Which row of the table.
+    pub row: usize,
+    /// The angle as it should be seen.
+    pub predicted_rad: f64,
+    /// Rate of the angle as seen.
+    pub rate_rad_s: f64,
+}
+
+/// What a prediction needs besides the model.
+#[derive(Debug, Clone, Copy)]
+pub struct Request<'a> {
+    /// The recording.
+    pub record: &'a Record,
+    /// Rows to predict; the motion starts at the first.
+    pub rows: &'a Range<usize>,
+    /// Angles between marks at the first row, then their rates.
+    pub start: &'a [f64],
+    /// The camera.
+    pub camera: &'a Camera,
+    /// Parameters to take derivatives with.
+    pub parameters: &'a [Parameter],
+    /// Stamp to which the motion is carried on.
+    pub until_s: f64,
+    /// Of the integration.
+    pub accuracy: &'a Accuracy,
+}
+
+/// Predicts the angles of some rows.
+///
+/// # Errors
+/// [`Error::Simulation`] where the motion cannot be integrated.
+pub fn predict(model: &ForwardModel, request: &Request<'_>) -> Result<Prediction> {
+    let Request { record, rows, start, parameters, accuracy, .. } = *request;
+    let marks = record.links();
+    let chain = model.chain();
+    let (theta_rad, spread) = links_from_chords(chain, &start[..marks]);
+    let (omega_rad_s, _) = links_from_chords(chain, &start[marks..]);
+    let (n, m) = (chain.count(), model.rates());
+    let mut seeds = (DMatrix::zeros(n, 2 * marks), DMatrix::zeros(m, 2 * marks));
+    seeds.0.view_mut((0, 0), (n, marks)).copy_from(&spread);
+    seeds.1.view_mut((0, marks), (n, marks)).copy_from(&spread);
+    let directions = Directions { parameters: parameters.to_vec(), theta: seeds.0, rate: seeds.1 };
+    let start_s = record.t_s[rows.start];
+    let mut camera = Camera { origin_s: start_s, ..*request.camera };
+    if start_s >= camera.dropped_at_s {
+        // the motion starts after the missing frames
+        (camera.dropped_s, camera.dropped_at_s) = (0.0, f64::INFINITY);
+    }
+    let ends_s = [0, 1].map(|link| camera.true_time_s(request.until_s, link));
+    let latest_s = ends_s[0].max(ends_s[1]) + 1e-9;
+    let state = State { theta_rad, omega_rad_s, hidden: Vec::new() };
+    let swing = Trajectory::with(model, &state, (start_s, latest_s), Some(&directions), accuracy)?;
+    let columns = parameters.len() + 2 * marks;
+    let mut values = Vec::with_capacity(record.values(rows.clone()));
+    let mut flat = Vec::with_capacity(values.capacity() * columns);
+    let mut row_slopes = vec![0.0; columns];
+    for link in 0..marks {
+        for row in rows.clone().filter(|row| record.theta_rad[link][*row].is_some()) {
+            let t_s = record.t_s[row];
+            row_slopes.fill(0.0);
+            let (theta, omega) = seen(chain, &swing, camera.true_time_s(t_s, link), link, &mut row_slopes)
+                .ok_or_else(|| Error::Simulation { detail: "a motion of no length".into() })?;
+            let gain = 1.0 + camera.gain;
+            row_slopes.iter_mut().for_each(|s| *s *= gain);
+            for (column, parameter) in parameters.iter().enumerate() {
+                row_slopes[column] += camera.slope(*parameter, t_s, link, theta, omega);
+            }
+            flat.extend_from_slice(&row_slopes);
+            values.push(Value { link, row, predicted_rad: camera.seen_rad(theta), rate_rad_s: gain * omega });
+        }
+    }
+    let slopes = DMatrix::from_row_slice(values.len(), columns, &flat);
+    Ok(Prediction { values, slopes, end: end_of(model, &swing, request, &camera)? })
+}
+
+/// Angle between marks and its rate at a true time; its derivatives are added to `slopes`.
+fn seen(
+    chain: &crate::model::Chain,
+    swing: &Trajectory,
+    true_s: f64,
+    link: usize,
+    slopes: &mut [f64],
+) -> Option<(f64, f64)> {
+    let (step, tau) = swing.step_at(true_s)?;
+    let at = StepPlace::at(tau);
+    let group = &chain.groups()[link];
+    // a lag may reach a little before the start
+    let missed_s = true_s.min(step.from_s + tau * step.length_s) - (step.from_s + tau * step.length_s);
+    if group.len() == 1 {
+        step.add_angle_slopes(group.start, &at, 1.0, slopes);
+        let (theta, omega) = step.link(group.start, &at);
+        return Some((theta + omega * missed_s, omega));
+    }
+    let (theta, rate) = (step.theta_rad(tau), step.rate(tau));
+    let along = chord_slopes(chain, &theta);
+    let mut omega = 0.0;
+    for member in group.clone() {
+        step.add_angle_slopes(member, &at, along[(link, member)], slopes);
+        omega += along[(link, member)] * rate[member];
+    }
+    Some((chord_angles_rad(chain, &theta)[link] + omega * missed_s, omega))
+}
+
+fn end_of(
+    model: &ForwardModel,
+    swing: &Trajectory,
+    request: &Request<'_>,
+    camera: &Camera,
+) -> Result<(Vec<f64>, DMatrix<f64>)> {
+    let (chain, marks) = (model.chain(), request.record.links());
+    let instant = swing
+        .instant(camera.true_time_s(request.until_s, 0))
+        .ok_or_else(|| Error::Simulation { detail: "a motion of no length".into() })?;
+    let (theta, rate) = instant.slopes.unwrap_or_else(|| (DMatrix::zeros(0, 0), DMatrix::zeros(0, 0)));
+    let along = chord_slopes(chain, &instant.theta_rad);
+    let n = chain.count();
+    let omega = nalgebra::DVector::from_column_slice(&instant.rate[..n]);
+    let mut values = chord_angles_rad(chain, &instant.theta_rad);
+    values.extend((&along * omega).iter());
+    let columns = request.parameters.len() + 2 * marks;
+    let mut slopes = DMatrix::zeros(2 * marks, columns);
+    slopes.rows_mut(0, marks).copy_from(&(&along * theta));
+    slopes.rows_mut(marks, marks).copy_from(&(&along * rate.rows(0, n)));
+    // the camera's clock moves the instant itself
+    for (column, parameter) in request.parameters.iter().enumerate() {
+        for link in 0..marks {
+            let clock = Camera { gain: 0.0, ..*camera };
+            let moved = match parameter {
+                Parameter::TimeBase | Parameter::DroppedFrames => {
+                    clock.slope(*parameter, request.until_s, 0, 0.0, 1.0)
+                }
+                _ => 0.0,
+            };
+            let acceleration: f64 = (0..n).map(|i| along[(link, i)] * instant.acceleration[i]).sum();
+            slopes[(link, column)] += moved * values[marks + link];
+            slopes[(marks + link, column)] += moved * acceleration;
+        }
+    }
+    Ok((values, slopes))
+}

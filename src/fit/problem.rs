@@ -1,0 +1,229 @@
+//! What is fitted to what: the recordings, the model with its free parameters, the noise.
+
+use nalgebra::{DMatrix, DVector};
+
+use super::descent::Block;
+use super::predict::{Request, predict};
+use super::{Prediction, Record};
+use crate::error::{Error, Result};
+use crate::experiment::{Experiment, Hysteresis, SupportMotion};
+use crate::model::{Accuracy, Camera, ForwardModel, Parameter};
+
+/// A model with free parameters, and recordings of one specimen.
+///
+/// The variables of a fit are the free parameters, then for each recording the angles between marks at its first row and their rates.
+#[derive(Debug)]
+pub struct Problem<'a> {
+    /// The recordings.
+    pub records: &'a [Record],
+    /// The parameters that are free.
+    pub free: Vec<Parameter>,
+    /// The model, its coefficients at their start values.
+    pub experiment: Experiment,
+    /// Noise of each angle of each recording, `[record][link]`.
+    pub noise_rad: Vec<Vec<f64>>,
+    /// Of the integration.
+    pub accuracy: Accuracy,
+    /// From this stamp on frames may be missing, where that is asked.
+    pub dropped_at_s: f64,
+}
+
+impl<'a> Problem<'a> {
+    /// A problem with some free parameters. Laws that are off are switched on with a coefficient of zero.
+    ///
+    /// # Errors
+    /// [`Error::Option`] for a parameter that this specimen does not have; [`Error::Simulation`] for a specimen that cannot swing.
+    pub fn new(records: &'a [Record], experiment: &Experiment, free: &[Parameter]) -> Result<Self> {
+        let mut experiment = experiment.clone();
+        free.iter().for_each(|parameter| switch_on(&mut experiment, *parameter));
+        let model = ForwardModel::of(&experiment)?;
+        for parameter in free {
+            let of_joint = matches!(
+                parameter,
+                Parameter::JointStiffness
+                    | Parameter::JointDamping
+                    | Parameter::RestCurl
+                    | Parameter::JointCubicStiffness
+                    | Parameter::HysteresisTorque
+                    | Parameter::HysteresisYield
+                    | Parameter::DifferentialLag
+            );
+            if of_joint && model.chain().count() < 2 {
+                let message = "this specimen has one link and no joint; leave it out".to_owned();
+                return Err(Error::Option { option: parameter.id().to_owned(), message });
+            }
+        }
+        Ok(Self {
+            records,
+            free: free.to_vec(),
+            experiment,
+            noise_rad: records.iter().map(|r| vec![1e-3; r.links()]).collect(),
+            accuracy: Accuracy::default(),
+            dropped_at_s: f64::INFINITY,
+        })
+    }
+
+    /// Number of angles, and as many rates, at each start.
+    pub fn marks(&self) -> usize {
+        self.records.first().map_or(0, Record::links)
+    }
+
+    /// Number of variables.
+    pub fn variables(&self) -> usize {
+        self.free.len() + self.records.len() * 2 * self.marks()
+    }
+
+    /// Where a recording's start stands among the variables.
+    pub fn start_of(&self, record: usize) -> usize {
+        self.free.len() + record * 2 * self.marks()
+    }
+
+    /// The start values of the free parameters.
+    pub fn start_values(&self) -> Result<Vec<f64>> {
+        let (model, camera) = self.model(&[])?;
+        let value = |p: &Parameter| camera.value(*p).or_else(|| model.value(*p)).unwrap_or(0.0);
+        Ok(self.free.iter().map(value).collect())
+    }
+
+    /// Lower bounds of all variables.
+    pub fn lower(&self) -> Vec<f64> {
+        let mut lower = vec![f64::NEG_INFINITY; self.variables()];
+        for (bound, parameter) in lower.iter_mut().zip(&self.free) {
+            if parameter.is_not_negative() {
+                // a yield angle or a frequency of zero has no meaning
+                *bound = if matches!(parameter, Parameter::HysteresisYield | Parameter::SupportFrequency) { 1e-4 } else { 0.0 };
+            }
+        }
+        lower
+    }
+
+    /// The model and the camera with values for the first of the free parameters.
+    ///
+    /// # Errors
+    /// [`Error::Simulation`].
+    pub fn model(&self, values: &[f64]) -> Result<(ForwardModel, Camera)> {
+        let mut model = ForwardModel::of(&self.experiment)?;
+        let mut camera = Camera::of(&self.experiment.model.effects, 0.0, self.dropped_at_s);
+        for (parameter, value) in self.free.iter().zip(values) {
+            model.set(*parameter, *value);
+            camera.set(*parameter, *value);
+        }
+        Ok((model, camera))
+    }
+
+    /// Predicts all rows of one recording.
+    ///
+    /// # Errors
+    /// [`Error::Simulation`].
+    pub fn predict(&self, record: usize, x: &[f64]) -> Result<Prediction> {
+        let (model, camera) = self.model(&x[..self.free.len()])?;
+        let start = self.start_of(record);
+        let data = &self.records[record];
+        let request = Request {
+            record: data,
+            rows: &(0..data.len()),
+            start: &x[start..start + 2 * self.marks()],
+            camera: &camera,
+            parameters: &self.free,
+            until_s: data.t_s[data.len() - 1],
+            accuracy: &self.accuracy,
+        };
+        predict(&model, &request)
+    }
+
+    /// The residuals of all recordings, each as one motion from its first row; `None` where it cannot be integrated.
+    pub fn blocks(&self, x: &[f64]) -> Option<Vec<Block>> {
+        (0..self.records.len())
+            .map(|record| {
+                let prediction = self.predict(record, x).ok()?;
+                let start = self.start_of(record);
+                let columns = (0..self.free.len()).chain(start..start + 2 * self.marks()).collect();
+                Some(self.block(record, &prediction, columns))
+            })
+            .collect()
+    }
+
+    /// The residuals of a prediction over their noise.
+    pub fn block(&self, record: usize, prediction: &Prediction, columns: Vec<usize>) -> Block {
+        let data = &self.records[record];
+        let weight = |link: usize, row: usize| 1.0 / (self.noise_rad[record][link] * data.relative_sd[link][row]);
+        let mut slopes = prediction.slopes.clone();
+        let mut residual = DVector::zeros(prediction.values.len());
+        for (i, value) in prediction.values.iter().enumerate() {
+            let weight = weight(value.link, value.row);
+            let measured_rad = data.theta_rad[value.link][value.row].unwrap_or(value.predicted_rad);
+            residual[i] = weight * (value.predicted_rad - measured_rad);
+            slopes.row_mut(i).scale_mut(weight);
+        }
+        Block { columns, residual, slopes, robust: true }
+    }
+
+    /// Sets the noise to what some residuals (in units of the present noise) say, robustly, and the accuracy of the integration with it.
+    pub fn learn_noise(&mut self, residuals: &[(usize, usize, f64)], variables: usize) {
+        for record in 0..self.records.len() {
+            for link in 0..self.marks() {
+                let of = |r: &&(usize, usize, f64)| r.0 == record && r.1 == link;
+                let mut sizes: Vec<f64> = residuals.iter().filter(of).map(|r| r.2.abs()).collect();
+                if sizes.len() < 4 {
+                    continue;
+                }
+                let middle = sizes.len() / 2;
+                let median = *sizes.select_nth_unstable_by(middle, f64::total_cmp).1;
+                let freedom = residuals.len().saturating_sub(variables).max(1) as f64 / residuals.len() as f64;
+                let factor = 1.4826 * median / freedom.sqrt();
+                // an exact table still has the digits it was written with
+                self.noise_rad[record][link] = (self.noise_rad[record][link] * factor).max(1e-9);
+            }
+        }
+        let least = self.noise_rad.iter().flatten().copied().fold(f64::INFINITY, f64::min);
+        self.accuracy.step_error_rad = (3e-5 * least).clamp(1e-11, 1e-7);
+    }
+}
+
+/// The derivatives of a fit's blocks with all variables, and their residuals, one row after another.
+pub fn stacked(blocks: &[Block], variables: usize) -> (DVector<f64>, DMatrix<f64>) {
+    let rows: usize = blocks.iter().map(|b| b.residual.len()).sum();
+    let (mut residual, mut slopes) = (DVector::zeros(rows), DMatrix::zeros(rows, variables));
+    let mut first = 0;
+    for block in blocks {
+        let count = block.residual.len();
+        residual.rows_mut(first, count).copy_from(&block.residual);
+        for (own, column) in block.columns.iter().enumerate() {
+            slopes.view_mut((first, *column), (count, 1)).copy_from(&block.slopes.column(own));
+        }
+        first += count;
+    }
+    (residual, slopes)
+}
+
+fn switch_on(experiment: &mut Experiment, parameter: Parameter) {
+    let effects = &mut experiment.model.effects;
+    let on = |effect: &mut Option<f64>| {
+        effect.get_or_insert(0.0);
+    };
+    match parameter {
+        Parameter::JointStiffness | Parameter::JointDamping => {}
+        Parameter::RestCurl => on(&mut effects.rest_curl),
+        Parameter::BendingStiffness => on(&mut effects.distributed_flexibility),
+        Parameter::JointCubicStiffness => on(&mut effects.joint_cubic_stiffness),
+        Parameter::HysteresisTorque | Parameter::HysteresisYield => {
+            effects.joint_hysteretic.get_or_insert(Hysteresis { torque_n_m: 0.0, yield_rad: 0.03 });
+        }
+        Parameter::HingeViscous => on(&mut effects.hinge_viscous),
+        Parameter::HingeCoulomb => on(&mut effects.hinge_coulomb),
+        Parameter::HingeStiffness => on(&mut effects.hinge_stiffness),
+        Parameter::AirLinear => on(&mut effects.air_linear),
+        Parameter::AirQuadratic => on(&mut effects.air_quadratic),
+        Parameter::AddedMass => on(&mut effects.added_mass),
+        Parameter::SideForce => on(&mut effects.side_force),
+        Parameter::SupportSine | Parameter::SupportCosine | Parameter::SupportFrequency => {
+            let still = SupportMotion { amplitude_m: 0.0, frequency_hz: 1.0, phase_rad: 0.0 };
+            effects.support_motion.get_or_insert(still);
+        }
+        Parameter::TimeBase => on(&mut effects.time_base),
+        Parameter::DroppedFrames => on(&mut effects.dropped_frames),
+        Parameter::CameraTilt => on(&mut effects.camera_tilt),
+        Parameter::AngleGain => on(&mut effects.angle_gain),
+        Parameter::DifferentialLag => on(&mut effects.differential_lag),
+    }
+}

@@ -1,0 +1,118 @@
+//! The angles of a recording, ready to be fitted.
+
+use std::ops::Range;
+use std::path::PathBuf;
+
+use crate::error::{Error, Result};
+use crate::series::AngleSeries;
+
+/// One recording of a specimen.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Record {
+    /// For messages.
+    pub path: PathBuf,
+    /// Time stamps.
+    pub t_s: Vec<f64>,
+    /// `[link][row]`; absent where it was not measured.
+    pub theta_rad: Vec<Vec<Option<f64>>>,
+    /// Relative standard deviation of each value, `[link][row]`: 1 where the table says nothing.
+    pub relative_sd: Vec<Vec<f64>>,
+}
+
+impl Record {
+    /// The angles of a table with the given number of links; standard deviations in it count relative to each other.
+    ///
+    /// # Errors
+    /// [`Error::Table`] when the number of angles is not the model's.
+    pub fn of(series: &AngleSeries, links: usize) -> Result<Self> {
+        if series.links() != links {
+            let message = format!(
+                "has {} angle{}, and the specimen {links} link{}; describe the specimen as it was filmed (specimen.link_lengths_m or [[specimen.links]])",
+                series.links(),
+                if series.links() == 1 { "" } else { "s" },
+                if links == 1 { "" } else { "s" },
+            );
+            return Err(Error::Table { path: series.path.clone(), line: None, message });
+        }
+        let relative_sd = series.sd_rad.iter().map(|sd| relative(sd)).collect();
+        Ok(Self {
+            path: series.path.clone(),
+            t_s: series.t_s.clone(),
+            theta_rad: series.theta_rad.clone(),
+            relative_sd,
+        })
+    }
+
+    /// Number of angles.
+    pub fn links(&self) -> usize {
+        self.theta_rad.len()
+    }
+
+    /// Number of rows.
+    pub fn len(&self) -> usize {
+        self.t_s.len()
+    }
+
+    /// Whether there is no row.
+    pub fn is_empty(&self) -> bool {
+        self.t_s.is_empty()
+    }
+
+    /// Number of values in some rows.
+    pub fn values(&self, rows: Range<usize>) -> usize {
+        self.theta_rad.iter().map(|angles| angles[rows.clone()].iter().flatten().count()).sum()
+    }
+
+    /// Angle and rate of each link at a row, from a cubic through the values nearby; the rms of what the cubic leaves comes third.
+    /// Where nothing was measured nearby, the nearest value at rest.
+    pub fn state_near(&self, row: usize, reach_s: f64) -> Vec<[f64; 3]> {
+        let t0_s = self.t_s[row];
+        self.theta_rad
+            .iter()
+            .map(|angles| {
+                let nearby = |reach_s: f64| -> Vec<(f64, f64)> {
+                    let inside = |i: &usize| (self.t_s[*i] - t0_s).abs() <= reach_s;
+                    let (below, above) = ((0..row).rev().take_while(inside), (row..self.len()).take_while(inside));
+                    below.chain(above).filter_map(|i| Some((self.t_s[i] - t0_s, angles[i]?))).collect()
+                };
+                let mut points = nearby(reach_s);
+                if points.len() < 5 {
+                    points = nearby(2.0 * reach_s);
+                }
+                local_cubic(&points).unwrap_or_else(|| {
+                    let nearest = (0..self.len())
+                        .filter_map(|i| Some(((self.t_s[i] - t0_s).abs(), angles[i]?)))
+                        .min_by(|a, b| a.0.total_cmp(&b.0));
+                    [nearest.map_or(0.0, |(_, angle)| angle), 0.0, 0.0]
+                })
+            })
+            .collect()
+    }
+}
+
+/// Value, slope and residual rms at zero of the cubic (or the highest lower power) through some points.
+fn local_cubic(points: &[(f64, f64)]) -> Option<[f64; 3]> {
+    if points.len() < 3 {
+        return None;
+    }
+    let columns = 4.min(points.len() - 1);
+    let scale = points.iter().fold(0.0f64, |a, p| a.max(p.0.abs())).max(f64::MIN_POSITIVE);
+    let basis = nalgebra::DMatrix::from_fn(points.len(), columns, |i, k| (points[i].0 / scale).powi(k as i32));
+    let values = nalgebra::DVector::from_iterator(points.len(), points.iter().map(|p| p.1));
+    let fitted = basis.clone().svd(true, true).solve(&values, 1e-10).ok()?;
+    let left = values - basis * &fitted;
+    let freedom = (points.len() - columns).max(1) as f64;
+    Some([fitted[0], fitted[1] / scale, (left.norm_squared() / freedom).sqrt()])
+}
+
+/// Standard deviations over their median; a value without one counts like the median.
+fn relative(sd_rad: &[Option<f64>]) -> Vec<f64> {
+    let mut stated: Vec<f64> = sd_rad.iter().flatten().copied().filter(|sd| *sd > 0.0).collect();
+    if stated.is_empty() {
+        return vec![1.0; sd_rad.len()];
+    }
+    let middle = stated.len() / 2;
+    let median = *stated.select_nth_unstable_by(middle, f64::total_cmp).1;
+    // a stated error of next to nothing must not outweigh everything else
+    sd_rad.iter().map(|sd| sd.map_or(1.0, |sd| (sd / median).clamp(0.3, 30.0))).collect()
+}

@@ -1,0 +1,179 @@
+//! Multiple shooting: the recording in short stretches, each with a start of its own, drawn together into one motion.
+//!
+//! From the start values of a file a motion of a minute soon swings out of step with the recording, and its least squares have many false
+//! minima. A stretch of a swing or two cannot: its own start comes from the recording, and the parameters from all stretches at once. What is
+//! left at the seams (the defects) is then made to vanish step by step.
+
+use std::ops::Range;
+
+use nalgebra::{DMatrix, DVector};
+
+use super::descent::{Block, Descent};
+use super::predict::{Request, predict};
+use super::{Problem, Record};
+use crate::error::Result;
+use crate::model::Accuracy;
+
+/// Standard deviations of the seams (in units of the noise), from loose to tight.
+const SEAMS: [f64; 4] = [300.0, 30.0, 3.0, 0.3];
+/// Steps of the descent for each.
+const STEPS_EACH: usize = 8;
+/// Length of a stretch, in periods of the model's pace.
+const PERIODS: f64 = 1.5;
+/// Fewest values a stretch holds for each number in its start.
+const VALUES_EACH: usize = 5;
+
+/// A stretch of a recording.
+struct Stretch {
+    record: usize,
+    rows: Range<usize>,
+    /// Where the next one begins; the last row of the recording for the last.
+    until_s: f64,
+    last: bool,
+}
+
+/// Start values for a fit of whole recordings: the parameters, then each recording's start; and the noise of every angle on the way.
+///
+/// # Errors
+/// [`crate::Error::Simulation`] where the specimen cannot swing.
+pub fn multiple_shooting(problem: &mut Problem<'_>) -> Result<Vec<f64>> {
+    let (model, _) = problem.model(&[])?;
+    let pace_rad_s = model.pace_rad_s();
+    let length_s = PERIODS * std::f64::consts::TAU / pace_rad_s;
+    let stretches = stretches(problem, length_s);
+    let marks = problem.marks();
+    let mut x = problem.start_values()?;
+    let free = x.len();
+    // wide enough to even out the noise, short enough for a cubic to follow the second mode
+    let reach_s = 0.35 / pace_rad_s;
+    let mut left: Vec<Vec<Vec<f64>>> = vec![vec![Vec::new(); marks]; problem.records.len()];
+    for stretch in &stretches {
+        let near = problem.records[stretch.record].state_near(stretch.rows.start, reach_s);
+        x.extend(near.iter().map(|n| n[0]));
+        x.extend(near.iter().map(|n| n[1]));
+        near.iter().enumerate().for_each(|(link, n)| left[stretch.record][link].push(n[2]));
+    }
+    for (noise, left) in problem.noise_rad.iter_mut().flatten().zip(left.iter_mut().flatten()) {
+        let middle = left.len() / 2;
+        *noise = left.select_nth_unstable_by(middle, f64::total_cmp).1.clamp(1e-6, 0.05);
+    }
+    let mut lower = problem.lower();
+    lower.resize(x.len(), f64::NEG_INFINITY);
+    problem.accuracy = Accuracy { step_error_rad: 1e-6, ..Accuracy::default() };
+    for (round, seam) in SEAMS.iter().enumerate() {
+        let descent = Descent { huber: 4.0, most_steps: STEPS_EACH, enough: 1e-3 };
+        let Some(outcome) = descent.run(x.clone(), &lower, |x| blocks(problem, &stretches, x, *seam, pace_rad_s)) else {
+            break;
+        };
+        x = outcome.x;
+        if round < 2 {
+            let residuals: Vec<(usize, usize, f64)> = residuals(problem, &stretches, &x);
+            let variables = x.len();
+            problem.learn_noise(&residuals, variables);
+            problem.accuracy.step_error_rad = 1e-6;
+        }
+    }
+    let mut whole = x[..free].to_vec();
+    for (index, stretch) in stretches.iter().enumerate() {
+        if stretch.rows.start == 0 {
+            let start = free + index * 2 * marks;
+            whole.extend_from_slice(&x[start..start + 2 * marks]);
+        }
+    }
+    Ok(whole)
+}
+
+fn stretches(problem: &Problem<'_>, length_s: f64) -> Vec<Stretch> {
+    let wanted = VALUES_EACH * 2 * problem.marks();
+    problem.records.iter().enumerate().flat_map(|(index, record)| cut(index, record, length_s, wanted)).collect()
+}
+
+/// Cuts at measured rows; a gap makes its stretch longer.
+fn cut(index: usize, record: &Record, length_s: f64, wanted: usize) -> Vec<Stretch> {
+    let mut starts = vec![0];
+    for row in 1..record.len() {
+        let begun = starts[starts.len() - 1];
+        let long = record.t_s[row] - record.t_s[begun] >= length_s;
+        let measured = record.theta_rad.iter().all(|angles| angles[row].is_some());
+        if long && measured && record.values(begun..row) >= wanted && record.values(row..record.len()) >= wanted {
+            starts.push(row);
+        }
+    }
+    let end = record.len();
+    (0..starts.len())
+        .map(|k| {
+            let next = starts.get(k + 1).copied();
+            Stretch {
+                record: index,
+                rows: starts[k]..next.unwrap_or(end),
+                until_s: record.t_s[next.unwrap_or(end - 1)],
+                last: next.is_none(),
+            }
+        })
+        .collect()
+}
+
+fn blocks(problem: &Problem<'_>, stretches: &[Stretch], x: &[f64], seam: f64, pace_rad_s: f64) -> Option<Vec<Block>> {
+    let (free, marks) = (problem.free.len(), problem.marks());
+    let (model, camera) = problem.model(&x[..free]).ok()?;
+    let mut blocks = Vec::with_capacity(2 * stretches.len());
+    for (index, stretch) in stretches.iter().enumerate() {
+        let start = free + index * 2 * marks;
+        let request = Request {
+            record: &problem.records[stretch.record],
+            rows: &stretch.rows,
+            start: &x[start..start + 2 * marks],
+            camera: &camera,
+            parameters: &problem.free,
+            until_s: stretch.until_s,
+            accuracy: &problem.accuracy,
+        };
+        let prediction = predict(&model, &request).ok()?;
+        let own: Vec<usize> = (0..free).chain(start..start + 2 * marks).collect();
+        blocks.push(problem.block(stretch.record, &prediction, own.clone()));
+        if stretch.last {
+            continue;
+        }
+        let (end, end_slopes) = prediction.end;
+        let next = start + 2 * marks;
+        let mut columns = own;
+        columns.extend(next..next + 2 * marks);
+        let mut slopes = DMatrix::zeros(2 * marks, columns.len());
+        slopes.columns_mut(0, end_slopes.ncols()).copy_from(&end_slopes);
+        let mut residual = DVector::zeros(2 * marks);
+        for row in 0..2 * marks {
+            let noise_rad = problem.noise_rad[stretch.record][row % marks];
+            let weight = 1.0 / (seam * noise_rad * if row < marks { 1.0 } else { pace_rad_s });
+            residual[row] = weight * (end[row] - x[next + row]);
+            slopes[(row, free + 2 * marks + row)] = -1.0;
+            slopes.row_mut(row).scale_mut(weight);
+        }
+        blocks.push(Block { columns, residual, slopes, robust: false });
+    }
+    Some(blocks)
+}
+
+/// The data's residuals in units of the noise, with recording and link.
+fn residuals(problem: &Problem<'_>, stretches: &[Stretch], x: &[f64]) -> Vec<(usize, usize, f64)> {
+    let (free, marks) = (problem.free.len(), problem.marks());
+    let Ok((model, camera)) = problem.model(&x[..free]) else { return Vec::new() };
+    let mut all = Vec::new();
+    for (index, stretch) in stretches.iter().enumerate() {
+        let start = free + index * 2 * marks;
+        let request = Request {
+            record: &problem.records[stretch.record],
+            rows: &stretch.rows,
+            start: &x[start..start + 2 * marks],
+            camera: &camera,
+            parameters: &[],
+            until_s: stretch.until_s,
+            accuracy: &problem.accuracy,
+        };
+        if let Ok(prediction) = predict(&model, &request) {
+            let block = problem.block(stretch.record, &prediction, Vec::new());
+            let pairs = prediction.values.iter().zip(block.residual.iter());
+            all.extend(pairs.map(|(value, r)| (stretch.record, value.link, *r)));
+        }
+    }
+    all
+}
