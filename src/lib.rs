@@ -9,6 +9,7 @@
 //! | angles | `angles` | tracks → θ₁, θ₂ with standard deviations |
 //! | overlay | `overlay` | recording, tracks and angles → a video that shows them |
 //! | model | `model` | the forward model of the swing |
+//! | paper | `paper` | the published tables, recomputed |
 //! | synth | `synth` | exact swings, rendered recordings with known truth |
 
 pub mod angles;
@@ -22,6 +23,7 @@ pub mod measure;
 pub mod model;
 pub mod output;
 pub mod overlay;
+pub mod paper;
 pub mod progress;
 pub mod sidecar;
 pub mod synth;

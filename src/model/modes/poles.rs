@@ -126,10 +126,12 @@ fn refined(linear: &Linearised, start: Complex<f64>) -> Option<(Complex<f64>, Ve
     // A little off the eigenvalue, where the matrix can still be inverted and its inverse is all eigenvector.
     let near = start * Complex::from(1.0 + 1e-9) + Complex::from(1e-12 * start.norm());
     let factor = (&inertia * (near * near) + &damping * near + &stiffness).lu();
+    // With the derivative on the right the distance to the eigenvalue enters the vector squared.
+    let derivative = &inertia * (near * 2.0) + &damping;
     // Components of different size and sign: no mode is at right angles to it.
     let mut vector = DVector::from_fn(n, |i, _| Complex::from(((i as f64 + 1.0) * 0.754_877).sin()));
     for _ in 0..4 {
-        vector = factor.solve(&vector)?;
+        vector = factor.solve(&(&derivative * &vector))?;
         vector /= Complex::from(vector.norm());
     }
     let form = |matrix: &DMatrix<Complex<f64>>| vector.dotc(&(matrix * &vector)).re;
