@@ -4,7 +4,7 @@ use std::f64::consts::PI;
 use std::fmt::Write;
 use std::path::PathBuf;
 
-use super::table::{Table, number, paragraph};
+use super::table::{Table, number, paragraph, setting};
 use crate::error::Result;
 use crate::experiment::Experiment;
 use crate::model::modes::{Component, RodMode, Survey};
@@ -74,14 +74,18 @@ fn chain(survey: &Survey, text: &mut String) {
         text,
         "\nChain of {links} link{}: K = {} N·m/rad, C = {} N·m·s/rad at each joint",
         if links == 1 { "" } else { "s" },
-        chain.joint_stiffness_n_m_per_rad,
-        chain.joint_damping_n_m_s_per_rad
+        setting(chain.joint_stiffness_n_m_per_rad),
+        setting(chain.joint_damping_n_m_s_per_rad)
     );
     if chain.rest_rad.iter().any(|a| a.abs() > 1e-9) {
         let angles: Vec<String> = chain.rest_rad.iter().map(|a| format!("{:.2}°", a.to_degrees())).collect();
-        text.push_str(&paragraph(&format!("  at rest at {}", angles.join(", ")), 4));
+        text.push_str(&paragraph("  at rest at ", &angles.join(", ")));
     }
-    let shape_heading = if links > PRINTED_COMPONENTS { "shape θ₁, …" } else { "shape θ₁ : θ₂ : …" };
+    let shape_heading = match links {
+        1 => "shape",
+        2 => "shape θ₁ : θ₂",
+        _ => "shape θ₁ : θ₂ : …",
+    };
     let mut table = Table::with_sentences(["mode", "Hz", "ξ", shape_heading]);
     for (k, mode) in chain.modes.modes.iter().enumerate().take(PRINTED_MODES) {
         let ratio = if mode.damping_ratio == 0.0 { "0".to_owned() } else { number(mode.damping_ratio, 4) };
@@ -104,7 +108,7 @@ fn chain(survey: &Survey, text: &mut String) {
     }
     if !chain.not_linear.is_empty() {
         let names = chain.not_linear.join(", ");
-        text.push_str(&paragraph(&format!("  Left out, having no linear part: {names}."), 4));
+        text.push_str(&paragraph("  ", &format!("Left out, having no linear part at rest: {names}.")));
     }
 }
 

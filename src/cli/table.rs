@@ -54,11 +54,11 @@ impl Table {
     }
 }
 
-/// A paragraph, its lines after the first indented by `hanging`.
-pub fn paragraph(text: &str, hanging: usize) -> String {
-    let mut lines = wrapped(text, WIDTH - hanging).join(&format!("\n{}", " ".repeat(hanging)));
-    lines.push('\n');
-    lines
+/// A paragraph after `bullet`, under whose end the further lines begin.
+pub fn paragraph(bullet: &str, text: &str) -> String {
+    let hanging = columns_of(bullet);
+    let lines = wrapped(text, WIDTH - hanging).join(&format!("\n{}", " ".repeat(hanging)));
+    format!("{bullet}{lines}\n")
 }
 
 /// A number with `digits` significant ones, as a power of ten where it is very small or very large.
@@ -68,6 +68,11 @@ pub fn number(value: f64, digits: usize) -> String {
         return format!("{value:.*e}", digits - 1);
     }
     format!("{value:.*}", (digits as i32 - 1 - magnitude).max(0) as usize)
+}
+
+/// A configured value as a person would write it.
+pub fn setting(value: f64) -> String {
+    if value == 0.0 || (1e-3..1e6).contains(&value.abs()) { value.to_string() } else { format!("{value:e}") }
 }
 
 fn wrapped(text: &str, width: usize) -> Vec<String> {
@@ -103,6 +108,7 @@ mod tests {
         assert_eq!(number(1.883e-8, 3), "1.88e-8");
         assert_eq!(number(-292.54, 4), "-292.5");
         assert_eq!(number(0.0, 3), "0.00");
+        assert_eq!([0.05, 2e-8, 0.0].map(setting), ["0.05", "2e-8", "0"]);
     }
 
     #[test]

@@ -72,7 +72,8 @@ impl Strip {
             mass_kg += element.mass_m() * self.mass_per_length_kg_m;
             let mut stiffness_n_m = whole.stiffness_n_m.fixed_view_mut::<4, 4>(2 * k, 2 * k);
             stiffness_n_m += element.bending_per_m3() * self.bending_stiffness_n_m2;
-            stiffness_n_m += element.tension(|x_m| self.mass_per_length_kg_m * self.gravity_m_s2 * (self.length_m - x_m));
+            stiffness_n_m +=
+                element.tension(|x_m| self.mass_per_length_kg_m * self.gravity_m_s2 * (self.length_m - x_m));
             let mut load_m = whole.pressure_load_m.fixed_rows_mut::<4>(2 * k);
             load_m += element.load_m();
         }
@@ -111,7 +112,8 @@ impl Mesh {
     /// A mesh fine enough for the first few modes: half its elements within the boundary layer where that is thin.
     pub fn of(strip: &Strip) -> Self {
         let layer_m = strip.boundary_layer_m();
-        let fine_m = if layer_m > 0.0 { (Self::LAYERS * layer_m).min(0.5 * strip.length_m) } else { 0.5 * strip.length_m };
+        let fine_m =
+            if layer_m > 0.0 { (Self::LAYERS * layer_m).min(0.5 * strip.length_m) } else { 0.5 * strip.length_m };
         let part = |from_m: f64, until_m: f64| {
             let step_m = (until_m - from_m) / Self::ELEMENTS as f64;
             (0..Self::ELEMENTS).map(move |k| from_m + step_m * k as f64)
@@ -215,10 +217,8 @@ mod tests {
         let strip = kapton();
         let mesh = Mesh::of(&strip);
         let matrices = strip.assemble(&mesh, Support::Hinged);
-        let turned = DVector::from_iterator(
-            2 * mesh.nodes_m().len() - 1,
-            mesh.nodes_m().iter().flat_map(|x| [*x, 1.0]).skip(1),
-        );
+        let turned =
+            DVector::from_iterator(2 * mesh.nodes_m().len() - 1, mesh.nodes_m().iter().flat_map(|x| [*x, 1.0]).skip(1));
         let inertia_kg_m2 = turned.dot(&(&matrices.mass_kg * &turned));
         let stiffness_n_m = turned.dot(&(&matrices.stiffness_n_m * &turned));
         let (mu, g, l) = (strip.mass_per_length_kg_m, strip.gravity_m_s2, strip.length_m);

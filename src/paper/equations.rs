@@ -88,10 +88,8 @@ impl Lumps {
         let weight_n = if has(Slip::GravitySign) { -m3 * g } else { m3 * g };
         let side_n = if has(Slip::SideForceSign) { -fx3 } else { fx3 };
         let [joint_1_n, joint_2_n] = self.joint_n(at, slips);
-        let a1 = at.omega_rad_s[1].powi(2) * l2 * m3 * s21
-            + c1 * (fx2 + fx3)
-            + s1 * (fy2 + fy3 - (m2 + m3) * g)
-            + joint_1_n;
+        let a1 =
+            at.omega_rad_s[1].powi(2) * l2 * m3 * s21 + c1 * (fx2 + fx3) + s1 * (fy2 + fy3 - (m2 + m3) * g) + joint_1_n;
         let a2 = -rate.powi(2) * l1 * m3 * s21 + c2 * side_n + s2 * (load_n - weight_n) + joint_2_n;
 
         let (k1, k2) = ((m2 + m3) * l1, m3 * l2 * c21);
@@ -158,7 +156,9 @@ impl Lumps {
         let (half_trace, determinant) = (0.5 * (b11 + b22), b11 * b22 - b12 * b21);
         let discriminant = half_trace * half_trace - determinant;
         if !discriminant.is_finite() {
-            return Err(Error::Simulation { detail: "the lumps make no pendulum; give both a mass and a length".into() });
+            return Err(Error::Simulation {
+                detail: "the lumps make no pendulum; give both a mass and a length".into(),
+            });
         }
         if discriminant < 0.0 {
             // β = r e^(±iφ), so √β = √r e^(±iφ/2)

@@ -33,8 +33,7 @@ impl Linearised {
         let rest_rad = laws.rest_rad()?;
         let effects = &experiment.model.effects;
         let strip_m3 = strip_integrals_m3(&chain, &rest_rad);
-        let chain_kg_m2 =
-            chain.inertia_kg_m2().map_with_location(|i, j, a| a * (rest_rad[i] - rest_rad[j]).cos());
+        let chain_kg_m2 = chain.inertia_kg_m2().map_with_location(|i, j, a| a * (rest_rad[i] - rest_rad[j]).cos());
         let mut damping_n_m_s = difference_matrix(chain.count(), |_| experiment.model.c_eq_n_m_s_per_rad);
         damping_n_m_s[(0, 0)] += effects.hinge_viscous.unwrap_or(0.0);
         Ok(Self {
@@ -69,8 +68,9 @@ impl LinearLaws<'_> {
     /// θ₀ by Newton's method from the vertical.
     fn rest_rad(&self) -> Result<DVector<f64>> {
         let none = || Error::Simulation {
-            detail: "the chain has no rest position near the vertical; lower rest_curl, side_force or a negative stiffness"
-                .into(),
+            detail:
+                "the chain has no rest position near the vertical; lower rest_curl, side_force or a negative stiffness"
+                    .into(),
         };
         let mut theta = DVector::zeros(self.chain.count());
         for _ in 0..50 {
@@ -94,7 +94,8 @@ impl LinearLaws<'_> {
         torque[0] -= effects.hinge_stiffness.unwrap_or(0.0) * theta[0];
         for j in 1..theta.len() {
             let bend = self.bend_rad(theta, j);
-            let spring = self.joint_stiffness_n_m(j) * bend + effects.joint_cubic_stiffness.unwrap_or(0.0) * bend.powi(3);
+            let spring =
+                self.joint_stiffness_n_m(j) * bend + effects.joint_cubic_stiffness.unwrap_or(0.0) * bend.powi(3);
             torque[j - 1] += spring;
             torque[j] -= spring;
         }
@@ -196,7 +197,8 @@ mod tests {
             let expected = -inverse.solve(&linear.stiffness_n_m.column(i));
             assert!((slope - &expected).norm() < 1e-7 * expected.norm());
             let omega = DVector::from_fn(2, |k, _| if k == i { small } else { 0.0 });
-            let rate = (acceleration(&linear.rest_rad, omega.as_slice()) - acceleration(&linear.rest_rad, (-omega).as_slice()))
+            let rate = (acceleration(&linear.rest_rad, omega.as_slice())
+                - acceleration(&linear.rest_rad, (-omega).as_slice()))
                 / (2.0 * small);
             let expected = -inverse.solve(&linear.damping_n_m_s.column(i));
             assert!((rate - &expected).norm() < 1e-6 * expected.norm());

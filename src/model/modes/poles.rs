@@ -175,10 +175,8 @@ mod tests {
 
     #[test]
     fn the_joint_of_table_2_takes_next_to_nothing_out_of_the_first_mode() {
-        let pet_1_mil = Experiment {
-            specimen: Specimen { mass_kg: 0.3530e-3, ..Specimen::default() },
-            ..strip(0.0258, 2.467e-4)
-        };
+        let pet_1_mil =
+            Experiment { specimen: Specimen { mass_kg: 0.3530e-3, ..Specimen::default() }, ..strip(0.0258, 2.467e-4) };
         let found = modes(&pet_1_mil);
         assert_eq!((found.modes.len(), found.overdamped.len()), (1, 2));
         let first = &found.modes[0];
