@@ -94,10 +94,7 @@ fn chain(survey: &Survey, text: &mut String) {
     if !chain.modes.modes.is_empty() {
         text.push_str(&table.text());
     }
-    let hidden = chain.modes.modes.len().saturating_sub(PRINTED_MODES);
-    if hidden > 0 {
-        let _ = writeln!(text, "  … and {hidden} more, see --json");
-    }
+    more(chain.modes.modes.len(), text);
     if !chain.modes.overdamped.is_empty() {
         let mut table = Table::with_sentences(["overdamped", "decays in", "shape"]);
         for (k, pole) in chain.modes.overdamped.iter().enumerate().take(PRINTED_MODES) {
@@ -105,10 +102,17 @@ fn chain(survey: &Survey, text: &mut String) {
             table.row([(k + 1).to_string(), time, shape_text(&pole.shape)]);
         }
         text.push_str(&table.text());
+        more(chain.modes.overdamped.len(), text);
     }
     if !chain.not_linear.is_empty() {
         let names = chain.not_linear.join(", ");
         text.push_str(&paragraph("  ", &format!("Left out, having no linear part at rest: {names}.")));
+    }
+}
+
+fn more(count: usize, text: &mut String) {
+    if let Some(hidden) = count.checked_sub(PRINTED_MODES).filter(|n| *n > 0) {
+        let _ = writeln!(text, "  … and {hidden} more, see --json");
     }
 }
 
@@ -171,6 +175,9 @@ fn rod_ratio(mode: &RodMode) -> String {
 /// Components with their sign where the links pass the middle together, with their phase where they do not.
 fn shape_text(shape: &[Component]) -> String {
     let component = |c: &Component| {
+        if c.amplitude < 5e-5 {
+            return "0".to_owned();
+        }
         let off_phase_rad = (c.phase_rad.abs() - PI).abs().min(c.phase_rad.abs());
         if off_phase_rad.to_degrees() >= 0.1 {
             format!("{:.4}∠{:.1}°", c.amplitude, c.phase_rad.to_degrees())
