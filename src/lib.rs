@@ -10,6 +10,7 @@
 //! | series | [`series`] | angles.csv → the same as numbers, checked |
 //! | overlay | `overlay` | recording, tracks and angles → a video that shows them |
 //! | model | `model` | the forward model of the swing |
+//! | paper | `paper` | the published tables, recomputed |
 //! | synth | `synth` | exact swings, rendered recordings with known truth |
 
 pub mod angles;
@@ -24,6 +25,7 @@ pub mod measure;
 pub mod model;
 pub mod output;
 pub mod overlay;
+pub mod paper;
 pub mod progress;
 pub mod series;
 pub mod sidecar;

@@ -44,6 +44,11 @@ impl OutputFile {
         Ok(Self { path: path.to_owned(), sink })
     }
 
+    /// Whether it goes to standard output.
+    pub fn is_standard_output(&self) -> bool {
+        matches!(self.sink, Sink::StandardOutput)
+    }
+
     /// Writes everything and lets it appear.
     ///
     /// # Errors

@@ -1,14 +1,20 @@
 //! The command line: parse → options → stage → write → exit code. One file a command.
 
 mod bar;
+mod modes;
+mod paper;
 mod render;
+mod table;
 mod track;
 
+use std::io::Write;
 use std::process::ExitCode;
 
 use clap::{Parser, Subcommand};
 
 pub use bar::Bar;
+
+use crate::output::OutputFile;
 
 /// Measures vibration from video.
 #[derive(Debug, Parser)]
@@ -22,6 +28,8 @@ pub struct Cli {
 enum Command {
     Track(track::TrackArgs),
     Render(render::RenderArgs),
+    Modes(modes::ModesArgs),
+    Paper(paper::PaperArgs),
 }
 
 /// `track` alone, so that `track VIDEO --out angles.csv` works as typed.
@@ -38,6 +46,8 @@ impl Cli {
         exit(match Self::parse().command {
             Command::Track(args) => args.run(),
             Command::Render(args) => args.run(),
+            Command::Modes(args) => args.run(),
+            Command::Paper(args) => args.run(),
         })
     }
 }
@@ -57,5 +67,27 @@ fn exit(outcome: crate::Result<()>) -> ExitCode {
             eprintln!("error: {error}");
             ExitCode::from(2)
         }
+    }
+}
+
+/// Prints a report; with a file for JSON writes it there, and prints nothing where that file is standard output.
+fn deliver(text: &str, report: &impl serde::Serialize, json: Option<OutputFile>) -> crate::Result<()> {
+    if !json.as_ref().is_some_and(OutputFile::is_standard_output) {
+        print(text)?;
+    }
+    let Some(json) = json else { return Ok(()) };
+    // numbers, strings and lists of them cannot fail to serialise
+    let contents = serde_json::to_string_pretty(report).unwrap_or_default() + "\n";
+    json.commit(contents.as_bytes())
+}
+
+/// Standard output; a reader that has seen enough, such as `head`, is no failure.
+fn print(text: &str) -> crate::Result<()> {
+    let mut standard_output = std::io::stdout().lock();
+    match standard_output.write_all(text.as_bytes()).and_then(|()| standard_output.flush()) {
+        Err(e) if e.kind() != std::io::ErrorKind::BrokenPipe => {
+            Err(crate::Error::unwritable("standard output".as_ref(), e))
+        }
+        _ => Ok(()),
     }
 }

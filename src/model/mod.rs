@@ -13,6 +13,9 @@
 //! | [`trajectory`] | the motion at every instant, with its sensitivities |
 //! | [`observe`] | the angles between marks |
 //! | [`camera`] | what a camera makes of them |
+//! | [`modes`] | small vibrations: frequencies, damping ratios, shapes |
+//! | [`strip`] | the strip as a beam in gravity, by finite elements |
+//! | [`radiation`] | the pressure of light |
 
 pub mod camera;
 pub mod chain;
@@ -20,11 +23,14 @@ pub mod collocation;
 pub mod effects;
 pub mod forward;
 pub mod integrate;
+pub mod modes;
 pub mod motion;
 pub mod observe;
 pub mod parameter;
 mod partials;
+pub mod radiation;
 pub mod step;
+pub mod strip;
 #[cfg(test)]
 mod tests;
 pub mod trajectory;
