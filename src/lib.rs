@@ -9,6 +9,7 @@
 //! | angles | `angles` | tracks → θ₁, θ₂ with standard deviations |
 //! | series | [`series`] | angles.csv → the same as numbers, checked |
 //! | overlay | `overlay` | recording, tracks and angles → a video that shows them |
+//! | identify | [`identify`] | angles → frequencies, damping and their intervals, without a model |
 //! | model | `model` | the forward model of the swing |
 //! | synth | `synth` | exact swings, rendered recordings with known truth |
 
@@ -19,6 +20,7 @@ pub mod cli;
 pub mod detect;
 pub mod error;
 pub mod experiment;
+pub mod identify;
 pub mod measure;
 pub mod model;
 pub mod output;
