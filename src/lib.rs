@@ -9,6 +9,7 @@
 //! | angles | `angles` | tracks → θ₁, θ₂ with standard deviations |
 //! | series | [`series`] | angles.csv → the same as numbers, checked |
 //! | overlay | `overlay` | recording, tracks and angles → a video that shows them |
+//! | identify | [`identify`] | angles → frequencies, damping and their intervals, without a model |
 //! | model | `model` | the forward model of the swing |
 //! | paper | `paper` | the published tables, recomputed |
 //! | synth | `synth` | exact swings, rendered recordings with known truth |
@@ -21,6 +22,7 @@ pub mod detect;
 pub mod error;
 pub mod experiment;
 pub mod fit;
+pub mod identify;
 pub mod measure;
 pub mod model;
 pub mod output;

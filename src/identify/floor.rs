@@ -1,0 +1,157 @@
+//! The frequency floor: gravity alone makes a hung body swing at least so fast.
+
+use nalgebra::{Complex, DMatrix};
+use serde::Serialize;
+
+use super::estimate::Estimate;
+use crate::experiment::Specimen;
+use crate::model::chain::Chain;
+
+/// First zero of the Bessel function J₀.
+const BESSEL_ZERO: f64 = 2.404_825_557_695_773;
+
+/// The lowest frequency that a specimen can have, and whether the measured one respects it.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Floor {
+    /// What swings at it.
+    pub body: &'static str,
+    /// The floor at small amplitude.
+    pub floor_hz: f64,
+    /// The rigid strip of the same length, for a strip.
+    pub rigid_hz: Option<f64>,
+    /// Whether the whole 95 % interval lies below the floor.
+    pub below: bool,
+    /// What would mend it.
+    pub remedy: Option<Remedy>,
+    /// In words.
+    pub statement: String,
+}
+
+/// Factors any one of which lifts the measured frequency to the floor.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Remedy {
+    /// True seconds a stated second, at most.
+    pub time: f64,
+    /// True length over the stated one, at least.
+    pub length: f64,
+    /// True gravity over the stated one, at most.
+    pub gravity: f64,
+}
+
+impl Floor {
+    /// The floor of a specimen, against its lowest frequency at small amplitude.
+    ///
+    /// ```text
+    /// limp strip (hanging chain)   f = (j₀,₁/4π) √(g/L)         any stiffness only raises it
+    /// rigid strip                  f = √(3g/2L) / 2π
+    /// given links                  lowest root of det(diag(g hᵢ) − ω² a) = 0, the joints free
+    /// ```
+    pub fn of(specimen: &Specimen, chain: &Chain, gravity_m_s2: f64, frequency_hz: Estimate) -> Self {
+        let length_m: f64 = chain.links().iter().map(|l| l.length_m).sum();
+        let (body, floor_hz, rigid_hz) = if specimen.links.is_empty() {
+            ("the limp strip", limp_strip_hz(length_m, gravity_m_s2), Some(rigid_strip_hz(length_m, gravity_m_s2)))
+        } else {
+            ("the given links with free joints", lowest_chain_hz(chain, gravity_m_s2), None)
+        };
+        let below = frequency_hz.high < floor_hz;
+        let ratio = frequency_hz.value / floor_hz;
+        let remedy = below.then(|| Remedy { time: ratio, length: ratio.powi(-2), gravity: ratio.powi(2) });
+        let statement = match remedy {
+            Some(r) => format!(
+                "{:.4} Hz is below the floor of {floor_hz:.4} Hz ({body}): time base, length or gravity is wrong; mended by time × {:.3}, or length × {:.3}, or gravity × {:.3}",
+                frequency_hz.value, r.time, r.length, r.gravity
+            ),
+            None => format!("{:.4} Hz respects the floor of {floor_hz:.4} Hz ({body})", frequency_hz.value),
+        };
+        Self { body, floor_hz, rigid_hz, below, remedy, statement }
+    }
+}
+
+/// A hanging chain of uniform mass.
+pub fn limp_strip_hz(length_m: f64, gravity_m_s2: f64) -> f64 {
+    BESSEL_ZERO / (2.0 * std::f64::consts::TAU) * (gravity_m_s2 / length_m).sqrt()
+}
+
+/// A uniform rod hung at its end.
+pub fn rigid_strip_hz(length_m: f64, gravity_m_s2: f64) -> f64 {
+    (1.5 * gravity_m_s2 / length_m).sqrt() / std::f64::consts::TAU
+}
+
+/// The slowest mode of a chain whose joints are free.
+pub fn lowest_chain_hz(chain: &Chain, gravity_m_s2: f64) -> f64 {
+    // the largest eigenvalue of G^{-1/2} a G^{-1/2} is 1/ω² of the slowest mode
+    let root = |i: usize| (gravity_m_s2 * chain.static_moment_kg_m(i)).sqrt();
+    let a = chain.inertia_kg_m2();
+    let scaled = DMatrix::from_fn(chain.count(), chain.count(), |i, j| a[(i, j)] / (root(i) * root(j)));
+    scaled.symmetric_eigenvalues().max().sqrt().recip() / std::f64::consts::TAU
+}
+
+/// κ of f = f₀(1 − κA²) for a mode of a chain, A being the amplitude of the link that moves most.
+///
+/// With θ = s q, gravity's potential Σ g hᵢ(1 − cos sᵢq) and the inertia ½ Σ aᵢⱼ sᵢsⱼ cos((sᵢ−sⱼ)q) q̇² expanded to the fourth order, harmonic
+/// balance gives
+///
+/// ```text
+/// κ = g Σ hᵢsᵢ⁴ / (16 k) − Σ aᵢⱼ sᵢsⱼ (sᵢ−sⱼ)² / (8 m),   m = Σ aᵢⱼ sᵢsⱼ,   k = ω² m
+/// ```
+/// 1/16 for one link. Springs in the joints enter through the measured ω.
+pub fn amplitude_dependence(chain: &Chain, gravity_m_s2: f64, frequency_hz: f64, shape: &[Complex<f64>]) -> f64 {
+    // the part of the shape that moves together
+    let largest =
+        shape.iter().fold(Complex::new(0.0, 0.0), |l: Complex<f64>, s| if s.norm() > l.norm() { *s } else { l });
+    let s: Vec<f64> = shape.iter().map(|v| (v / largest).re).collect();
+    let a = chain.inertia_kg_m2();
+    let (mut mass, mut curve, mut quartic) = (0.0, 0.0, 0.0);
+    for i in 0..chain.count() {
+        quartic += gravity_m_s2 * chain.static_moment_kg_m(i) * s[i].powi(4);
+        for j in 0..chain.count() {
+            mass += a[(i, j)] * s[i] * s[j];
+            curve += a[(i, j)] * s[i] * s[j] * (s[i] - s[j]).powi(2);
+        }
+    }
+    let stiffness = (std::f64::consts::TAU * frequency_hz).powi(2) * mass;
+    quartic / (16.0 * stiffness) - curve / (8.0 * mass)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const G: f64 = 9.80665;
+
+    #[test]
+    fn the_strips_have_the_frequencies_of_the_handbook() {
+        assert!((limp_strip_hz(0.2, G) - 1.3403).abs() < 5e-5);
+        assert!((rigid_strip_hz(0.2, G) - 1.3649).abs() < 5e-5);
+        let rods = Chain::of(&Specimen::default()).unwrap();
+        assert!((lowest_chain_hz(&rods, 9.81) - 1.3489).abs() < 5e-5);
+    }
+
+    #[test]
+    fn many_links_approach_the_limp_strip() {
+        let strip = Specimen { link_lengths_m: vec![0.01; 20], ..Specimen::default() };
+        let many = lowest_chain_hz(&Chain::of(&strip).unwrap(), G);
+        assert!((many / limp_strip_hz(0.2, G) - 1.0).abs() < 1e-3, "{many}");
+    }
+
+    #[test]
+    fn a_frequency_below_the_floor_is_mended_by_a_factor() {
+        let strip = Specimen::default();
+        let chain = Chain::of(&strip).unwrap();
+        let low = Floor::of(&strip, &chain, G, Estimate::new(0.5156, 0.001, 100.0));
+        let remedy = low.remedy.unwrap();
+        assert!(low.below && (remedy.time - 0.5156 / 1.3403).abs() < 1e-4);
+        assert!((limp_strip_hz(0.2 * remedy.length, G) - 0.5156).abs() < 1e-9);
+        assert!((limp_strip_hz(0.2, G * remedy.gravity) - 0.5156).abs() < 1e-9);
+        let sound = Floor::of(&strip, &chain, G, Estimate::new(1.3402, 0.001, 100.0));
+        assert!(!sound.below && sound.remedy.is_none());
+    }
+
+    #[test]
+    fn one_link_loses_a_sixteenth_of_its_amplitude_squared() {
+        let strip = Specimen { link_lengths_m: vec![0.2], ..Specimen::default() };
+        let chain = Chain::of(&strip).unwrap();
+        let f = lowest_chain_hz(&chain, G);
+        assert!((amplitude_dependence(&chain, G, f, &[Complex::new(-2.0, 0.0)]) - 0.0625).abs() < 1e-12);
+    }
+}

@@ -1,0 +1,325 @@
+//! Damped sinusoids by nonlinear least squares on the true time stamps.
+//!
+//! ```text
+//! θᵢ(t) = oᵢ + Σₘ e^{−σₘτ} (aᵢₘ cos ωₘτ + bᵢₘ sin ωₘτ),   τ = t − t₀
+//! f = √(ω² + σ²) / 2π,   ξ = σ / √(ω² + σ²)
+//! ```
+//!
+//! The poles (ωₘ, σₘ) are common to all links, offsets and amplitudes belong to each. The latter enter linearly and are eliminated: variable
+//! projection with Kaufman's Jacobian (Golub and Pereyra, Inverse Problems 19 (2003) R1, Eq. 11), minimised by Levenberg–Marquardt.
+//! Missing samples are simply absent. Each link is weighted by the noise found in its own residual.
+
+use levenberg_marquardt::{LeastSquaresProblem, LevenbergMarquardt};
+use nalgebra::storage::Owned;
+use nalgebra::{Complex, DMatrix, DVector, Dyn};
+use serde::Serialize;
+
+use super::estimate::Estimate;
+use super::signal::{LinkSamples, Signal};
+
+/// One damped oscillation: its pole −σ ± iω.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Pole {
+    /// ω, damped angular frequency.
+    pub omega_rad_s: f64,
+    /// σ; an amplitude falls as e^{−σt}.
+    pub decay_per_s: f64,
+}
+
+impl Pole {
+    /// From the natural frequency and the damping ratio.
+    pub fn of(frequency_hz: f64, damping_ratio: f64) -> Self {
+        let natural_rad_s = std::f64::consts::TAU * frequency_hz;
+        Self {
+            omega_rad_s: natural_rad_s * (1.0 - damping_ratio * damping_ratio).max(0.0).sqrt(),
+            decay_per_s: damping_ratio * natural_rad_s,
+        }
+    }
+
+    /// Undamped natural frequency f.
+    pub fn frequency_hz(&self) -> f64 {
+        self.omega_rad_s.hypot(self.decay_per_s) / std::f64::consts::TAU
+    }
+
+    /// ξ.
+    pub fn damping_ratio(&self) -> f64 {
+        self.decay_per_s / self.omega_rad_s.hypot(self.decay_per_s)
+    }
+}
+
+/// What the fit says about one link.
+#[derive(Debug, Clone, PartialEq)]
+pub struct LinkFit {
+    /// oᵢ.
+    pub offset_rad: f64,
+    /// a − ib of each mode at the origin: θ = Re(c e^{(−σ+iω)τ}).
+    pub amplitudes_rad: Vec<Complex<f64>>,
+    /// Standard deviation of the real and of the imaginary part of each, for given poles.
+    pub amplitude_sd_rad: Vec<f64>,
+    /// Measured minus fitted.
+    pub residual_rad: Vec<f64>,
+    /// Standard deviation of the residual.
+    pub noise_rad: f64,
+}
+
+/// A sum of damped sinusoids fitted to a signal.
+#[derive(Debug, Clone, PartialEq)]
+pub struct SinusoidFit {
+    /// t₀.
+    pub origin_s: f64,
+    /// One a mode, in the order of the start values.
+    pub poles: Vec<Pole>,
+    /// Covariance of (ω₁, σ₁, ω₂, σ₂, …), of white residuals.
+    pub covariance: DMatrix<f64>,
+    /// One a link.
+    pub links: Vec<LinkFit>,
+    /// Values less parameters.
+    pub degrees_of_freedom: f64,
+    /// Σᵢ nᵢ ln(RSSᵢ/nᵢ): minus twice the log-likelihood, up to a constant.
+    pub deviance: f64,
+}
+
+impl SinusoidFit {
+    /// Fits from these poles; `None` when there are too few values, or the search ends where no oscillation is (ω ≤ 0, beyond
+    /// the Nyquist frequency, or not finite).
+    pub fn from_start(signal: &Signal, origin_s: f64, start: &[Pole]) -> Option<Self> {
+        let linear = 1 + 2 * start.len();
+        if start.is_empty() || signal.links.iter().any(|l| l.t_s.len() < linear + 2 * start.len()) {
+            return None;
+        }
+        let mut problem = Projection::new(signal, origin_s, start);
+        for _ in 0..2 {
+            let solver = LevenbergMarquardt::new().with_tol(1e-12).with_patience(40);
+            let (solved, _) = solver.minimize(problem);
+            problem = solved;
+            problem.weigh()?;
+        }
+        let nyquist_rad_s = std::f64::consts::PI / signal.step_s;
+        let poles = problem.poles();
+        let sane = |p: &Pole| p.omega_rad_s > 0.0 && p.omega_rad_s < 1.05 * nyquist_rad_s && p.decay_per_s.is_finite();
+        if !poles.iter().all(sane) {
+            return None;
+        }
+        problem.finish(origin_s, poles)
+    }
+
+    /// Natural frequency of a mode.
+    pub fn frequency_hz(&self, mode: usize) -> Estimate {
+        let Pole { omega_rad_s: w, decay_per_s: s } = self.poles[mode];
+        let natural = w.hypot(s);
+        let sd = self.propagated(mode, [w / natural, s / natural]) / std::f64::consts::TAU;
+        Estimate::new(self.poles[mode].frequency_hz(), sd, self.degrees_of_freedom)
+    }
+
+    /// Damping ratio of a mode.
+    pub fn damping_ratio(&self, mode: usize) -> Estimate {
+        let Pole { omega_rad_s: w, decay_per_s: s } = self.poles[mode];
+        let cubed = w.hypot(s).powi(3);
+        let sd = self.propagated(mode, [-s * w / cubed, w * w / cubed]);
+        Estimate::new(self.poles[mode].damping_ratio(), sd, self.degrees_of_freedom)
+    }
+
+    fn propagated(&self, mode: usize, slope: [f64; 2]) -> f64 {
+        let c = self.covariance.view((2 * mode, 2 * mode), (2, 2));
+        let [a, b] = slope;
+        (a * a * c[(0, 0)] + 2.0 * a * b * c[(0, 1)] + b * b * c[(1, 1)]).max(0.0).sqrt()
+    }
+
+    /// The fitted angle of a link without its offset, of one mode.
+    pub fn mode_rad(&self, link: usize, mode: usize, t_s: f64) -> f64 {
+        let (pole, tau) = (self.poles[mode], t_s - self.origin_s);
+        let rotation = Complex::from_polar((-pole.decay_per_s * tau).exp(), pole.omega_rad_s * tau);
+        (self.links[link].amplitudes_rad[mode] * rotation).re
+    }
+
+    /// The signal with the offsets and every mode but one taken away.
+    pub fn isolate(&self, signal: &Signal, mode: usize) -> Signal {
+        let value = |link: usize, t: f64, theta: f64| {
+            let others = (0..self.poles.len()).filter(|m| *m != mode).map(|m| self.mode_rad(link, m, t));
+            theta - self.links[link].offset_rad - others.sum::<f64>()
+        };
+        let each = |(link, samples): (usize, &LinkSamples)| {
+            samples.t_s.iter().zip(&samples.theta_rad).map(|(t, a)| value(link, *t, *a)).collect()
+        };
+        signal.with_values(signal.links.iter().enumerate().map(each).collect())
+    }
+
+    /// The residuals as a signal.
+    pub fn residuals(&self, signal: &Signal) -> Signal {
+        signal.with_values(self.links.iter().map(|l| l.residual_rad.clone()).collect())
+    }
+
+    /// Largest amplitude of a mode among the links at the origin.
+    pub fn amplitude_rad(&self, mode: usize) -> f64 {
+        self.links.iter().map(|l| l.amplitudes_rad[mode].norm()).fold(0.0, f64::max)
+    }
+
+    /// Number of parameters: poles, amplitudes, offsets.
+    pub fn parameters(&self) -> usize {
+        2 * self.poles.len() + self.links.len() * (1 + 2 * self.poles.len())
+    }
+}
+
+/// The least-squares problem in the poles alone.
+struct Projection {
+    links: Vec<Projected>,
+    parameters: DVector<f64>,
+}
+
+/// One link's share of it, at the present poles.
+struct Projected {
+    tau_s: Vec<f64>,
+    measured: DVector<f64>,
+    weight: f64,
+    orthonormal: DMatrix<f64>,
+    triangle: DMatrix<f64>,
+    /// offset, a₁, b₁, a₂, b₂, …
+    coefficients: DVector<f64>,
+    residual: DVector<f64>,
+}
+
+impl Projected {
+    fn update(&mut self, parameters: &DVector<f64>) {
+        let columns = 1 + parameters.len();
+        let mut basis = DMatrix::from_element(self.tau_s.len(), columns, 1.0);
+        for (row, tau) in self.tau_s.iter().enumerate() {
+            for m in 0..parameters.len() / 2 {
+                let envelope = (-parameters[2 * m + 1] * tau).exp();
+                let (sin, cos) = (parameters[2 * m] * tau).sin_cos();
+                basis[(row, 1 + 2 * m)] = envelope * cos;
+                basis[(row, 2 + 2 * m)] = envelope * sin;
+            }
+        }
+        let qr = basis.qr();
+        self.orthonormal = qr.q();
+        self.triangle = qr.r();
+        let projected = self.orthonormal.tr_mul(&self.measured);
+        self.residual = &self.measured - &self.orthonormal * &projected;
+        self.coefficients = self
+            .triangle
+            .solve_upper_triangular(&projected)
+            .unwrap_or_else(|| DVector::from_element(columns, f64::NAN));
+    }
+
+    /// Kaufman's Jacobian of the residual: −P⊥ (∂Φ/∂α) c, unweighted.
+    fn jacobian(&self, parameters: &DVector<f64>) -> DMatrix<f64> {
+        let mut slope = DMatrix::zeros(self.tau_s.len(), parameters.len());
+        for (row, tau) in self.tau_s.iter().enumerate() {
+            for m in 0..parameters.len() / 2 {
+                let envelope = (-parameters[2 * m + 1] * tau).exp();
+                let (sin, cos) = (parameters[2 * m] * tau).sin_cos();
+                let (a, b) = (self.coefficients[1 + 2 * m], self.coefficients[2 + 2 * m]);
+                slope[(row, 2 * m)] = envelope * tau * (b * cos - a * sin);
+                slope[(row, 2 * m + 1)] = -envelope * tau * (a * cos + b * sin);
+            }
+        }
+        &self.orthonormal * self.orthonormal.tr_mul(&slope) - slope
+    }
+}
+
+impl Projection {
+    fn new(signal: &Signal, origin_s: f64, start: &[Pole]) -> Self {
+        let link = |l: &LinkSamples| Projected {
+            tau_s: l.t_s.iter().map(|t| t - origin_s).collect(),
+            measured: DVector::from_column_slice(&l.theta_rad),
+            weight: 1.0,
+            orthonormal: DMatrix::zeros(0, 0),
+            triangle: DMatrix::zeros(0, 0),
+            coefficients: DVector::zeros(0),
+            residual: DVector::zeros(0),
+        };
+        let parameters = start.iter().flat_map(|p| [p.omega_rad_s, p.decay_per_s]).collect::<Vec<_>>();
+        let mut problem =
+            Self { links: signal.links.iter().map(link).collect(), parameters: DVector::zeros(parameters.len()) };
+        problem.set_params(&DVector::from_vec(parameters));
+        problem
+    }
+
+    fn poles(&self) -> Vec<Pole> {
+        let pairs = self.parameters.as_slice().chunks_exact(2);
+        pairs.map(|p| Pole { omega_rad_s: p[0], decay_per_s: p[1] }).collect()
+    }
+
+    /// Sets each link's weight to the inverse of its noise.
+    fn weigh(&mut self) -> Option<()> {
+        let noises: Vec<f64> = self.links.iter().map(|l| l.residual.norm_squared() / l.tau_s.len() as f64).collect();
+        let largest = noises.iter().copied().fold(0.0, f64::max);
+        if !largest.is_finite() {
+            return None;
+        }
+        for (link, noise) in self.links.iter_mut().zip(&noises) {
+            // an exact fit of one link must not silence the other
+            link.weight = 1.0 / noise.max(1e-6 * largest).max(f64::MIN_POSITIVE).sqrt();
+        }
+        Some(())
+    }
+
+    fn finish(self, origin_s: f64, poles: Vec<Pole>) -> Option<SinusoidFit> {
+        let values: usize = self.links.iter().map(|l| l.tau_s.len()).sum();
+        let linear = 1 + 2 * poles.len();
+        let share = 2.0 * poles.len() as f64 / values as f64;
+        let degrees_of_freedom =
+            (values - self.links.len() * linear).checked_sub(2 * poles.len()).filter(|d| *d > 0)? as f64;
+        let jacobian = self.jacobian()?;
+        let chi2: f64 = self.residuals()?.norm_squared();
+        let covariance = jacobian.tr_mul(&jacobian).try_inverse()? * (chi2 / degrees_of_freedom);
+        let mut links = Vec::new();
+        let mut deviance = 0.0;
+        for link in self.links {
+            let n = link.tau_s.len() as f64;
+            let rss = link.residual.norm_squared();
+            deviance += n * (rss / n).max(f64::MIN_POSITIVE).ln();
+            let noise_rad = (rss / (n * (1.0 - share) - linear as f64).max(1.0)).sqrt();
+            let inverse = link.triangle.try_inverse()?;
+            let spread = |k: usize| inverse.row(k).norm();
+            let c = &link.coefficients;
+            let modes = 0..poles.len();
+            links.push(LinkFit {
+                offset_rad: c[0],
+                amplitudes_rad: modes.clone().map(|m| Complex::new(c[1 + 2 * m], -c[2 + 2 * m])).collect(),
+                amplitude_sd_rad: modes
+                    .map(|m| noise_rad * spread(1 + 2 * m).hypot(spread(2 + 2 * m)) * std::f64::consts::FRAC_1_SQRT_2)
+                    .collect(),
+                residual_rad: link.residual.as_slice().to_vec(),
+                noise_rad,
+            });
+        }
+        let finite = covariance.iter().all(|c| c.is_finite());
+        finite.then_some(SinusoidFit { origin_s, poles, covariance, links, degrees_of_freedom, deviance })
+    }
+}
+
+impl LeastSquaresProblem<f64, Dyn, Dyn> for Projection {
+    type ResidualStorage = Owned<f64, Dyn>;
+    type JacobianStorage = Owned<f64, Dyn, Dyn>;
+    type ParameterStorage = Owned<f64, Dyn>;
+
+    fn set_params(&mut self, parameters: &DVector<f64>) {
+        self.parameters.copy_from(parameters);
+        for link in &mut self.links {
+            link.update(parameters);
+        }
+    }
+
+    fn params(&self) -> DVector<f64> {
+        self.parameters.clone()
+    }
+
+    fn residuals(&self) -> Option<DVector<f64>> {
+        let values = self.links.iter().flat_map(|l| l.residual.iter().map(|r| r * l.weight));
+        let all = DVector::from_vec(values.collect());
+        all.iter().all(|r| r.is_finite()).then_some(all)
+    }
+
+    fn jacobian(&self) -> Option<DMatrix<f64>> {
+        let rows = self.links.iter().map(|l| l.tau_s.len()).sum();
+        let mut all = DMatrix::zeros(rows, self.parameters.len());
+        let mut row = 0;
+        for link in &self.links {
+            let part = link.jacobian(&self.parameters) * link.weight;
+            all.rows_mut(row, part.nrows()).copy_from(&part);
+            row += part.nrows();
+        }
+        all.iter().all(|v| v.is_finite()).then_some(all)
+    }
+}

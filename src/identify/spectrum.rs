@@ -1,0 +1,254 @@
+//! The amplitude spectrum: Hann window, mean removed, zero padded, peaks interpolated and refined on the true time stamps.
+//!
+//! ```text
+//! X(ω) = Σₖ w(tₖ) θ(tₖ) e^{−iωtₖ},   w = ½ − ½ cos 2π(t − t₀)/T,   amplitude = 2|X| / Σ w
+//! ```
+//! The transform runs on an even grid of the median step. Between neighbours at most three steps apart the grid is filled by interpolation (four
+//! points, cubic); across longer gaps it carries no weight, which is what a missing sample means in the sum above. The peaks found there
+//! are then moved to the maximum of the sum on the true time stamps, so that neither grid nor interpolation biases a frequency.
+
+use nalgebra::Complex;
+use rustfft::FftPlanner;
+use serde::Serialize;
+
+use super::estimate::Estimate;
+use super::signal::{LinkSamples, Signal};
+
+/// Least ratio of the padded length to the record.
+const PADDING: usize = 4;
+/// Longest distance between neighbours, in median steps, that the grid is filled across.
+const BRIDGE_STEPS: f64 = 3.0;
+/// Main lobe of the Hann window from zero to zero, in 1/T.
+const HANN_LOBE: f64 = 4.0;
+/// Width of the Hann window's main lobe at half power, in 1/T.
+const HANN_HALF_POWER: f64 = 1.44;
+
+/// A peak of the spectrum.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Peak {
+    /// Where it is.
+    pub frequency_hz: Estimate,
+    /// Amplitude of a steady sinusoid that would give it, the root of the sum of squares over the links.
+    pub amplitude_rad: f64,
+    /// Power over the median power around: see [`Spectrum::significant`].
+    pub over_floor: f64,
+}
+
+/// Amplitude spectrum of all links together.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Spectrum {
+    /// 1/T: two modes closer than this cannot be told apart.
+    pub resolution_hz: f64,
+    /// Width at half power that the window gives to a pure line.
+    pub window_width_hz: f64,
+    /// Share of steps that differ from the median by more than 5 %.
+    pub irregular_share: f64,
+    /// Share of grid points without weight.
+    pub missing_share: f64,
+    /// Highest first.
+    pub peaks: Vec<Peak>,
+    /// Spacing of `amplitude_rad`.
+    #[serde(skip)]
+    pub step_hz: f64,
+    /// From 0 Hz to the Nyquist frequency.
+    #[serde(skip)]
+    pub amplitude_rad: Vec<f64>,
+}
+
+impl Spectrum {
+    /// The spectrum of a signal; the share of irregular steps is only kept beside it.
+    pub fn of(signal: &Signal, irregular_share: f64) -> Self {
+        let duration_s = signal.duration_s().max(signal.step_s);
+        let points = (duration_s / signal.step_s).round() as usize + 1;
+        let padded = (PADDING * points).next_power_of_two();
+        let transform = FftPlanner::new().plan_fft_forward(padded);
+        let mut power = vec![0.0; padded / 2 + 1];
+        let mut missing = 0;
+        for link in &signal.links {
+            let (mut buffer, weight, absent) = windowed_grid(link, signal, points);
+            missing += absent;
+            buffer.resize(padded, Complex::new(0.0, 0.0));
+            transform.process(&mut buffer);
+            for (p, x) in power.iter_mut().zip(&buffer) {
+                *p += x.norm_sqr() * (2.0 / weight).powi(2);
+            }
+        }
+        let step_hz = 1.0 / (padded as f64 * signal.step_s);
+        let resolution_hz = 1.0 / duration_s;
+        let mut spectrum = Self {
+            resolution_hz,
+            window_width_hz: HANN_HALF_POWER * resolution_hz,
+            irregular_share,
+            missing_share: missing as f64 / (points * signal.links.len()) as f64,
+            peaks: Vec::new(),
+            step_hz,
+            amplitude_rad: power.iter().map(|p| p.sqrt()).collect(),
+        };
+        spectrum.peaks = spectrum.find_peaks(signal, &power);
+        spectrum
+    }
+
+    fn find_peaks(&self, signal: &Signal, power: &[f64]) -> Vec<Peak> {
+        let lobe = (0.5 * HANN_LOBE * self.resolution_hz / self.step_hz).round() as usize;
+        let first = (1.5 * self.resolution_hz / self.step_hz).ceil() as usize;
+        let floor = median(power).max(f64::MIN_POSITIVE);
+        let is_peak = |k: usize| {
+            let around = k.saturating_sub(lobe).max(1)..(k + lobe + 1).min(power.len());
+            around.clone().all(|j| power[j] <= power[k])
+        };
+        let mut found: Vec<usize> = (first..power.len().saturating_sub(1)).filter(|k| is_peak(*k)).collect();
+        found.sort_by(|a, b| power[*b].total_cmp(&power[*a]));
+        found.truncate(8);
+        // the median of a sum of n exponentials is its mean times about 1 − 1/3n
+        let noise_power = floor / (1.0 - 1.0 / (3.0 * signal.links.len() as f64));
+        let peak = |k: &usize| {
+            let refined = refine(signal, *k as f64 * self.step_hz, self.resolution_hz);
+            let sd_hz = line_sd_hz(signal, refined.0, noise_power);
+            Peak {
+                frequency_hz: Estimate::new(refined.0, sd_hz, 1e6),
+                amplitude_rad: refined.1,
+                over_floor: power[*k] / floor,
+            }
+        };
+        found.iter().map(peak).collect()
+    }
+
+    /// The peaks that noise alone would show in one of a thousand records.
+    pub fn significant(&self) -> impl Iterator<Item = &Peak> {
+        // power over its median is exponential with mean 1/ln 2; (number of independent frequencies) e^{−P ln 2} = 0.001
+        let independent = self.amplitude_rad.len() as f64 * self.step_hz / self.resolution_hz;
+        let least = (independent / 1e-3).ln() / std::f64::consts::LN_2;
+        self.peaks.iter().filter(move |p| p.over_floor > least)
+    }
+}
+
+/// The Hann window of a signal at an instant.
+fn hann(signal: &Signal, t_s: f64) -> f64 {
+    let phase = (t_s - signal.span_s[0]) / signal.duration_s().max(f64::MIN_POSITIVE);
+    0.5 - 0.5 * (std::f64::consts::TAU * phase).cos()
+}
+
+/// Windowed values on the grid, the sum of their weights, and how many carry none.
+fn windowed_grid(link: &LinkSamples, signal: &Signal, points: usize) -> (Vec<Complex<f64>>, f64, usize) {
+    let mean = weighted_mean(link, signal);
+    let (mut weight, mut absent) = (0.0, 0);
+    let mut grid = Vec::with_capacity(points);
+    for k in 0..points {
+        let t = signal.span_s[0] + k as f64 * signal.step_s;
+        let value = match interpolate(link, t, BRIDGE_STEPS * signal.step_s) {
+            Some(theta) => {
+                let w = hann(signal, t);
+                weight += w;
+                w * (theta - mean)
+            }
+            None => {
+                absent += 1;
+                0.0
+            }
+        };
+        grid.push(Complex::new(value, 0.0));
+    }
+    (grid, weight.max(f64::MIN_POSITIVE), absent)
+}
+
+fn weighted_mean(link: &LinkSamples, signal: &Signal) -> f64 {
+    let (sum, weight) = link.t_s.iter().zip(&link.theta_rad).fold((0.0, 0.0), |(s, v), (t, a)| {
+        let w = hann(signal, *t);
+        (s + w * a, v + w)
+    });
+    sum / weight.max(f64::MIN_POSITIVE)
+}
+
+/// The cubic through the four nearest samples, or `None` in a gap.
+fn interpolate(link: &LinkSamples, t_s: f64, longest_s: f64) -> Option<f64> {
+    let n = link.t_s.len();
+    let after = link.t_s.partition_point(|t| *t < t_s);
+    if link.t_s.get(after).is_some_and(|t| t - t_s < 1e-6 * longest_s) {
+        return Some(link.theta_rad[after]);
+    }
+    if after == 0 || after >= n {
+        // the grid's last point may lie a rounding beyond the last sample
+        let nearest = after.min(n - 1);
+        return ((link.t_s[nearest] - t_s).abs() < 0.2 * longest_s).then(|| link.theta_rad[nearest]);
+    }
+    if link.t_s[after] - link.t_s[after - 1] > longest_s {
+        return None;
+    }
+    let from = after.saturating_sub(2).min(n.saturating_sub(4));
+    let (t, a) = (&link.t_s[from..(from + 4).min(n)], &link.theta_rad[from..(from + 4).min(n)]);
+    let weight = |i: usize| (0..t.len()).filter(|j| *j != i).map(|j| (t_s - t[j]) / (t[i] - t[j])).product::<f64>();
+    Some((0..t.len()).map(|i| a[i] * weight(i)).sum())
+}
+
+/// The maximum of the windowed sum on the true time stamps near a frequency, with the amplitude there: golden-section search.
+fn refine(signal: &Signal, near_hz: f64, resolution_hz: f64) -> (f64, f64) {
+    let means: Vec<f64> = signal.links.iter().map(|l| weighted_mean(l, signal)).collect();
+    let power = |f_hz: f64| {
+        let each = signal.links.iter().zip(&means);
+        each.map(|(link, mean)| {
+            let (mut x, mut weight) = (Complex::new(0.0, 0.0), 0.0);
+            for (t, a) in link.t_s.iter().zip(&link.theta_rad) {
+                let w = hann(signal, *t);
+                x += Complex::from_polar(w * (a - mean), -std::f64::consts::TAU * f_hz * (t - signal.span_s[0]));
+                weight += w;
+            }
+            (2.0 / weight).powi(2) * x.norm_sqr()
+        })
+        .sum::<f64>()
+    };
+    let golden = 0.5 * (5f64.sqrt() - 1.0);
+    let (mut low, mut high) = (near_hz - 0.5 * resolution_hz, near_hz + 0.5 * resolution_hz);
+    let (mut a, mut b) = (high - golden * (high - low), low + golden * (high - low));
+    let (mut pa, mut pb) = (power(a), power(b));
+    while high - low > 1e-5 * resolution_hz {
+        if pa > pb {
+            (high, b, pb) = (b, a, pa);
+            a = high - golden * (high - low);
+            pa = power(a);
+        } else {
+            (low, a, pa) = (a, b, pb);
+            b = low + golden * (high - low);
+            pb = power(b);
+        }
+    }
+    let best = 0.5 * (low + high);
+    (best, power(best).sqrt())
+}
+
+/// Standard deviation of an interpolated peak in white noise of variance s², from the first-order shift of the maximum of |X|²:
+///
+/// ```text
+/// δω = s √(½ Σ w²(t−t̄)²) / (|X| V),   t̄ = Re(X₁/X),  V = Re(X₂/X) − t̄²,   Xₖ = Σ w tᵏ θ e^{−iωt}
+/// ```
+/// V is the spread in time of the windowed oscillation, so that damping is allowed for. With a flat window and no damping it is the Cramér–Rao
+/// bound √24 s/(A√N T). A noise of variance s² has the mean power 4 s² Σw²/(Σw)² on the spectrum's scale.
+fn line_sd_hz(signal: &Signal, f_hz: f64, noise_power: f64) -> f64 {
+    let (mut variance, mut curvature) = (0.0, 0.0);
+    for link in &signal.links {
+        let mean = weighted_mean(link, signal);
+        let mut moments = [Complex::new(0.0, 0.0); 3];
+        let (mut w1, mut w2) = (0.0, [0.0; 3]);
+        for (t, a) in link.t_s.iter().zip(&link.theta_rad) {
+            let (w, tau) = (hann(signal, *t), t - signal.span_s[0]);
+            let x = Complex::from_polar(w * (a - mean), -std::f64::consts::TAU * f_hz * tau);
+            let powers = [1.0, tau, tau * tau];
+            w1 += w;
+            for k in 0..3 {
+                moments[k] += x * powers[k];
+                w2[k] += w * w * powers[k];
+            }
+        }
+        let centre = (moments[1] / moments[0]).re;
+        let spread = (moments[2] / moments[0]).re - centre * centre;
+        let noise2 = noise_power / signal.links.len() as f64 * w1 * w1 / (4.0 * w2[0]);
+        variance += moments[0].norm_sqr() * 0.5 * noise2 * (w2[2] - 2.0 * centre * w2[1] + centre * centre * w2[0]);
+        curvature += moments[0].norm_sqr() * spread;
+    }
+    variance.max(0.0).sqrt() / curvature.max(f64::MIN_POSITIVE) / std::f64::consts::TAU
+}
+
+fn median(values: &[f64]) -> f64 {
+    let mut sorted = values.to_vec();
+    let middle = sorted.len() / 2;
+    *sorted.select_nth_unstable_by(middle, f64::total_cmp).1
+}

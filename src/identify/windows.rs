@@ -1,0 +1,163 @@
+//! A recording cut into windows of a few cycles, with damped sinusoids fitted in each on its own.
+//!
+//! Amplitude and phase at a window's middle do not depend on the frequency and damping fitted within it, nor on the other windows.
+
+use nalgebra::Complex;
+
+use super::signal::Signal;
+use super::sinusoids::{Pole, SinusoidFit};
+
+/// Cycles of the slowest mode in a window.
+const WINDOW_CYCLES: f64 = 4.0;
+/// An amplitude must exceed this many of its standard deviations, or its phase cannot be followed.
+const CLEAR_OF_NOISE: f64 = 5.0;
+
+/// One mode in one window.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Moment {
+    /// The window's middle.
+    pub t_s: f64,
+    /// Complex amplitude of the mode, scaled to the link that moves most.
+    pub amplitude_rad: Complex<f64>,
+    /// Standard deviation of its real and imaginary part.
+    pub sd_rad: f64,
+    /// Frequency within the window, for joining the phases.
+    pub omega_rad_s: f64,
+}
+
+impl Moment {
+    /// A, with the noise's share of its square removed.
+    pub fn amplitude_rad(&self) -> f64 {
+        (self.amplitude_rad.norm_sqr() - self.sd_rad * self.sd_rad).max(0.0).sqrt()
+    }
+}
+
+/// The windows of a recording.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Windows {
+    /// Length of each.
+    pub window_s: f64,
+    /// `[mode][window]`, those clear of the noise.
+    pub moments: Vec<Vec<Moment>>,
+    /// Noise of each link, from what the windows' fits leave over.
+    pub noise_rad: Vec<f64>,
+    /// θᵢ/θ₁ of each mode, all windows together: `[mode][link]`.
+    pub shapes: Vec<Vec<Complex<f64>>>,
+    /// Standard deviation of the real and imaginary part of each.
+    pub shape_sd: Vec<Vec<f64>>,
+}
+
+impl Windows {
+    /// Cuts a signal into windows and fits these modes in each.
+    ///
+    /// # Errors
+    /// In words, when there are fewer than three windows.
+    pub fn of(signal: &Signal, fit: &SinusoidFit) -> Result<Self, String> {
+        let slowest = fit.poles.iter().map(|p| p.omega_rad_s).fold(f64::INFINITY, f64::min);
+        let cycles = signal.duration_s() * slowest / std::f64::consts::TAU;
+        let count = (cycles / WINDOW_CYCLES).floor();
+        if count < 3.0 {
+            return Err(format!(
+                "{cycles:.1} cycles are too few to see an amplitude change; record at least {:.0}",
+                3.0 * WINDOW_CYCLES
+            ));
+        }
+        let window_s = signal.duration_s() / count;
+        let mut fits: Vec<SinusoidFit> = Vec::new();
+        let mut previous = fit.poles.clone();
+        for k in 0..count as usize {
+            let from_s = signal.span_s[0] + k as f64 * window_s;
+            // the last sample belongs to the last window
+            let until_s = from_s + window_s + if k + 1 == count as usize { signal.step_s } else { 0.0 };
+            let window = signal.between(from_s, until_s);
+            if let Some(local) = window_fit(&window, from_s + 0.5 * window_s, &previous, &fit.poles) {
+                previous.clone_from(&local.poles);
+                previous.extend_from_slice(&fit.poles[local.poles.len()..]);
+                fits.push(local);
+            }
+        }
+        let noise_rad: Vec<f64> = (0..signal.links.len()).map(|link| pooled_noise(&fits, link)).collect();
+        let modes = fit.poles.len();
+        let mut windows = Self { window_s, moments: Vec::new(), noise_rad, shapes: Vec::new(), shape_sd: Vec::new() };
+        for mode in 0..modes {
+            let local: Vec<&SinusoidFit> = fits.iter().filter(|f| f.poles.len() > mode).collect();
+            let (shape, sd) = shape(&local, fit, mode);
+            windows.moments.push(moments(&local, mode, &shape));
+            windows.shapes.push(shape);
+            windows.shape_sd.push(sd);
+        }
+        Ok(windows)
+    }
+}
+
+/// Fits a window with all modes, or with fewer when the weaker ones have died away.
+fn window_fit(window: &Signal, origin_s: f64, previous: &[Pole], whole: &[Pole]) -> Option<SinusoidFit> {
+    let best = |modes: usize| {
+        let starts = [&previous[..modes], &whole[..modes]];
+        let fits = starts.iter().filter_map(|start| SinusoidFit::from_start(window, origin_s, start));
+        let near = |f: &SinusoidFit| {
+            f.poles.iter().zip(previous).all(|(a, b)| (a.omega_rad_s / b.omega_rad_s - 1.0).abs() < 0.25)
+        };
+        fits.filter(near).min_by(|a, b| a.deviance.total_cmp(&b.deviance))
+    };
+    let clear = |f: &SinusoidFit| {
+        (0..f.poles.len())
+            .all(|m| f.links.iter().any(|l| l.amplitudes_rad[m].norm() > CLEAR_OF_NOISE * l.amplitude_sd_rad[m]))
+    };
+    (1..=whole.len()).rev().filter_map(best).find(clear)
+}
+
+fn pooled_noise(fits: &[SinusoidFit], link: usize) -> f64 {
+    // the median is not drawn up by the first, largest swings, where a sinusoid fits worst
+    let mut noises: Vec<f64> = fits.iter().map(|f| f.links[link].noise_rad).collect();
+    if noises.is_empty() {
+        return f64::NAN;
+    }
+    let middle = noises.len() / 2;
+    *noises.select_nth_unstable_by(middle, f64::total_cmp).1
+}
+
+/// θᵢ/θ₁ over all windows, each weighted by its own certainty; of the whole record's fit where no window shows the mode.
+fn shape(local: &[&SinusoidFit], whole: &SinusoidFit, mode: usize) -> (Vec<Complex<f64>>, Vec<f64>) {
+    let source: Vec<&SinusoidFit> = if local.is_empty() { vec![whole] } else { local.to_vec() };
+    let links = 0..whole.links.len();
+    let each = links.map(|link| {
+        let (mut cross, mut power, mut variance) = (Complex::new(0.0, 0.0), 0.0, 0.0);
+        for fit in &source {
+            let (first, this) = (&fit.links[0], &fit.links[link]);
+            let weight =
+                1.0 / this.amplitude_sd_rad[mode].hypot(first.amplitude_sd_rad[mode]).powi(2).max(f64::MIN_POSITIVE);
+            cross += weight * this.amplitudes_rad[mode] * first.amplitudes_rad[mode].conj();
+            power += weight * first.amplitudes_rad[mode].norm_sqr();
+        }
+        let ratio = cross / power;
+        for fit in &source {
+            let (first, this) = (&fit.links[0], &fit.links[link]);
+            let sd2 = this.amplitude_sd_rad[mode].powi(2) + (ratio.norm() * first.amplitude_sd_rad[mode]).powi(2);
+            variance += first.amplitudes_rad[mode].norm_sqr() / sd2.max(f64::MIN_POSITIVE);
+        }
+        (ratio, if link == 0 { 0.0 } else { variance.recip().sqrt() })
+    });
+    each.unzip()
+}
+
+/// The mode's amplitude in each window, projected on its shape, scaled to the link that moves most.
+fn moments(local: &[&SinusoidFit], mode: usize, shape: &[Complex<f64>]) -> Vec<Moment> {
+    let largest = shape.iter().map(|s| s.norm()).fold(0.0, f64::max);
+    let each = local.iter().map(|fit| {
+        let (mut sum, mut weight) = (Complex::new(0.0, 0.0), 0.0);
+        for (link, s) in fit.links.iter().zip(shape) {
+            let (s, certainty) = (s / largest, link.amplitude_sd_rad[mode].powi(-2));
+            sum += certainty * s.conj() * link.amplitudes_rad[mode];
+            weight += certainty * s.norm_sqr();
+        }
+        Moment {
+            t_s: fit.origin_s,
+            amplitude_rad: sum / weight,
+            sd_rad: weight.recip().sqrt(),
+            omega_rad_s: fit.poles[mode].omega_rad_s,
+        }
+    });
+    let sound = |m: &Moment| m.sd_rad > 0.0 && m.sd_rad.is_finite();
+    each.filter(sound).take_while(|m| m.amplitude_rad.norm() > CLEAR_OF_NOISE * m.sd_rad).collect()
+}
