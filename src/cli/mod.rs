@@ -1,9 +1,11 @@
 //! The command line: parse → options → stage → write → exit code. One file a command.
 
 mod bar;
+mod fit;
 mod modes;
 mod paper;
 mod render;
+mod simulate;
 mod table;
 mod track;
 
@@ -27,6 +29,8 @@ pub struct Cli {
 #[derive(Debug, Subcommand)]
 enum Command {
     Track(track::TrackArgs),
+    Fit(fit::FitArgs),
+    Simulate(simulate::SimulateArgs),
     Render(render::RenderArgs),
     Modes(modes::ModesArgs),
     Paper(paper::PaperArgs),
@@ -45,6 +49,8 @@ impl Cli {
     pub fn run() -> ExitCode {
         exit(match Self::parse().command {
             Command::Track(args) => args.run(),
+            Command::Fit(args) => args.run(),
+            Command::Simulate(args) => args.run(),
             Command::Render(args) => args.run(),
             Command::Modes(args) => args.run(),
             Command::Paper(args) => args.run(),

@@ -110,11 +110,11 @@ pub fn fit(records: &[Record], experiment: &Experiment, free: &[Parameter]) -> R
     problem.learn_noise(&[], 0);
     let refused = || Error::Simulation { detail: "no motion near the start values follows the recording; check [specimen] and [model]".into() };
     let lower = problem.lower();
-    let robust = Descent { huber: 4.0, most_steps: 30, enough: 1e-3 };
+    let robust = Descent { huber: 4.0, most_steps: 30, enough: 0.03 };
     let first = robust.run(start, &lower, |x| problem.blocks(x)).ok_or_else(refused)?;
     let (kept, outliers) = without_outliers(&problem, &first.x)?;
     let problem = Problem { records: &kept, ..problem };
-    let outcome = Descent { most_steps: 30, ..Descent::default() }.run(first.x, &lower, |x| problem.blocks(x)).ok_or_else(refused)?;
+    let outcome = Descent { most_steps: 30, enough: 1e-3, ..Descent::default() }.run(first.x, &lower, |x| problem.blocks(x)).ok_or_else(refused)?;
     let uncertainty = interval::uncertainty(&problem, &outcome);
     let residuals = residuals(&problem, &outcome.x, &noise_rad)?;
     let (marks, free) = (problem.marks(), problem.free.len());
@@ -131,8 +131,9 @@ pub fn fit(records: &[Record], experiment: &Experiment, free: &[Parameter]) -> R
     })
 }
 
-/// The recordings without values that stand out from their neighbours: by more than six robust standard deviations from the median residual
-/// of the seven around. A misfit of the model moves neighbours together and is no outlier.
+/// The recordings without values that stand out from their neighbours: whose residual is further from the cubic through two on each side than
+/// six robust standard deviations of that distance, here and in the recording as a whole. A misfit of the model is smooth in time and moves
+/// neighbours together. Where more than one value in fifty stands out, the noise is not normal, and none is left out.
 fn without_outliers(problem: &Problem<'_>, x: &[f64]) -> Result<(Vec<Record>, Vec<Vec<(usize, usize)>>)> {
     let mut kept = problem.records.to_vec();
     let mut outliers = vec![Vec::new(); kept.len()];
@@ -144,22 +145,42 @@ fn without_outliers(problem: &Problem<'_>, x: &[f64]) -> Result<(Vec<Record>, Ve
                 .filter(|(value, _)| value.link == link)
                 .map(|(value, r)| (value.row, *r))
                 .collect();
-            let apart: Vec<f64> = (0..own.len())
-                .map(|i| {
-                    let around = &own[i.saturating_sub(3)..(i + 4).min(own.len())];
-                    own[i].1 - median(around.iter().map(|a| a.1).collect())
-                })
-                .collect();
-            let scale = 1.4826 * median(apart.iter().map(|a| a.abs()).collect());
-            for ((row, _), apart) in own.iter().zip(&apart) {
-                if apart.abs() > OUTLIER * scale.max(f64::MIN_POSITIVE) && *row > 0 {
-                    record.theta_rad[link][*row] = None;
-                    outliers[index].push((link, *row));
-                }
+            for row in standing_out(own) {
+                record.theta_rad[link][row] = None;
+                outliers[index].push((link, row));
             }
         }
     }
     Ok((kept, outliers))
+}
+
+/// Rows whose residual stands out; the farthest first, as it pulls at its neighbours' cubics.
+fn standing_out(mut own: Vec<(usize, f64)>) -> Vec<usize> {
+    let most = own.len() / 50;
+    let sizes: Vec<f64> = (0..own.len()).map(|i| apart(&own, i).abs()).collect();
+    let scale = |sizes: &[f64]| 1.4826 * median(sizes.to_vec());
+    let everywhere = scale(&sizes);
+    let here: Vec<f64> = (0..own.len()).map(|i| scale(&sizes[i.saturating_sub(30)..(i + 31).min(sizes.len())])).collect();
+    let mut limits: Vec<f64> = here.iter().map(|here| OUTLIER * here.max(everywhere)).collect();
+    let mut rows = Vec::new();
+    loop {
+        let beyond = (0..own.len()).map(|i| (i, apart(&own, i).abs() - limits[i])).max_by(|a, b| a.1.total_cmp(&b.1));
+        let Some((i, _)) = beyond.filter(|(_, beyond)| *beyond > 0.0) else { return rows };
+        if rows.len() == most {
+            return Vec::new();
+        }
+        rows.push(own.remove(i).0);
+        limits.remove(i);
+    }
+}
+
+/// How far a residual is from the cubic through the two before and the two after it; zero at the ends.
+fn apart(own: &[(usize, f64)], i: usize) -> f64 {
+    if i < 2 || i + 2 >= own.len() {
+        return 0.0;
+    }
+    let [a, b, c, d] = [own[i - 2].1, own[i - 1].1, own[i + 1].1, own[i + 2].1];
+    own[i].1 - (4.0 * (b + c) - a - d) / 6.0
 }
 
 fn residuals(problem: &Problem<'_>, x: &[f64], noise_rad: &[Vec<f64>]) -> Result<Vec<Residuals>> {

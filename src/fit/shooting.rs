@@ -15,7 +15,7 @@ use crate::error::Result;
 use crate::model::Accuracy;
 
 /// Standard deviations of the seams (in units of the noise), from loose to tight.
-const SEAMS: [f64; 4] = [300.0, 30.0, 3.0, 0.3];
+const SEAMS: [f64; 3] = [300.0, 30.0, 3.0];
 /// Steps of the descent for each.
 const STEPS_EACH: usize = 8;
 /// Length of a stretch, in periods of the model's pace.
@@ -61,7 +61,7 @@ pub fn multiple_shooting(problem: &mut Problem<'_>) -> Result<Vec<f64>> {
     lower.resize(x.len(), f64::NEG_INFINITY);
     problem.accuracy = Accuracy { step_error_rad: 1e-6, ..Accuracy::default() };
     for (round, seam) in SEAMS.iter().enumerate() {
-        let descent = Descent { huber: 4.0, most_steps: STEPS_EACH, enough: 1e-3 };
+        let descent = Descent { huber: 4.0, most_steps: STEPS_EACH, enough: 0.3 };
         let Some(outcome) = descent.run(x.clone(), &lower, |x| blocks(problem, &stretches, x, *seam, pace_rad_s)) else {
             break;
         };

@@ -105,6 +105,24 @@ impl Verdict {
         Self { departs, peaks: residuals.values.iter().map(|values| peaks(values)).collect(), windows, ratio }
     }
 
+    /// In words: reproduced or not, from which second on, at which amplitude, how far the phase drifts.
+    pub fn statement(&self) -> String {
+        let Some(departure) = self.departs else {
+            return "reproduced: in no window does the residual exceed the noise.".to_owned();
+        };
+        let Departure { link, from_s, amplitude_rad, rms_rad, share } = departure;
+        let last = self.windows.iter().rev().find_map(|w| w.links.get(link)).copied();
+        let drift = last.map_or(String::new(), |l| {
+            format!(" At the end the recording is {:+.1} ms late and {:+.1} % larger.", 1e3 * l.lag_s, 1e2 * l.gain)
+        });
+        format!(
+            "not reproduced: from {from_s:.2} s on, at an amplitude of {amplitude_rad:.3} rad, θ{} differs by {:.2} mrad rms; {:.0} % of the windows from there on exceed the noise.{drift}",
+            link + 1,
+            1e3 * rms_rad,
+            1e2 * share,
+        )
+    }
+
     /// Whether no window is a misfit.
     pub fn is_reproduced(&self) -> bool {
         self.departs.is_none()

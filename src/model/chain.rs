@@ -4,7 +4,7 @@ use std::ops::Range;
 
 use nalgebra::DMatrix;
 
-use super::{Motion, Partials};
+use super::{Motion, Parameter, Partials};
 use crate::error::{Error, Result};
 use crate::experiment::{Inertia, Link, Specimen};
 
@@ -42,17 +42,7 @@ impl Chain {
             return Err(Error::Simulation { detail: "the specimen has no link; give specimen.link_lengths_m".into() });
         }
         let n = links.len();
-        let mass_below = |i: usize| links[i + 1..].iter().map(|l| l.mass_kg).sum::<f64>();
-        let static_moment_kg_m: Vec<f64> =
-            (0..n).map(|i| links[i].mass_kg * links[i].com_m + links[i].length_m * mass_below(i)).collect();
-        let inertia_kg_m2 = DMatrix::from_fn(n, n, |i, j| {
-            if i == j {
-                let Link { length_m, mass_kg, com_m, inertia_kg_m2 } = links[i];
-                inertia_kg_m2 + mass_kg * com_m * com_m + mass_below(i) * length_m * length_m
-            } else {
-                links[i.min(j)].length_m * static_moment_kg_m[i.max(j)]
-            }
-        });
+        let (inertia_kg_m2, static_moment_kg_m) = coefficients(&links);
         let scaled = DMatrix::from_fn(n, n, |i, j| {
             inertia_kg_m2[(i, j)] / (inertia_kg_m2[(i, i)] * inertia_kg_m2[(j, j)]).sqrt()
         });
@@ -155,6 +145,57 @@ impl Chain {
         &self.groups
     }
 
+    /// The value of a parameter of a link.
+    pub fn value(&self, parameter: Parameter) -> Option<f64> {
+        match parameter {
+            Parameter::FirstInertia => self.links.first().map(|l| l.inertia_kg_m2),
+            Parameter::FirstCom => self.links.first().map(|l| l.com_m),
+            Parameter::SecondInertia => self.links.get(1).map(|l| l.inertia_kg_m2),
+            Parameter::SecondCom => self.links.get(1).map(|l| l.com_m),
+            _ => None,
+        }
+    }
+
+    /// Sets a parameter of a link; others are left alone.
+    pub fn set(&mut self, parameter: Parameter, value: f64) {
+        let of_first = matches!(parameter, Parameter::FirstInertia | Parameter::FirstCom);
+        let Some(link) = self.links.get_mut(usize::from(!of_first)) else { return };
+        match parameter {
+            Parameter::FirstInertia | Parameter::SecondInertia => link.inertia_kg_m2 = value,
+            Parameter::FirstCom | Parameter::SecondCom => link.com_m = value,
+            _ => return,
+        }
+        (self.inertia_kg_m2, self.static_moment_kg_m) = coefficients(&self.links);
+    }
+
+    /// Adds the derivative of the chain's torques with a parameter of a link. They are linear in a and h, so it is their value for
+    ///
+    /// ```text
+    /// ∂aᵢᵢ/∂Iᵢ = 1      ∂aᵢᵢ/∂cᵢ = 2mᵢcᵢ,  ∂aᵢⱼ/∂cᵢ = Lⱼmᵢ for j < i,  ∂hᵢ/∂cᵢ = mᵢ
+    /// ```
+    pub fn add_sensitivity(&self, parameter: Parameter, gravity_m_s2: f64, motion: &Motion, q: &mut [f64]) {
+        let (i, of_com) = match parameter {
+            Parameter::FirstInertia => (0, false),
+            Parameter::FirstCom => (0, true),
+            Parameter::SecondInertia => (1, false),
+            Parameter::SecondCom => (1, true),
+            _ => return,
+        };
+        let Some(link) = self.links.get(i) else { return };
+        if !of_com {
+            q[i] -= motion.acceleration[i];
+            return;
+        }
+        let mass_kg = link.mass_kg;
+        q[i] -= gravity_m_s2 * mass_kg * motion.sin[i] + 2.0 * mass_kg * link.com_m * motion.acceleration[i];
+        for j in 0..i {
+            let a = self.links[j].length_m * mass_kg;
+            let (sin, cos) = (motion.sin_difference(i, j), motion.cos_difference(i, j));
+            q[i] -= a * (cos * motion.acceleration[j] + sin * motion.rate[j] * motion.rate[j]);
+            q[j] -= a * (cos * motion.acceleration[i] - sin * motion.rate[i] * motion.rate[i]);
+        }
+    }
+
     /// Adds −Σⱼ aᵢⱼ [cos(θᵢ−θⱼ) θ̈ⱼ + sin(θᵢ−θⱼ) θ̇ⱼ²] − g hᵢ sin θᵢ (N·m): the links' own inertia, and gravity.
     pub fn add_torque(&self, gravity_m_s2: f64, motion: &Motion, q: &mut [f64]) {
         for i in 0..self.count() {
@@ -196,6 +237,23 @@ impl Chain {
     fn a(&self, i: usize, j: usize) -> f64 {
         self.inertia_kg_m2[(i, j)]
     }
+}
+
+/// a and h of some links.
+fn coefficients(links: &[Link]) -> (DMatrix<f64>, Vec<f64>) {
+    let n = links.len();
+    let mass_below = |i: usize| links[i + 1..].iter().map(|l| l.mass_kg).sum::<f64>();
+    let static_moment_kg_m: Vec<f64> =
+        (0..n).map(|i| links[i].mass_kg * links[i].com_m + links[i].length_m * mass_below(i)).collect();
+    let inertia_kg_m2 = DMatrix::from_fn(n, n, |i, j| {
+        if i == j {
+            let Link { length_m, mass_kg, com_m, inertia_kg_m2 } = links[i];
+            inertia_kg_m2 + mass_kg * com_m * com_m + mass_below(i) * length_m * length_m
+        } else {
+            links[i.min(j)].length_m * static_moment_kg_m[i.max(j)]
+        }
+    });
+    (inertia_kg_m2, static_moment_kg_m)
 }
 
 #[cfg(test)]

@@ -74,7 +74,9 @@ impl ForwardModel {
 
     /// Every coefficient with its value.
     pub fn parameters(&self) -> Vec<(Parameter, f64)> {
-        self.effects.iter().flat_map(|e| e.parameters()).collect()
+        let of_links = [Parameter::FirstInertia, Parameter::FirstCom, Parameter::SecondInertia, Parameter::SecondCom];
+        let of_links = of_links.into_iter().filter_map(|p| self.chain.value(p).map(|value| (p, value)));
+        self.effects.iter().flat_map(|e| e.parameters()).chain(of_links).collect()
     }
 
     /// The value of a coefficient, where a law has it.
@@ -85,6 +87,7 @@ impl ForwardModel {
     /// Sets a coefficient of the laws that have it.
     pub fn set(&mut self, parameter: Parameter, value: f64) {
         self.effects.iter_mut().for_each(|e| e.set(parameter, value));
+        self.chain.set(parameter, value);
         if parameter == Parameter::HingeCoulomb {
             self.friction_n_m = self.friction_n_m.map(|_| value);
         }
@@ -149,6 +152,7 @@ impl ForwardModel {
     /// ∂Q/∂parameter; `partials` are those of the same instant.
     pub fn sensitivity(&self, parameter: Parameter, motion: &Motion, partials: &Partials, q: &mut [f64]) {
         q.fill(0.0);
+        self.chain.add_sensitivity(parameter, self.gravity_m_s2, motion, q);
         self.effects.iter().for_each(|e| e.add_sensitivity(parameter, &self.chain, motion, q));
         if let Some(support) = self.support() {
             let [velocity, acceleration] = support.slopes(parameter, motion.t_s);

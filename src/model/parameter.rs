@@ -39,6 +39,14 @@ pub enum Parameter {
     SupportCosine,
     /// Frequency of the pivot's motion.
     SupportFrequency,
+    /// Inertia of the first link about its centre of mass.
+    FirstInertia,
+    /// Distance of the first link's centre of mass from its pivot.
+    FirstCom,
+    /// Inertia of the second link about its centre of mass.
+    SecondInertia,
+    /// Distance of the second link's centre of mass from its pivot.
+    SecondCom,
     /// ε of the camera's clock.
     TimeBase,
     /// Time of the frames missing at one instant.
@@ -72,6 +80,10 @@ impl Parameter {
             Self::SupportSine => "support_motion.sine_m",
             Self::SupportCosine => "support_motion.cosine_m",
             Self::SupportFrequency => "support_motion.frequency_hz",
+            Self::FirstInertia => "links.1.inertia_kg_m2",
+            Self::FirstCom => "links.1.com_m",
+            Self::SecondInertia => "links.2.inertia_kg_m2",
+            Self::SecondCom => "links.2.com_m",
             Self::TimeBase => "time_base",
             Self::DroppedFrames => "dropped_frames",
             Self::CameraTilt => "camera_tilt",
@@ -93,7 +105,8 @@ impl Parameter {
             Self::AirQuadratic => "kg/m2",
             Self::AddedMass => "kg/m",
             Self::SideForce => "m/s2",
-            Self::SupportSine | Self::SupportCosine => "m",
+            Self::SupportSine | Self::SupportCosine | Self::FirstCom | Self::SecondCom => "m",
+            Self::FirstInertia | Self::SecondInertia => "kg m2",
             Self::SupportFrequency => "Hz",
             Self::TimeBase | Self::AngleGain => "1",
             Self::DroppedFrames | Self::DifferentialLag => "s",
@@ -124,12 +137,16 @@ impl Parameter {
             | Self::AirLinear
             | Self::AirQuadratic
             | Self::AddedMass
-            | Self::SupportFrequency => true,
+            | Self::SupportFrequency
+            | Self::FirstInertia
+            | Self::FirstCom
+            | Self::SecondInertia
+            | Self::SecondCom => true,
         }
     }
 
     /// Every parameter.
-    pub const ALL: [Self; 22] = [
+    pub const ALL: [Self; 26] = [
         Self::JointStiffness,
         Self::JointDamping,
         Self::RestCurl,
@@ -147,6 +164,10 @@ impl Parameter {
         Self::SupportSine,
         Self::SupportCosine,
         Self::SupportFrequency,
+        Self::FirstInertia,
+        Self::FirstCom,
+        Self::SecondInertia,
+        Self::SecondCom,
         Self::TimeBase,
         Self::DroppedFrames,
         Self::CameraTilt,

@@ -1,0 +1,336 @@
+//! `freeswing fit`: the forward model's parameters, and whether it reproduces the recording.
+
+use std::fmt::Write;
+use std::path::PathBuf;
+
+use serde_json::{Value, json};
+
+use super::table::{Table, number, paragraph};
+use crate::error::{Error, Result};
+use crate::experiment::Experiment;
+use crate::fit::{self, Fit, Record, Verdict};
+use crate::model::{ForwardModel, Parameter};
+use crate::output::OutputFile;
+use crate::series::AngleSeries;
+
+/// Fit the forward model to recordings: parameters, simulated against measured, does it reproduce the decay.
+#[derive(Debug, clap::Args)]
+#[command(after_help = "\
+Examples:
+  freeswing fit angles.csv --config videos/kapton.toml
+  freeswing fit small.csv large.csv --config experiment.toml --free hinge_coulomb --json fit.json
+
+Free are the joint's spring and damper, every effect named in [model.effects] (its value is the start), and of one link the hinge's
+viscous damper. A joint whose k_eq_n_m_per_rad is 0 has no spring. Several recordings share all parameters but not their release.")]
+pub struct FitArgs {
+    /// Tables of angles of one specimen; `-` is standard input.
+    #[arg(required = true, value_name = "ANGLES")]
+    angles: Vec<PathBuf>,
+    /// The experiment file: specimen, rig and model.
+    #[arg(long, value_name = "FILE")]
+    config: PathBuf,
+    /// Write all of it as JSON; `-` for standard output.
+    #[arg(long, value_name = "FILE")]
+    json: Option<PathBuf>,
+    /// Let a parameter or effect free that the file does not name; may be repeated.
+    #[arg(long, value_name = "ID")]
+    free: Vec<String>,
+    /// Keep a parameter at its value in the file; may be repeated.
+    #[arg(long, value_name = "ID")]
+    fix: Vec<String>,
+    /// Use rows from this stamp on.
+    #[arg(long, value_name = "S", default_value_t = f64::NEG_INFINITY, hide_default_value = true)]
+    from: f64,
+    /// Use rows before this stamp.
+    #[arg(long, value_name = "S", default_value_t = f64::INFINITY, hide_default_value = true)]
+    until: f64,
+    /// Nothing on standard output.
+    #[arg(long)]
+    quiet: bool,
+}
+
+impl FitArgs {
+    /// Fits and prints.
+    ///
+    /// # Errors
+    /// One line: what, where, what to do.
+    pub fn run(&self) -> Result<()> {
+        let experiment = Experiment::read(&self.config)?;
+        let model = ForwardModel::of(&experiment)?;
+        let marks = model.chain().groups().len();
+        let records = (self.angles.iter())
+            .map(|path| {
+                let series = AngleSeries::read(path)?;
+                let rows = series.rows(self.from, self.until);
+                let kept = series.slice(rows);
+                if kept.len() < crate::series::FEWEST_ROWS {
+                    let message = format!("{} rows between --from and --until; widen them", kept.len());
+                    return Err(Error::Table { path: path.clone(), line: None, message });
+                }
+                Record::of(&kept, marks)
+            })
+            .collect::<Result<Vec<Record>>>()?;
+        let free = free_parameters(&experiment, marks, &self.free, &self.fix)?;
+        let json = self.json.as_deref().map(OutputFile::create).transpose()?;
+        let window_s = std::f64::consts::TAU / model.pace_rad_s();
+        let report = Report {
+            given: Side::of(fit::fit(&records, &experiment, &[])?, window_s),
+            fitted: Side::of(fit::fit(&records, &experiment, &free)?, window_s),
+            start: free.iter().map(|p| model.value(*p).unwrap_or(0.0)).collect(),
+            records: &records,
+            specimen: &experiment.specimen.name,
+        };
+        let text = if self.quiet { String::new() } else { report.text() };
+        super::deliver(&text, &report.json(), json)
+    }
+}
+
+/// The parameters a fit leaves free.
+fn free_parameters(experiment: &Experiment, marks: usize, more: &[String], fix: &[String]) -> Result<Vec<Parameter>> {
+    let parse = |id: &String| {
+        let nearest = || {
+            Parameter::ALL
+                .into_iter()
+                .map(|p| (strsim::jaro_winkler(id, p.id()), p.id()))
+                .max_by(|a, b| a.0.total_cmp(&b.0))
+                .map_or("", |n| n.1)
+        };
+        Parameter::from_id(id).ok_or_else(|| Error::Option {
+            option: id.clone(),
+            message: format!("no such parameter; the nearest known one is `{}`", nearest()),
+        })
+    };
+    let fix = fix.iter().map(parse).collect::<Result<Vec<_>>>()?;
+    let effects = &experiment.model.effects;
+    let mut free = Vec::new();
+    if marks > 1 {
+        if effects.distributed_flexibility.is_some() {
+            free.push(Parameter::BendingStiffness);
+        } else if experiment.model.k_eq_n_m_per_rad > 0.0 {
+            free.push(Parameter::JointStiffness);
+        }
+        free.push(Parameter::JointDamping);
+    } else {
+        free.push(Parameter::HingeViscous);
+    }
+    let named = [
+        (effects.rest_curl, Parameter::RestCurl),
+        (effects.joint_cubic_stiffness, Parameter::JointCubicStiffness),
+        (effects.joint_hysteretic.map(|h| h.torque_n_m), Parameter::HysteresisTorque),
+        (effects.joint_hysteretic.map(|h| h.yield_rad), Parameter::HysteresisYield),
+        (effects.hinge_viscous, Parameter::HingeViscous),
+        (effects.hinge_coulomb, Parameter::HingeCoulomb),
+        (effects.hinge_stiffness, Parameter::HingeStiffness),
+        (effects.air_linear, Parameter::AirLinear),
+        (effects.air_quadratic, Parameter::AirQuadratic),
+        (effects.added_mass, Parameter::AddedMass),
+        (effects.side_force, Parameter::SideForce),
+        (effects.support_motion.map(|s| s.amplitude_m), Parameter::SupportSine),
+        (effects.support_motion.map(|s| s.amplitude_m), Parameter::SupportCosine),
+        (effects.support_motion.map(|s| s.frequency_hz), Parameter::SupportFrequency),
+        (effects.time_base, Parameter::TimeBase),
+        (effects.camera_tilt, Parameter::CameraTilt),
+        (effects.angle_gain, Parameter::AngleGain),
+        (effects.differential_lag, Parameter::DifferentialLag),
+    ];
+    free.extend(named.into_iter().filter_map(|(value, parameter)| value.map(|_| parameter)));
+    for id in more {
+        free.push(parse(id)?);
+    }
+    free.retain(|p| !fix.contains(p));
+    let mut once = Vec::new();
+    free.retain(|p| !once.contains(p) && { once.push(*p); true });
+    Ok(free)
+}
+
+struct Side {
+    fit: Fit,
+    verdicts: Vec<Verdict>,
+}
+
+impl Side {
+    fn of(fit: Fit, window_s: f64) -> Self {
+        let verdicts = fit.residuals.iter().map(|r| Verdict::of(r, window_s)).collect();
+        Self { fit, verdicts }
+    }
+}
+
+struct Report<'a> {
+    given: Side,
+    fitted: Side,
+    start: Vec<f64>,
+    records: &'a [Record],
+    specimen: &'a str,
+}
+
+impl Report<'_> {
+    fn text(&self) -> String {
+        let mut text = format!("{}\n\n", self.specimen);
+        self.parameters(&mut text);
+        for index in 0..self.records.len() {
+            self.recording(index, &mut text);
+        }
+        text
+    }
+
+    fn parameters(&self, text: &mut String) {
+        let mut table = Table::new(["parameter", "fitted", "sd", "95 % from", "to", "in the file", "unit"]);
+        for (estimate, start) in self.fitted.fit.estimates.iter().zip(&self.start) {
+            table.row([
+                estimate.parameter.id().to_owned(),
+                number(estimate.value, 5),
+                number(estimate.sd, 2),
+                number(estimate.low, 4),
+                number(estimate.high, 4),
+                number(*start, 4),
+                estimate.parameter.unit().to_owned(),
+            ]);
+        }
+        text.push_str(&table.text());
+        for estimate in &self.fitted.fit.estimates {
+            if !estimate.is_determined() {
+                let (id, high) = (estimate.parameter.id(), number(estimate.high, 3));
+                let line = format!("{id} is not told from zero: at most {high} {}", estimate.parameter.unit());
+                text.push_str(&paragraph("  ", &line));
+            }
+        }
+        for combination in self.fitted.fit.undetermined.iter().filter(|c| c.len() > 1) {
+            let names: Vec<&str> = combination.iter().map(|(p, _)| p.id()).collect();
+            text.push_str(&paragraph("  ", &format!("Only together, not one by one: {}", names.join(", "))));
+        }
+        for (pair, correlation) in self.strong_correlations() {
+            text.push_str(&paragraph("  ", &format!("{} and {} are correlated by {correlation:.3}", pair[0], pair[1])));
+        }
+        if self.fitted.fit.coloured {
+            text.push_str(&paragraph("  ", "The residuals are correlated in time; the intervals are widened for it."));
+        }
+    }
+
+    fn strong_correlations(&self) -> Vec<([&'static str; 2], f64)> {
+        let fit = &self.fitted.fit;
+        let mut strong = Vec::new();
+        for i in 0..fit.estimates.len() {
+            for j in 0..i {
+                let c = fit.correlation[(i, j)];
+                if c.abs() > 0.95 {
+                    strong.push(([fit.estimates[j].parameter.id(), fit.estimates[i].parameter.id()], c));
+                }
+            }
+        }
+        strong
+    }
+
+    fn recording(&self, index: usize, text: &mut String) {
+        let record = &self.records[index];
+        let _ = writeln!(
+            text,
+            "\n{}: {} rows, {:.3} s to {:.3} s",
+            record.path.display(),
+            record.len(),
+            record.t_s[0],
+            record.t_s[record.len() - 1]
+        );
+        let mut table = Table::new(["", "noise mrad", "left by the fit", "by the file's values"]);
+        for link in 0..record.links() {
+            let milli = |rad: f64| number(1e3 * rad, 3);
+            table.row([
+                format!("θ{}", link + 1),
+                milli(self.fitted.fit.residuals[index].noise_rad[link]),
+                milli(self.fitted.fit.residuals[index].rmse_rad[link]),
+                milli(self.given.fit.residuals[index].rmse_rad[link]),
+            ]);
+        }
+        text.push_str(&table.text());
+        for (name, side) in [("Fitted", &self.fitted), ("With the file's values", &self.given)] {
+            text.push_str(&paragraph("  ", &format!("{name}: {}", side.verdicts[index].statement())));
+        }
+        let outliers = self.fitted.fit.outliers[index].len();
+        if outliers > 0 {
+            let plural = if outliers == 1 { "value stands" } else { "values stand" };
+            text.push_str(&paragraph("  ", &format!("{outliers} {plural} apart from the neighbours and was left out")));
+        }
+        self.peaks(index, text);
+    }
+
+    /// A few turning points from the first to the last.
+    fn peaks(&self, index: usize, text: &mut String) {
+        for (link, peaks) in self.fitted.verdicts[index].peaks.iter().enumerate() {
+            if peaks.is_empty() {
+                continue;
+            }
+            let mut table =
+                Table::new([&format!("θ{} turns at s", link + 1), "measured mrad", "simulated", "turns later by ms"]);
+            let shown = 6.min(peaks.len());
+            for k in 0..shown {
+                let peak = peaks[k * (peaks.len() - 1) / (shown - 1).max(1)];
+                table.row([
+                    format!("{:.3}", peak.t_s),
+                    format!("{:.2}", 1e3 * peak.measured_rad),
+                    format!("{:.2}", 1e3 * peak.simulated_rad),
+                    format!("{:.2}", 1e3 * peak.lag_s),
+                ]);
+            }
+            text.push('\n');
+            text.push_str(&table.text());
+        }
+    }
+
+    fn json(&self) -> Value {
+        json!({
+            "schema": "freeswing.fit/1",
+            "specimen": self.specimen,
+            "parameters": self.fitted.fit.estimates.iter().zip(&self.start).map(|(e, start)| (e.parameter.id().to_owned(), json!({
+                "value": e.value, "sd": e.sd, "low95": e.low, "high95": e.high, "start": start,
+                "unit": e.parameter.unit(), "at_bound": e.at_bound, "determined": e.is_determined(),
+            }))).collect::<serde_json::Map<_, _>>(),
+            "correlation": rows(&self.fitted.fit.correlation),
+            "undetermined": self.fitted.fit.undetermined.iter().map(|c| c.iter().map(|(p, share)| json!([p.id(), share])).collect()).collect::<Vec<Value>>(),
+            "coloured_residuals": self.fitted.fit.coloured,
+            "converged": self.fitted.fit.ending == fit::Ending::Converged,
+            "recordings": (0..self.records.len()).map(|i| self.recording_json(i)).collect::<Vec<_>>(),
+        })
+    }
+
+    fn recording_json(&self, index: usize) -> Value {
+        let side = |side: &Side| {
+            let verdict = &side.verdicts[index];
+            json!({
+                "rmse_rad": side.fit.residuals[index].rmse_rad,
+                "noise_rad": side.fit.residuals[index].noise_rad,
+                "start_rad_and_rad_s": side.fit.starts[index],
+                "reproduced": verdict.is_reproduced(),
+                "statement": verdict.statement(),
+                "departs": verdict.departs.map(|d| json!({
+                    "angle": d.link + 1, "from_s": d.from_s, "amplitude_rad": d.amplitude_rad, "rms_rad": d.rms_rad,
+                    "share_of_windows_after": d.share,
+                })),
+                "windows": verdict.windows.iter().map(window_json).collect::<Vec<_>>(),
+                "peaks": verdict.peaks.iter().map(|peaks| peaks.iter().map(|p| json!({
+                    "t_s": p.t_s, "measured_rad": p.measured_rad, "simulated_rad": p.simulated_rad, "lag_s": p.lag_s,
+                })).collect::<Vec<_>>()).collect::<Vec<_>>(),
+            })
+        };
+        let record = &self.records[index];
+        json!({
+            "file": record.path,
+            "rows": record.len(),
+            "outliers": self.fitted.fit.outliers[index].iter().map(|(link, row)| json!({"angle": link + 1, "t_s": record.t_s[*row]})).collect::<Vec<_>>(),
+            "fitted": side(&self.fitted),
+            "given": side(&self.given),
+        })
+    }
+}
+
+fn window_json(window: &fit::verdict::Window) -> Value {
+    json!({
+        "from_s": window.from_s,
+        "until_s": window.until_s,
+        "angles": window.links.iter().map(|l| json!({
+            "amplitude_rad": l.amplitude_rad, "rms_rad": l.rms_rad, "lag_s": l.lag_s, "gain": l.gain, "misfit": l.misfit,
+        })).collect::<Vec<_>>(),
+    })
+}
+
+fn rows(matrix: &nalgebra::DMatrix<f64>) -> Vec<Vec<f64>> {
+    matrix.row_iter().map(|row| row.iter().copied().collect()).collect()
+}
