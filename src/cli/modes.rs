@@ -70,13 +70,13 @@ fn floor(survey: &Survey, text: &mut String) {
 fn chain(survey: &Survey, text: &mut String) {
     let chain = &survey.chain;
     let links = chain.rest_rad.len();
-    let _ = writeln!(
-        text,
-        "\nChain of {links} link{}: K = {} N·m/rad, C = {} N·m·s/rad at each joint",
-        if links == 1 { "" } else { "s" },
-        setting(chain.joint_stiffness_n_m_per_rad),
-        setting(chain.joint_damping_n_m_s_per_rad)
-    );
+    let spring = match (chain.joint_stiffness_n_m_per_rad, chain.bending_stiffness_n_m2) {
+        (Some(stiffness), _) => format!("K = {} N·m/rad", setting(stiffness)),
+        (None, bending) => format!("EI = {} N·m²", setting(bending.unwrap_or(0.0))),
+    };
+    let damper = setting(chain.joint_damping_n_m_s_per_rad);
+    let plural = if links == 1 { "" } else { "s" };
+    let _ = writeln!(text, "\nChain of {links} link{plural}: {spring}, C = {damper} N·m·s/rad at each joint");
     if chain.rest_rad.iter().any(|a| a.abs() > 1e-9) {
         let angles: Vec<String> = chain.rest_rad.iter().map(|a| format!("{:.2}°", a.to_degrees())).collect();
         text.push_str(&paragraph("  at rest at ", &angles.join(", ")));

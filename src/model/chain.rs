@@ -1,7 +1,10 @@
 //! The chain: n rigid links hung one below the other from a hinge.
 
-use nalgebra::{DMatrix, DVector};
+use std::ops::Range;
 
+use nalgebra::DMatrix;
+
+use super::{Motion, Partials};
 use crate::error::{Error, Result};
 use crate::experiment::{Inertia, Link, Specimen};
 
@@ -24,6 +27,9 @@ pub struct Chain {
     inertia_kg_m2: DMatrix<f64>,
     /// h.
     static_moment_kg_m: Vec<f64>,
+    /// σ of each joint.
+    joint_ratios: Vec<f64>,
+    groups: Vec<Range<usize>>,
 }
 
 impl Chain {
@@ -56,7 +62,34 @@ impl Chain {
                 detail: "a link swings without inertia; give every node below the hinge a mass (specimen.lumps)".into(),
             });
         }
-        Ok(Self { links, inertia_kg_m2, static_moment_kg_m })
+        let (joint_ratios, groups) = (vec![1.0; n - 1], (0..n).map(|i| i..i + 1).collect());
+        Ok(Self { links, inertia_kg_m2, static_moment_kg_m, joint_ratios, groups })
+    }
+
+    /// The strip cut into `pieces` equal rods for each length between marks: with EI/ℓ at every joint it approaches the continuous strip.
+    ///
+    /// # Errors
+    /// As [`Chain::new`]; also for a specimen given as general links, which are rigid.
+    pub fn continuous(specimen: &Specimen, pieces: usize) -> Result<Self> {
+        if !specimen.links.is_empty() {
+            let detail =
+                "distributed_flexibility bends a strip, and specimen.links are rigid; give link_lengths_m instead";
+            return Err(Error::Simulation { detail: detail.into() });
+        }
+        let marks = specimen.link_lengths_m.len();
+        let cut = |length_m: &f64| std::iter::repeat_n(*length_m / pieces as f64, pieces);
+        let strip = Specimen {
+            link_lengths_m: specimen.link_lengths_m.iter().flat_map(cut).collect(),
+            inertia: Inertia::Rods,
+            lumps: None,
+            ..specimen.clone()
+        };
+        let mut chain = Self::of(&strip)?;
+        let mark_length_m = specimen.link_lengths_m.iter().sum::<f64>() / marks as f64;
+        let own_m = |upper: usize| 0.5 * (strip.link_lengths_m[upper] + strip.link_lengths_m[upper + 1]);
+        chain.joint_ratios = (0..chain.count() - 1).map(|upper| mark_length_m / own_m(upper)).collect();
+        chain.groups = (0..marks).map(|mark| mark * pieces..(mark + 1) * pieces).collect();
+        Ok(chain)
     }
 
     /// The chain of a specimen: its `links`, or its strip as rods or lumps. The strip's whole mass is carried by the links in proportion
@@ -107,63 +140,61 @@ impl Chain {
         self.static_moment_kg_m[i]
     }
 
-    /// The inertia matrix aᵢⱼ cos(θᵢ−θⱼ) (kg·m²) in a position.
-    pub fn inertia_at(&self, motion: &Motion) -> DMatrix<f64> {
-        self.inertia_kg_m2.map_with_location(|i, j, a| a * motion.cos_difference(i, j))
+    /// Length of a link.
+    pub fn length_m(&self, i: usize) -> f64 {
+        self.links[i].length_m
     }
 
-    /// −Σⱼ aᵢⱼ sin(θᵢ−θⱼ) θ̇ⱼ² (N·m): the torque of the links' own rotation.
-    pub fn rotation_torque(&self, motion: &Motion) -> DVector<f64> {
-        let torque = |i: usize| -> f64 {
-            (0..self.count())
-                .map(|j| self.inertia_kg_m2[(i, j)] * motion.sin_difference(i, j) * motion.omega_rad_s[j].powi(2))
-                .sum()
-        };
-        DVector::from_fn(self.count(), |i, _| -torque(i))
+    /// σ of the joint below link `upper`: the length between marks over the links' own, see [`joint`](super::effects::joint).
+    pub fn joint_ratio(&self, upper: usize) -> f64 {
+        self.joint_ratios[upper]
     }
-}
 
-/// One instant of the motion, with the sines and cosines every law needs.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Motion {
-    /// Time.
-    pub t_s: f64,
-    /// θ.
-    pub theta_rad: Vec<f64>,
-    /// θ̇.
-    pub omega_rad_s: Vec<f64>,
-    /// sin θ.
-    pub sin: Vec<f64>,
-    /// cos θ.
-    pub cos: Vec<f64>,
-    /// Sideways velocity of the pivot.
-    pub pivot_m_s: f64,
-    /// Sideways acceleration of the pivot.
-    pub pivot_m_s2: f64,
-}
+    /// The links between each pair of consecutive marks, top to bottom.
+    pub fn groups(&self) -> &[Range<usize>] {
+        &self.groups
+    }
 
-impl Motion {
-    /// An instant with the pivot at rest.
-    pub fn new(t_s: f64, theta_rad: &[f64], omega_rad_s: &[f64]) -> Self {
-        Self {
-            t_s,
-            theta_rad: theta_rad.to_vec(),
-            omega_rad_s: omega_rad_s.to_vec(),
-            sin: theta_rad.iter().map(|a| a.sin()).collect(),
-            cos: theta_rad.iter().map(|a| a.cos()).collect(),
-            pivot_m_s: 0.0,
-            pivot_m_s2: 0.0,
+    /// Adds −Σⱼ aᵢⱼ [cos(θᵢ−θⱼ) θ̈ⱼ + sin(θᵢ−θⱼ) θ̇ⱼ²] − g hᵢ sin θᵢ (N·m): the links' own inertia, and gravity.
+    pub fn add_torque(&self, gravity_m_s2: f64, motion: &Motion, q: &mut [f64]) {
+        for i in 0..self.count() {
+            q[i] -= gravity_m_s2 * self.static_moment_kg_m[i] * motion.sin[i] + self.a(i, i) * motion.acceleration[i];
+            for j in 0..i {
+                let (a, sin, cos) = (self.a(i, j), motion.sin_difference(i, j), motion.cos_difference(i, j));
+                q[i] -= a * (cos * motion.acceleration[j] + sin * motion.rate[j] * motion.rate[j]);
+                q[j] -= a * (cos * motion.acceleration[i] - sin * motion.rate[i] * motion.rate[i]);
+            }
         }
     }
 
-    /// cos(θᵢ−θⱼ).
-    pub fn cos_difference(&self, i: usize, j: usize) -> f64 {
-        self.cos[i] * self.cos[j] + self.sin[i] * self.sin[j]
+    /// Adds the derivatives of these torques.
+    pub fn add_partials(&self, gravity_m_s2: f64, motion: &Motion, partials: &mut Partials) {
+        let (rate, acceleration) = (&motion.rate, &motion.acceleration);
+        for i in 0..self.count() {
+            partials.theta[(i, i)] -= gravity_m_s2 * self.static_moment_kg_m[i] * motion.cos[i];
+            partials.acceleration[(i, i)] -= self.a(i, i);
+            for j in (0..self.count()).filter(|j| *j != i) {
+                let (a, sin, cos) = (self.a(i, j), motion.sin_difference(i, j), motion.cos_difference(i, j));
+                let turn = a * (sin * acceleration[j] - cos * rate[j] * rate[j]);
+                partials.theta[(i, i)] += turn;
+                partials.theta[(i, j)] -= turn;
+                partials.rate[(i, j)] -= 2.0 * a * sin * rate[j];
+                partials.acceleration[(i, j)] -= a * cos;
+            }
+        }
     }
 
-    /// sin(θᵢ−θⱼ).
-    pub fn sin_difference(&self, i: usize, j: usize) -> f64 {
-        self.sin[i] * self.cos[j] - self.cos[i] * self.sin[j]
+    /// ½ΣΣ aᵢⱼ cos(θᵢ−θⱼ) θ̇ᵢθ̇ⱼ + g Σ hᵢ(1 − cos θᵢ): kinetic energy in the pivot's frame, and gravity's from the hanging position (J).
+    pub fn energy_j(&self, gravity_m_s2: f64, motion: &Motion) -> f64 {
+        let n = self.count();
+        let pair = |i: usize, j: usize| self.a(i, j) * motion.cos_difference(i, j) * motion.rate[i] * motion.rate[j];
+        let kinetic_j = 0.5 * (0..n).flat_map(|i| (0..n).map(move |j| pair(i, j))).sum::<f64>();
+        let height_j = |i: usize| gravity_m_s2 * self.static_moment_kg_m[i] * (1.0 - motion.cos[i]);
+        kinetic_j + (0..n).map(height_j).sum::<f64>()
+    }
+
+    fn a(&self, i: usize, j: usize) -> f64 {
+        self.inertia_kg_m2[(i, j)]
     }
 }
 

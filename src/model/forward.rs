@@ -1,37 +1,55 @@
 //! The equations of motion of the chain with its effects.
 
-use nalgebra::{DMatrix, DVector};
+use nalgebra::DVector;
 
-use super::chain::{Chain, Motion};
+use super::effects::outside::{NodalForces, SupportMotion};
 use super::effects::{Effect, effects_of};
+use super::{Chain, Hinge, Motion, Parameter, Partials};
 use crate::error::{Error, Result};
-use crate::experiment::{Experiment, SupportMotion};
+use crate::experiment::Experiment;
 
-/// A chain under gravity, with its effects.
+/// Rods for each length between marks, where the strip bends everywhere.
+const PIECES: usize = 6;
+
+/// A chain under gravity, with its effects, as a balance of torques (d'Alembert):
 ///
 /// ```text
-/// Σⱼ aᵢⱼ cos(θᵢ−θⱼ) θ̈ⱼ = −Σⱼ aᵢⱼ sin(θᵢ−θⱼ) θ̇ⱼ² − g hᵢ sin θᵢ + Qᵢ
+/// 0 = Q = −Σⱼ aᵢⱼ [cos(θᵢ−θⱼ) θ̈ⱼ + sin(θᵢ−θⱼ) θ̇ⱼ²] − g hᵢ sin θᵢ + the effects' torques
 /// ```
+///
+/// (paper Eq. 22–25 as corrected). Laws with variables of their own add one equation for each.
 #[derive(Debug)]
 pub struct ForwardModel {
     chain: Chain,
     gravity_m_s2: f64,
-    support: Option<SupportMotion>,
     effects: Vec<Box<dyn Effect>>,
+    hidden: usize,
+    /// τ, where the hinge is dry.
+    friction_n_m: Option<f64>,
 }
 
 impl ForwardModel {
-    /// The model an experiment describes.
+    /// The model an experiment describes. `distributed_flexibility` makes the strip a chain of six rods between marks.
     ///
     /// # Errors
-    /// [`Error::Simulation`] when the specimen cannot swing or an effect is not simulated.
+    /// [`Error::Simulation`] when the specimen cannot swing.
     pub fn of(experiment: &Experiment) -> Result<Self> {
-        Ok(Self {
-            chain: Chain::of(&experiment.specimen)?,
-            gravity_m_s2: experiment.rig.gravity_m_s2,
-            support: experiment.model.effects.support_motion,
-            effects: effects_of(&experiment.model)?,
-        })
+        let (specimen, model) = (&experiment.specimen, &experiment.model);
+        let chain = match model.effects.distributed_flexibility {
+            Some(_) => Chain::continuous(specimen, PIECES)?,
+            None => Chain::of(specimen)?,
+        };
+        let lengths_m = specimen.lengths_m();
+        let effects = effects_of(model, lengths_m.iter().sum::<f64>() / lengths_m.len() as f64);
+        let hidden = effects.iter().map(|e| e.hidden(&chain)).sum();
+        let friction_n_m = model.effects.hinge_coulomb;
+        Ok(Self { chain, gravity_m_s2: experiment.rig.gravity_m_s2, effects, hidden, friction_n_m })
+    }
+
+    /// The same with forces on the lower ends of the links.
+    pub fn with_forces(mut self, forces: NodalForces) -> Self {
+        self.effects.push(Box::new(forces));
+        self
     }
 
     /// The links.
@@ -39,105 +57,151 @@ impl ForwardModel {
         &self.chain
     }
 
-    /// Sideways position of the pivot (m): A sin(2πft + φ).
-    pub fn pivot_m(&self, t_s: f64) -> f64 {
-        self.support.map_or(0.0, |s| s.amplitude_m * phase_rad(&s, t_s).sin())
+    /// Number of rates: one a link, and the laws' own variables.
+    pub fn rates(&self) -> usize {
+        self.chain.count() + self.hidden
     }
 
-    /// Everything the laws need at one instant; θ and θ̇ top to bottom.
-    pub fn motion(&self, t_s: f64, theta_rad: &[f64], omega_rad_s: &[f64]) -> Motion {
-        let mut motion = Motion::new(t_s, theta_rad, omega_rad_s);
-        if let Some(support) = &self.support {
-            let rate_rad_s = std::f64::consts::TAU * support.frequency_hz;
-            motion.pivot_m_s = support.amplitude_m * rate_rad_s * phase_rad(support, t_s).cos();
-            motion.pivot_m_s2 = -support.amplitude_m * rate_rad_s.powi(2) * phase_rad(support, t_s).sin();
+    /// g.
+    pub fn gravity_m_s2(&self) -> f64 {
+        self.gravity_m_s2
+    }
+
+    /// τ of the hinge, where it is dry.
+    pub fn friction_n_m(&self) -> Option<f64> {
+        self.friction_n_m
+    }
+
+    /// Every coefficient with its value.
+    pub fn parameters(&self) -> Vec<(Parameter, f64)> {
+        self.effects.iter().flat_map(|e| e.parameters()).collect()
+    }
+
+    /// The value of a coefficient, where a law has it.
+    pub fn value(&self, parameter: Parameter) -> Option<f64> {
+        self.parameters().into_iter().find(|(p, _)| *p == parameter).map(|(_, value)| value)
+    }
+
+    /// Sets a coefficient of the laws that have it.
+    pub fn set(&mut self, parameter: Parameter, value: f64) {
+        self.effects.iter_mut().for_each(|e| e.set(parameter, value));
+        if parameter == Parameter::HingeCoulomb {
+            self.friction_n_m = self.friction_n_m.map(|_| value);
         }
+    }
+
+    /// √(g Σhᵢ / Σaᵢᵢ): the pace of the swing, for tolerances on rates.
+    pub fn pace_rad_s(&self) -> f64 {
+        let n = self.chain.count();
+        let moment: f64 = (0..n).map(|i| self.chain.static_moment_kg_m(i)).sum();
+        (self.gravity_m_s2.abs() * moment / self.chain.inertia_kg_m2().trace()).sqrt().max(1.0)
+    }
+
+    /// Sideways position of the pivot (m).
+    pub fn pivot_m(&self, t_s: f64) -> f64 {
+        self.support().map_or(0.0, |s| s.at(t_s)[0])
+    }
+
+    /// Sorted instants at which the forces change suddenly.
+    pub fn breaks_s(&self) -> Vec<f64> {
+        let mut breaks_s: Vec<f64> = self.effects.iter().flat_map(|e| e.breaks_s()).collect();
+        breaks_s.sort_by(f64::total_cmp);
+        breaks_s
+    }
+
+    /// An instant with the pivot where it then is.
+    pub fn motion(&self, t_s: f64, theta_rad: &[f64], rate: &[f64]) -> Motion {
+        let mut motion = Motion::zero(self.chain.count(), self.hidden);
+        motion.place(theta_rad);
+        motion.rate[..rate.len()].copy_from_slice(rate);
+        motion.hinge = Hinge::sliding(rate[0]);
+        self.set_time(&mut motion, t_s);
         motion
     }
 
-    /// θ̈ (rad/s²).
+    /// Sets the time, and with it the pivot.
+    pub fn set_time(&self, motion: &mut Motion, t_s: f64) {
+        motion.t_s = t_s;
+        if let Some(support) = self.support() {
+            [_, motion.pivot_m_s, motion.pivot_m_s2] = support.at(t_s);
+        }
+    }
+
+    /// Q: zero when the accelerations are those of the motion. `q` holds one value a rate.
+    pub fn torque(&self, motion: &Motion, q: &mut [f64]) {
+        self.free_torque(motion, q);
+        if motion.hinge == Hinge::Sticks {
+            q[0] = -self.chain.inertia_kg_m2()[(0, 0)] * motion.acceleration[0];
+        }
+    }
+
+    /// ∂Q.
+    pub fn partials(&self, motion: &Motion, partials: &mut Partials) {
+        partials.clear();
+        self.chain.add_partials(self.gravity_m_s2, motion, partials);
+        self.effects.iter().for_each(|e| e.add_partials(&self.chain, motion, partials));
+        if motion.hinge == Hinge::Sticks {
+            partials.clear_row(0);
+            partials.acceleration[(0, 0)] = -self.chain.inertia_kg_m2()[(0, 0)];
+        }
+    }
+
+    /// ∂Q/∂parameter; `partials` are those of the same instant.
+    pub fn sensitivity(&self, parameter: Parameter, motion: &Motion, partials: &Partials, q: &mut [f64]) {
+        q.fill(0.0);
+        self.effects.iter().for_each(|e| e.add_sensitivity(parameter, &self.chain, motion, q));
+        if let Some(support) = self.support() {
+            let [velocity, acceleration] = support.slopes(parameter, motion.t_s);
+            for (row, q) in q.iter_mut().enumerate() {
+                *q += velocity * partials.pivot_velocity[row] + acceleration * partials.pivot_acceleration[row];
+            }
+        }
+        if motion.hinge == Hinge::Sticks {
+            q[0] = 0.0;
+        }
+    }
+
+    /// Solves the balance for the accelerations.
     ///
     /// # Errors
-    /// [`Error::Simulation`] when the inertia matrix is not positive (a negative added mass).
-    pub fn acceleration(&self, motion: &Motion) -> Result<DVector<f64>> {
-        let torque_n_m = self.torque(motion);
-        let singular = || Error::Simulation { detail: format!("no inertia left at t = {:.3} s", motion.t_s) };
-        Ok(self.inertia(motion).cholesky().ok_or_else(singular)?.solve(&torque_n_m))
+    /// [`Error::Simulation`] when no inertia is left (a negative added mass).
+    pub fn accelerate(&self, motion: &mut Motion) -> Result<()> {
+        let (n, m) = (self.chain.count(), self.rates());
+        let mut partials = Partials::zero(n, m);
+        motion.acceleration.fill(0.0);
+        self.partials(motion, &mut partials);
+        let mut q = DVector::zeros(m);
+        self.torque(motion, q.as_mut_slice());
+        let inertia = -partials.acceleration;
+        let detail = || format!("no inertia left at t = {:.3} s; lower model.effects.added_mass", motion.t_s);
+        let solved = inertia.lu().solve(&q).filter(|a| a.iter().all(|v| v.is_finite()));
+        let solved = solved.ok_or_else(|| Error::Simulation { detail: detail() })?;
+        motion.acceleration.copy_from_slice(solved.as_slice());
+        Ok(())
+    }
+
+    /// What friction has to bear on the first link while it is held: the sum of all other torques on it (N·m).
+    pub fn hold_n_m(&self, motion: &Motion) -> f64 {
+        let mut held = motion.clone();
+        held.hinge = Hinge::Sticks;
+        let mut q = vec![0.0; self.rates()];
+        self.free_torque(&held, &mut q);
+        q[0]
     }
 
     /// Kinetic energy in the pivot's frame, gravity's from the hanging position, and what the effects store (J).
     pub fn energy_j(&self, motion: &Motion) -> f64 {
-        let omega = DVector::from_column_slice(&motion.omega_rad_s);
-        let kinetic_j = 0.5 * omega.dot(&(self.chain.inertia_at(motion) * &omega));
-        let height_j = |i: usize| self.gravity_m_s2 * self.chain.static_moment_kg_m(i) * (1.0 - motion.cos[i]);
         let stored_j: f64 = self.effects.iter().map(|e| e.energy_j(&self.chain, motion)).sum();
-        kinetic_j + (0..self.chain.count()).map(height_j).sum::<f64>() + stored_j
+        self.chain.energy_j(self.gravity_m_s2, motion) + stored_j
     }
 
-    fn inertia(&self, motion: &Motion) -> DMatrix<f64> {
-        let mut inertia_kg_m2 = self.chain.inertia_at(motion);
-        for effect in &self.effects {
-            effect.add_inertia(&self.chain, motion, &mut inertia_kg_m2);
-        }
-        inertia_kg_m2
+    fn free_torque(&self, motion: &Motion, q: &mut [f64]) {
+        q.fill(0.0);
+        self.chain.add_torque(self.gravity_m_s2, motion, q);
+        self.effects.iter().for_each(|e| e.add_torque(&self.chain, motion, q));
     }
 
-    fn torque(&self, motion: &Motion) -> DVector<f64> {
-        let mut torque_n_m = self.chain.rotation_torque(motion);
-        for i in 0..self.chain.count() {
-            torque_n_m[i] -= self.gravity_m_s2 * self.chain.static_moment_kg_m(i) * motion.sin[i];
-        }
-        for effect in &self.effects {
-            effect.add_torque(&self.chain, motion, &mut torque_n_m);
-        }
-        torque_n_m
-    }
-}
-
-fn phase_rad(support: &SupportMotion, t_s: f64) -> f64 {
-    std::f64::consts::TAU * support.frequency_hz * t_s + support.phase_rad
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::experiment::{Model, Rig};
-
-    #[test]
-    fn two_limp_rods_swing_at_1_3489_and_3_6180_hz() {
-        let experiment = Experiment {
-            rig: Rig { gravity_m_s2: 9.81, ..Rig::default() },
-            model: Model { k_eq_n_m_per_rad: 0.0, c_eq_n_m_s_per_rad: 0.0, ..Model::default() },
-            ..Experiment::default()
-        };
-        let model = ForwardModel::of(&experiment).unwrap();
-        let tiny = 1e-6;
-        let stiffness = DMatrix::from_columns(&[
-            -model.torque(&model.motion(0.0, &[tiny, 0.0], &[0.0; 2])) / tiny,
-            -model.torque(&model.motion(0.0, &[0.0, tiny], &[0.0; 2])) / tiny,
-        ]);
-        let inertia = model.inertia(&model.motion(0.0, &[0.0; 2], &[0.0; 2]));
-        let squares = (inertia.try_inverse().unwrap() * stiffness).complex_eigenvalues();
-        let mut hz: Vec<f64> = squares.iter().map(|l| l.re.sqrt() / std::f64::consts::TAU).collect();
-        hz.sort_by(f64::total_cmp);
-        assert!((hz[0] - 1.3489).abs() < 5e-5 && (hz[1] - 3.6180).abs() < 5e-5, "{hz:?}");
-    }
-
-    #[test]
-    fn a_steady_side_force_turns_gravity() {
-        let mut experiment = Experiment::default();
-        experiment.model.effects.side_force = Some(1.3);
-        let model = ForwardModel::of(&experiment).unwrap();
-        let rest = (1.3f64 / experiment.rig.gravity_m_s2).atan();
-        let alpha = model.acceleration(&model.motion(0.0, &[rest; 2], &[0.0; 2])).unwrap();
-        assert!(alpha.norm() < 1e-9);
-    }
-
-    #[test]
-    fn an_effect_that_is_not_simulated_is_refused() {
-        let mut experiment = Experiment::default();
-        experiment.model.effects.distributed_flexibility = Some(1e-6);
-        let error = ForwardModel::of(&experiment).unwrap_err().to_string();
-        assert!(error.contains("model.effects.distributed_flexibility is not simulated; remove it"), "{error}");
+    fn support(&self) -> Option<&SupportMotion> {
+        self.effects.iter().find_map(|e| e.pivot())
     }
 }

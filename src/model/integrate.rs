@@ -1,226 +1,373 @@
-//! The motion in time, by the explicit Runge–Kutta method of Dormand and Prince, order 5(4), with dense output.
+//! Step after step, with the step's length fitted to the error, from one reversal of a dry hinge to the next.
 
-use nalgebra::DVector;
-use ode_solvers::continuous_output_model::ContinuousOutputModel;
-use ode_solvers::dop_shared::IntegrationError;
-use ode_solvers::{Dopri5, OutputType, System};
+use nalgebra::{DMatrix, DVector};
 
-use super::forward::ForwardModel;
+use super::collocation::{RADAU, STAGES};
+use super::step::{Slopes, Stages, Start, Step};
+use super::{ForwardModel, Hinge, Parameter};
 use crate::error::{Error, Result};
 
-/// Error allowed in a step, relative to the state.
-const RELATIVE_TOLERANCE: f64 = 1e-10;
-/// Error allowed in a step, in rad and rad/s.
-const ABSOLUTE_TOLERANCE: f64 = 1e-12;
-/// Longest step: a tenth of a second cannot leap over a swing released from rest.
-const LONGEST_STEP_S: f64 = 0.1;
-/// Most steps in one motion. A minute of an ordinary strip takes about 40 000; a stiff one would take millions.
-const MOST_STEPS: u32 = 400_000;
+/// How exact a motion is to be.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Accuracy {
+    /// Error allowed in a step's angles.
+    pub step_error_rad: f64,
+    /// Longest step: even a motion that begins at rest is looked at this often.
+    pub longest_step_s: f64,
+    /// Most steps in one motion.
+    pub most_steps: usize,
+}
 
-/// Angles and rates of all links, top to bottom.
+impl Default for Accuracy {
+    fn default() -> Self {
+        Self { step_error_rad: 1e-10, longest_step_s: 0.1, most_steps: 2_000_000 }
+    }
+}
+
+/// What the derivatives of a motion are taken with.
 #[derive(Debug, Clone, PartialEq)]
-pub struct State {
-    /// θ.
+pub struct Directions {
+    /// The first columns.
+    pub parameters: Vec<Parameter>,
+    /// ∂θ at the start with the initial values, n × further columns.
+    pub theta: DMatrix<f64>,
+    /// ∂rate at the start, m × further columns.
+    pub rate: DMatrix<f64>,
+}
+
+/// Where a motion is.
+pub(super) struct Place {
+    pub t_s: f64,
     pub theta_rad: Vec<f64>,
-    /// θ̇.
-    pub omega_rad_s: Vec<f64>,
+    pub rate: Vec<f64>,
 }
 
-impl State {
-    /// At rest in a position.
-    pub fn at_rest(theta_rad: &[f64]) -> Self {
-        Self { theta_rad: theta_rad.to_vec(), omega_rad_s: vec![0.0; theta_rad.len()] }
-    }
+/// Points of a step where a reversal is looked for.
+const LOOKS: usize = 12;
 
-    fn from_vector(y: &DVector<f64>) -> Self {
-        let (theta, omega) = y.as_slice().split_at(y.len() / 2);
-        Self { theta_rad: theta.to_vec(), omega_rad_s: omega.to_vec() }
-    }
-}
-
-/// A motion, known at every instant between its ends.
-#[derive(Debug, Clone)]
-pub struct Trajectory {
-    output: ContinuousOutputModel<f64, DVector<f64>>,
-    start: State,
-    from_s: f64,
+/// Runs the model from `place` to `until_s`, handing every accepted step to `visit`.
+pub(super) fn integrate(
+    model: &ForwardModel,
+    place: Place,
     until_s: f64,
-}
-
-impl Trajectory {
-    /// Lets the model swing from `start` at `from_s` until `until_s`.
-    ///
-    /// # Errors
-    /// [`Error::Simulation`] when the state does not match the links, or the motion is too stiff for an explicit method: it is refused
-    /// after a fixed number of steps instead of crawling.
-    pub fn swing(model: &ForwardModel, start: &State, from_s: f64, until_s: f64) -> Result<Self> {
-        Self::swing_within(MOST_STEPS, model, start, from_s, until_s)
-    }
-
-    fn swing_within(most_steps: u32, model: &ForwardModel, start: &State, from_s: f64, until_s: f64) -> Result<Self> {
-        let n = model.chain().count();
-        if start.theta_rad.len() != n || start.omega_rad_s.len() != n {
-            let detail = format!("{} angles for {n} links; give model.release_rad one a link", start.theta_rad.len());
+    directions: Option<&Directions>,
+    accuracy: &Accuracy,
+    visit: &mut dyn FnMut(Step),
+) -> Result<()> {
+    let mut run = Run::new(model, place, directions, accuracy)?;
+    let mut steps = 0;
+    while run.place.t_s < until_s {
+        steps += 1;
+        if steps > accuracy.most_steps {
+            let detail = format!("more than {} steps up to t = {:.4} s", accuracy.most_steps, run.place.t_s);
             return Err(Error::Simulation { detail });
         }
-        let mut trajectory =
-            Self { output: ContinuousOutputModel::new(), start: start.clone(), from_s, until_s: until_s.max(from_s) };
-        if until_s > from_s {
-            let y = DVector::from_iterator(2 * n, start.theta_rad.iter().chain(&start.omega_rad_s).copied());
-            let mut solver = Dopri5::from_param(
-                Equations(model),
-                from_s,
-                until_s,
-                0.0,
-                y,
-                RELATIVE_TOLERANCE,
-                ABSOLUTE_TOLERANCE,
-                0.9,
-                0.04,
-                0.2,
-                10.0,
-                LONGEST_STEP_S,
-                0.0,
-                most_steps,
-                u32::MAX,
-                OutputType::Continuous,
+        if let Some(step) = run.advance(until_s)? {
+            visit(step);
+        }
+    }
+    Ok(())
+}
+
+struct Run<'a> {
+    model: &'a ForwardModel,
+    accuracy: &'a Accuracy,
+    stages: Stages<'a>,
+    breaks_s: Vec<f64>,
+    place: Place,
+    hinge: Hinge,
+    /// Accelerations at the place.
+    first: Vec<f64>,
+    length_s: f64,
+    /// The step before, whose polynomial goes on into the next.
+    last: Option<Step>,
+    parameters: Vec<Parameter>,
+    /// ∂θ and ∂rate at the place.
+    slopes: Option<(DMatrix<f64>, DMatrix<f64>)>,
+}
+
+/// What ends a step early.
+enum Turn {
+    Reverses,
+    Lets,
+}
+
+impl<'a> Run<'a> {
+    fn new(
+        model: &'a ForwardModel,
+        place: Place,
+        directions: Option<&Directions>,
+        accuracy: &'a Accuracy,
+    ) -> Result<Self> {
+        let slopes = directions.map(|d| {
+            let start = d.parameters.len();
+            let mut theta = DMatrix::zeros(d.theta.nrows(), start + d.theta.ncols());
+            let mut rate = DMatrix::zeros(d.rate.nrows(), start + d.rate.ncols());
+            theta.columns_mut(start, d.theta.ncols()).copy_from(&d.theta);
+            rate.columns_mut(start, d.rate.ncols()).copy_from(&d.rate);
+            (theta, rate)
+        });
+        let mut run = Self {
+            model,
+            accuracy,
+            stages: Stages::new(model),
+            breaks_s: model.breaks_s(),
+            place,
+            hinge: Hinge::SlidesForward,
+            first: Vec::new(),
+            length_s: 0.1 * accuracy.longest_step_s,
+            last: None,
+            parameters: directions.map(|d| d.parameters.clone()).unwrap_or_default(),
+            slopes,
+        };
+        run.hinge = run.hinge_at_start()?;
+        run.first = run.accelerations(run.hinge)?;
+        Ok(run)
+    }
+
+    /// One attempt at a step; `None` where it was too long and is to be tried again.
+    fn advance(&mut self, until_s: f64) -> Result<Option<Step>> {
+        let target_s = self.breaks_s.iter().copied().find(|b| *b > self.place.t_s).map_or(until_s, |b| b.min(until_s));
+        let left_s = target_s - self.place.t_s;
+        let mut h = self.length_s.min(self.accuracy.longest_step_s);
+        if left_s < 2.0 * h {
+            h = if left_s <= h * (1.0 + 1e-9) { left_s } else { 0.5 * left_s };
+        }
+        let mut k = self.guess(h);
+        let tolerance_rad = self.accuracy.step_error_rad;
+        let start = start_of(&self.place, self.hinge);
+        let Some(()) = self.stages.solve(&start, h, &mut k, tolerance_rad) else {
+            self.last = None;
+            return self.shorten(0.3 * h).map(|()| None);
+        };
+        let error = self.stages.error_rad(&start, h, &k, &self.first) / tolerance_rad;
+        let factor = 0.9 * error.max(1e-12).powf(-1.0 / (STAGES + 1) as f64);
+        if !(error <= 1.0) {
+            return self.shorten(h * factor.clamp(0.1, 0.9)).map(|()| None);
+        }
+        self.length_s = (h * factor.clamp(0.2, 5.0)).min(self.accuracy.longest_step_s).max(self.length_s.min(h));
+        let mut step = self.step(h, &k);
+        let turn = self.turn_in(&step);
+        if let Some((tau, _)) = &turn {
+            step = self.end_at(step, *tau)?;
+        }
+        if let Some((theta, rate)) = &self.slopes {
+            let k = DVector::from_column_slice(&step.stages);
+            let stages = self.stages.slopes(
+                &start_of(&self.place, self.hinge),
+                step.length_s,
+                &k,
+                &self.parameters,
+                (theta, rate),
             );
-            solver.integrate_with_continuous_output_model(&mut trajectory.output).map_err(refusal)?;
+            let stages = stages.ok_or_else(|| self.stuck("no derivatives"))?;
+            step.slopes = Some(Slopes { theta: theta.clone(), rate: rate.clone(), stages });
         }
-        Ok(trajectory)
-    }
-
-    /// The state at an instant; before the start and after the end it is the state there.
-    pub fn at(&self, t_s: f64) -> State {
-        let t_s = t_s.clamp(self.from_s, self.until_s);
-        // The last breakpoint may lie a rounding error before the end.
-        let inside = if self.until_s > self.from_s { t_s.min(self.output.bounds().1) } else { t_s };
-        self.output.evaluate(inside).map_or_else(|| self.start.clone(), |y| State::from_vector(&y))
-    }
-
-    /// The first and the last instant.
-    pub fn span_s(&self) -> (f64, f64) {
-        (self.from_s, self.until_s)
-    }
-}
-
-/// y = (θ, θ̇), y′ = (θ̇, θ̈).
-struct Equations<'a>(&'a ForwardModel);
-
-impl System<f64, DVector<f64>> for Equations<'_> {
-    fn system(&self, t_s: f64, y: &DVector<f64>, dy: &mut DVector<f64>) {
-        let n = y.len() / 2;
-        let (theta, omega) = y.as_slice().split_at(n);
-        dy.rows_mut(0, n).copy_from_slice(omega);
-        match self.0.acceleration(&self.0.motion(t_s, theta, omega)) {
-            Ok(alpha) => dy.rows_mut(n, n).copy_from(&alpha),
-            // Not-a-number makes the solver shorten its step and, at last, give up.
-            Err(_) => dy.rows_mut(n, n).fill(f64::NAN),
-        }
-    }
-}
-
-fn refusal(error: IntegrationError) -> Error {
-    let (t_s, what) = match error {
-        IntegrationError::MaxNumStepReached { x, n_step } => (x, format!("more than {} steps", n_step - 1)),
-        IntegrationError::StepSizeUnderflow { x } => (x, "steps without length".to_owned()),
-        IntegrationError::StiffnessDetected { x } => (x, "ever shorter steps".to_owned()),
-    };
-    Error::Simulation {
-        detail: format!(
-            "it takes {what} up to t = {t_s:.4} s; lower model.k_eq_n_m_per_rad, model.c_eq_n_m_s_per_rad or the largest effect"
-        ),
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::experiment::{Effects, Experiment, SupportMotion};
-
-    fn experiment(k: f64, c: f64, effects: Effects) -> Experiment {
-        let mut experiment = Experiment::default();
-        experiment.model.k_eq_n_m_per_rad = k;
-        experiment.model.c_eq_n_m_s_per_rad = c;
-        experiment.model.effects = effects;
-        experiment
-    }
-
-    fn energies_j(experiment: &Experiment, release: &[f64], until_s: f64) -> Vec<f64> {
-        let model = ForwardModel::of(experiment).unwrap();
-        let swing = Trajectory::swing(&model, &State::at_rest(release), 0.0, until_s).unwrap();
-        (0..=400)
-            .map(|i| {
-                let t_s = until_s * f64::from(i) / 400.0;
-                let state = swing.at(t_s);
-                model.energy_j(&model.motion(t_s, &state.theta_rad, &state.omega_rad_s))
-            })
-            .collect()
-    }
-
-    #[test]
-    fn energy_is_conserved_without_losses() {
-        let stored = Effects {
-            hinge_stiffness: Some(1e-5),
-            joint_cubic_stiffness: Some(1e-4),
-            rest_curl: Some(0.1),
-            added_mass: Some(3e-4),
-            side_force: Some(0.4),
-            ..Effects::default()
+        self.place = Place {
+            t_s: if turn.is_none() && h == left_s { target_s } else { step.from_s + step.length_s },
+            theta_rad: step.theta_rad(1.0),
+            rate: step.rate(1.0),
         };
-        for (effects, release) in [(Effects::default(), [0.9, -0.6]), (stored, [0.5, 0.8])] {
-            let energies = energies_j(&experiment(2e-4, 0.0, effects), &release, 5.0);
-            let worst = energies.iter().map(|e| (e / energies[0] - 1.0).abs()).fold(0.0, f64::max);
-            assert!(worst < 1e-8, "{worst}");
+        self.slopes = step.slopes(1.0);
+        self.first = step.last_acceleration().to_vec();
+        let jump = turn.is_some() || self.place.t_s == target_s;
+        if let Some((_, turn)) = turn {
+            self.change_hinge(&turn)?;
+        } else if self.place.t_s == target_s && target_s < until_s {
+            self.first = self.accelerations(self.hinge)?;
+        }
+        self.last = if jump { None } else { Some(Step { slopes: None, ..step.clone() }) };
+        Ok(Some(step))
+    }
+
+    fn shorten(&mut self, length_s: f64) -> Result<()> {
+        self.length_s = length_s;
+        if length_s < 1e-12 * (1.0 + self.place.t_s.abs()) {
+            Err(self.stuck("no step is short enough"))
+        } else {
+            Ok(())
         }
     }
 
-    #[test]
-    fn energy_never_rises_where_every_effect_dissipates() {
-        let losses = Effects {
-            hinge_viscous: Some(1e-7),
-            hinge_coulomb: Some(2e-7),
-            air_linear: Some(1e-4),
-            air_quadratic: Some(2e-3),
-            ..Effects::default()
+    fn stuck(&self, what: &str) -> Error {
+        Error::Simulation {
+            detail: format!(
+                "{what} at t = {:.4} s; lower the largest coefficient of [model] or the release",
+                self.place.t_s
+            ),
+        }
+    }
+
+    fn step(&self, length_s: f64, k: &DVector<f64>) -> Step {
+        Step {
+            from_s: self.place.t_s,
+            length_s,
+            theta_rad: self.place.theta_rad.clone(),
+            rate: self.place.rate.clone(),
+            stages: k.as_slice().to_vec(),
+            hinge: self.hinge,
+            slopes: None,
+        }
+    }
+
+    /// The polynomial of the step before goes on; after a jump the accelerations are taken as constant.
+    fn guess(&self, length_s: f64) -> DVector<f64> {
+        let m = self.first.len();
+        let mut k = DVector::zeros(STAGES * m);
+        for (stage, node) in RADAU.nodes.iter().enumerate() {
+            let guess = match &self.last {
+                Some(last) if length_s < 2.0 * last.length_s => {
+                    last.acceleration(1.0 + node * length_s / last.length_s)
+                }
+                _ => self.first.clone(),
+            };
+            k.rows_mut(stage * m, m).copy_from_slice(&guess);
+        }
+        k
+    }
+
+    fn accelerations(&self, hinge: Hinge) -> Result<Vec<f64>> {
+        // just after a break of the forces, should there be one here
+        let t_s = self.place.t_s + 1e-12 * (1.0 + self.place.t_s.abs());
+        let mut motion = self.model.motion(t_s, &self.place.theta_rad, &self.place.rate);
+        motion.hinge = hinge;
+        self.model.accelerate(&mut motion)?;
+        Ok(motion.acceleration)
+    }
+
+    /// What friction bears while the hinge is held at the place (N·m).
+    fn hold_n_m(&self) -> Result<f64> {
+        let mut motion = self.model.motion(self.place.t_s, &self.place.theta_rad, &self.place.rate);
+        motion.hinge = Hinge::Sticks;
+        motion.acceleration = self.accelerations(Hinge::Sticks)?;
+        Ok(self.model.hold_n_m(&motion))
+    }
+
+    fn hinge_at_start(&self) -> Result<Hinge> {
+        let Some(friction_n_m) = self.model.friction_n_m() else { return Ok(Hinge::SlidesForward) };
+        if self.place.rate[0] != 0.0 {
+            return Ok(Hinge::sliding(self.place.rate[0]));
+        }
+        let hold_n_m = self.hold_n_m()?;
+        Ok(if hold_n_m.abs() <= friction_n_m { Hinge::Sticks } else { Hinge::sliding(hold_n_m) })
+    }
+
+    /// Where in the step the hinge reverses, or is let go.
+    fn turn_in(&self, step: &Step) -> Option<(f64, Turn)> {
+        let friction_n_m = self.model.friction_n_m()?;
+        // positive as long as the hinge goes on as it is
+        let goes_on = |tau: f64| match self.hinge {
+            Hinge::Sticks => {
+                let mut motion =
+                    self.model.motion(step.from_s + tau * step.length_s, &step.theta_rad(tau), &step.rate(tau));
+                motion.hinge = Hinge::Sticks;
+                motion.acceleration = step.acceleration(tau);
+                friction_n_m - self.model.hold_n_m(&motion).abs()
+            }
+            slides => slides.sign() * step.one_rate(0, tau),
         };
-        let energies = energies_j(&experiment(2e-4, 1e-7, losses), &[0.5, 0.7], 5.0);
-        assert!(energies.windows(2).all(|e| e[1] <= e[0] * (1.0 + 1e-10)));
-        assert!(energies[400] < 0.9 * energies[0]);
+        let turn = |tau| (tau, if self.hinge == Hinge::Sticks { Turn::Lets } else { Turn::Reverses });
+        let mut inside = 0.0;
+        for look in 1..=LOOKS {
+            let tau = look as f64 / LOOKS as f64;
+            if goes_on(tau) < 0.0 {
+                return Some(turn(root(inside, tau, goes_on)));
+            }
+            inside = tau;
+        }
+        None
     }
 
-    #[test]
-    fn a_heavy_dry_hinge_stops_the_rod_off_the_vertical() {
-        let mut dry = experiment(0.0, 0.0, Effects { hinge_coulomb: Some(2e-4), ..Effects::default() });
-        dry.specimen.link_lengths_m = vec![0.2];
-        let model = ForwardModel::of(&dry).unwrap();
-        let swing = Trajectory::swing(&model, &State::at_rest(&[0.7]), 0.0, 3.0).unwrap();
-        let stopped = swing.at(3.0);
-        assert!(stopped.omega_rad_s[0].abs() < 2e-3 && stopped.theta_rad[0].abs() > 0.1, "{stopped:?}");
+    /// The same step, ended where the hinge turns.
+    fn end_at(&mut self, step: Step, tau: f64) -> Result<Step> {
+        let mut step = step;
+        let mut end = tau;
+        // the polynomial's root first; a second pass lands on the reversal of the shorter step itself
+        for _ in 0..2 {
+            let length_s = step.length_s * end;
+            if !(length_s > 1e-13) {
+                return Ok(step_of_no_length(step));
+            }
+            let mut k = DVector::zeros(step.stages.len());
+            let m = self.first.len();
+            for (stage, node) in RADAU.nodes.iter().enumerate() {
+                k.rows_mut(stage * m, m).copy_from_slice(&step.acceleration(node * end));
+            }
+            let start = start_of(&self.place, self.hinge);
+            let tolerance_rad = self.accuracy.step_error_rad;
+            self.stages.solve(&start, length_s, &mut k, tolerance_rad).ok_or_else(|| self.stuck("no reversal"))?;
+            step = self.step(length_s, &k);
+            if self.hinge == Hinge::Sticks {
+                break;
+            }
+            let correction_s = step.one_rate(0, 1.0) / step.last_acceleration()[0];
+            end = 1.0 - correction_s / length_s;
+            if !((end - 1.0).abs() < 0.1) || correction_s.abs() < 1e-13 {
+                break;
+            }
+        }
+        Ok(step)
     }
 
-    #[test]
-    fn a_pivot_that_moves_slowly_carries_the_chain_with_it() {
-        let slow = SupportMotion { amplitude_m: 0.01, frequency_hz: 0.05, phase_rad: 0.0 };
-        let moved = experiment(2e-4, 0.0, Effects { support_motion: Some(slow), ..Effects::default() });
-        let model = ForwardModel::of(&moved).unwrap();
-        let swing = Trajectory::swing(&model, &State::at_rest(&[0.0, 0.0]), 0.0, 10.0).unwrap();
-        // Sudden start of the pivot at 3 mm/s: the chain rings by v/√(gL) at most.
-        assert!((0..100).all(|i| swing.at(0.1 * f64::from(i)).theta_rad[0].abs() < 0.01));
+    fn change_hinge(&mut self, turn: &Turn) -> Result<()> {
+        let before = std::mem::take(&mut self.first);
+        match turn {
+            Turn::Lets => {
+                self.hinge = Hinge::sliding(self.hold_n_m()?);
+                self.first = self.accelerations(self.hinge)?;
+            }
+            Turn::Reverses => {
+                let back = Hinge::sliding(-self.hinge.sign());
+                self.place.rate[0] = 0.0;
+                let slid = self.accelerations(back)?;
+                let hold_n_m = self.hold_n_m()?;
+                let holds = self.model.friction_n_m().is_some_and(|friction_n_m| hold_n_m.abs() <= friction_n_m);
+                self.hinge = if slid[0] * back.sign() > 0.0 {
+                    back
+                } else if holds {
+                    Hinge::Sticks
+                } else {
+                    Hinge::sliding(hold_n_m)
+                };
+                self.first = if self.hinge == back { slid } else { self.accelerations(self.hinge)? };
+                self.jump_slopes(&before);
+            }
+        }
+        Ok(())
     }
 
-    #[test]
-    fn a_motion_too_stiff_is_refused_with_its_remedy() {
-        let model = ForwardModel::of(&experiment(2e-4, 1.0, Effects::default())).unwrap();
-        let start = State::at_rest(&[0.5, 0.6]);
-        let error = Trajectory::swing_within(5_000, &model, &start, 0.0, 60.0).unwrap_err().to_string();
-        assert!(error.contains("more than 5000 steps") && error.contains("lower model.k_eq_n_m_per_rad"), "{error}");
+    /// The instant of the reversal depends on the parameters: ∂rate⁺ = ∂rate⁻ + (α⁻ − α⁺) ∂t, with ∂t = −∂ω₁/α₁⁻.
+    fn jump_slopes(&mut self, before: &[f64]) {
+        let Some((_, rate)) = &mut self.slopes else { return };
+        if before[0].abs() < 1e-9 * self.model.pace_rad_s().powi(2) {
+            return;
+        }
+        for mut column in rate.column_iter_mut() {
+            let instant = -column[0] / before[0];
+            for row in 0..before.len() {
+                column[row] += (before[row] - self.first[row]) * instant;
+            }
+        }
     }
+}
 
-    #[test]
-    fn the_wrong_number_of_angles_is_refused() {
-        let model = ForwardModel::of(&Experiment::default()).unwrap();
-        let error = Trajectory::swing(&model, &State::at_rest(&[0.5]), 0.0, 1.0).unwrap_err().to_string();
-        assert!(error.contains("1 angles for 2 links"), "{error}");
+fn start_of(place: &Place, hinge: Hinge) -> Start<'_> {
+    Start { from_s: place.t_s, theta_rad: &place.theta_rad, rate: &place.rate, hinge }
+}
+
+fn step_of_no_length(step: Step) -> Step {
+    Step { length_s: 0.0, ..step }
+}
+
+/// The root of a function that is not negative at `inside` and negative at `outside`, by halving.
+fn root(mut inside: f64, mut outside: f64, value: impl Fn(f64) -> f64) -> f64 {
+    for _ in 0..50 {
+        let middle = 0.5 * (inside + outside);
+        if value(middle) < 0.0 {
+            outside = middle;
+        } else {
+            inside = middle;
+        }
     }
+    outside
 }

@@ -3,22 +3,41 @@
 //! | file | holds |
 //! |---|---|
 //! | [`chain`] | the links: inertia matrix and static moments |
+//! | [`motion`] | one instant of the motion |
+//! | [`parameter`] | the numbers a fit may change |
 //! | [`effects`] | every further torque, one law each |
-//! | [`forward`] | the equations of motion |
-//! | [`integrate`] | their solution in time |
+//! | [`forward`] | the equations of motion, and their derivatives |
+//! | [`collocation`] | the integrator's nodes and weights |
+//! | [`step`] | one step of it |
+//! | [`integrate`] | step after step, from reversal to reversal |
+//! | [`trajectory`] | the motion at every instant, with its sensitivities |
+//! | [`observe`] | the angles between marks |
 //! | [`modes`] | small vibrations: frequencies, damping ratios, shapes |
 //! | [`strip`] | the strip as a beam in gravity, by finite elements |
 //! | [`radiation`] | the pressure of light |
 
 pub mod chain;
+pub mod collocation;
 pub mod effects;
 pub mod forward;
 pub mod integrate;
 pub mod modes;
+pub mod motion;
+pub mod observe;
+pub mod parameter;
+mod partials;
 pub mod radiation;
+pub mod step;
 pub mod strip;
+#[cfg(test)]
+mod tests;
+pub mod trajectory;
 
-pub use chain::{Chain, Motion};
+pub use chain::Chain;
 pub use effects::Effect;
 pub use forward::ForwardModel;
-pub use integrate::{State, Trajectory};
+pub use integrate::Accuracy;
+pub use motion::{Hinge, Motion};
+pub use parameter::Parameter;
+pub use partials::Partials;
+pub use trajectory::{State, Trajectory};

@@ -2,6 +2,7 @@
 
 use crate::error::Result;
 use crate::experiment::Experiment;
+use crate::model::observe::chord_angles_rad;
 use crate::model::{ForwardModel, State, Trajectory};
 
 /// A swing as the camera sees it, in the undistorted picture.
@@ -44,10 +45,10 @@ impl Swing {
         // Jitter, exposure and rolling shutter together reach less than two frames beyond the last stamp.
         let last_stamp_s = render.start_s + render.duration_s + 2.0 / render.fps;
         let until_s = rate.max(0.0) * last_stamp_s + lag_s.max(0.0) + jump_s.max(0.0);
-        let release = State::at_rest(&experiment.model.release_rad);
+        let release = State::released(model.chain(), &experiment.model.release_rad)?;
         let trajectory = Trajectory::swing(&model, &release, 0.0, until_s)?;
         Ok(Self {
-            lengths_m: model.chain().links().iter().map(|l| l.length_m).collect(),
+            lengths_m: experiment.specimen.lengths_m(),
             model,
             trajectory,
             hinge_px: experiment.rig.pivot_px.unwrap_or(render.hinge_px),
@@ -64,11 +65,12 @@ impl Swing {
 
     /// φ at a stamp, top to bottom: what a perfect measurement reads.
     pub fn angles_rad(&self, t_s: f64) -> Vec<f64> {
-        let upper = self.trajectory.at(self.true_time_s(t_s));
-        let lower = if self.lag_s == 0.0 { None } else { Some(self.trajectory.at(self.true_time_s(t_s) + self.lag_s)) };
+        let chords = |t_s: f64| chord_angles_rad(self.model.chain(), &self.trajectory.at(t_s).theta_rad);
+        let upper = chords(self.true_time_s(t_s));
+        let lower = if self.lag_s == 0.0 { None } else { Some(chords(self.true_time_s(t_s) + self.lag_s)) };
         let theta = |i: usize| match &lower {
-            Some(state) if i > 0 => state.theta_rad[i],
-            _ => upper.theta_rad[i],
+            Some(angles) if i > 0 => angles[i],
+            _ => upper[i],
         };
         (0..self.lengths_m.len()).map(|i| self.gain * theta(i) + self.tilt_rad).collect()
     }

@@ -1,20 +1,24 @@
 //! Forces of the air along the strip.
 //!
-//! At distance s down link i the strip's speed across itself is, with nᵢ = (cos θᵢ, sin θᵢ) and u the velocity of the link's upper end,
+//! At distance s down link i the strip's speed across itself is, with nᵢ = (cos θᵢ, sin θᵢ) and ẋₚ the pivot's sideways velocity,
 //!
 //! ```text
-//! vₙ(s) = u·nᵢ + s θ̇ᵢ = Σₖ Jₖ θ̇ₖ + ẋₚ cos θᵢ        Jₖ = Lₖ cos(θᵢ−θₖ) for k < i,  Jᵢ = s
+//! vₙ(s) = Σₖ Jₖ θ̇ₖ + ẋₚ cos θᵢ        Jₖ = Lₖ cos(θᵢ−θₖ) for k < i,  Jᵢ = s
 //! ```
 //!
 //! A force per length f(s) across the strip works on θₖ as Qₖ = ∫ f Jₖ ds (virtual work), taken by Gauss–Legendre quadrature on each link.
 
-use nalgebra::{DMatrix, DVector};
+use super::Law;
+use crate::model::{Chain, Motion, Parameter, Partials};
 
-use super::Effect;
-use crate::model::chain::{Chain, Motion};
+/// A quadrature rule on 0..1: nodes and weights.
+type Quadrature = &'static [(f64, f64)];
 
-/// Five-point Gauss–Legendre nodes on 0..1 and their weights: exact to the ninth power.
-const GAUSS: [(f64, f64); 5] = [
+/// Exact to the third power: for everything linear in vₙ.
+const GAUSS_2: Quadrature = &[(0.211_324_865_405_187_1, 0.5), (0.788_675_134_594_812_9, 0.5)];
+
+/// Exact to the ninth power: |vₙ|vₙ has a corner where the strip turns about a point of the link.
+const GAUSS_5: Quadrature = &[
     (0.046_910_077_030_668, 0.118_463_442_528_094_54),
     (0.230_765_344_947_158_45, 0.239_314_335_249_683_23),
     (0.5, 0.284_444_444_444_444_44),
@@ -24,140 +28,222 @@ const GAUSS: [(f64, f64); 5] = [
 
 /// `air_linear`: f = −c vₙ.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct LinearDrag {
-    /// c.
-    pub drag_n_s_m2: f64,
-}
+pub struct LinearDrag;
 
-impl Effect for LinearDrag {
-    fn add_torque(&self, chain: &Chain, motion: &Motion, torque_n_m: &mut DVector<f64>) {
-        add_force_per_length(chain, motion, torque_n_m, |v_m_s| -self.drag_n_s_m2 * v_m_s);
+impl Law for LinearDrag {
+    const PARAMETER: Parameter = Parameter::AirLinear;
+
+    fn add_torque(&self, chain: &Chain, motion: &Motion, c: f64, q: &mut [f64]) {
+        stations(chain, motion, GAUSS_2, |at| at.add_force(-c * at.speed_m_s, q));
+    }
+
+    fn add_partials(&self, chain: &Chain, motion: &Motion, c: f64, partials: &mut Partials) {
+        stations(chain, motion, GAUSS_2, |at| at.add_force_partials(-c * at.speed_m_s, -c, partials));
     }
 }
 
 /// `air_quadratic`: f = −c |vₙ| vₙ, c = ½ρC_D·width.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct QuadraticDrag {
-    /// c.
-    pub drag_kg_m2: f64,
-}
+pub struct QuadraticDrag;
 
-impl Effect for QuadraticDrag {
-    fn add_torque(&self, chain: &Chain, motion: &Motion, torque_n_m: &mut DVector<f64>) {
-        add_force_per_length(chain, motion, torque_n_m, |v_m_s| -self.drag_kg_m2 * v_m_s.abs() * v_m_s);
+impl Law for QuadraticDrag {
+    const PARAMETER: Parameter = Parameter::AirQuadratic;
+
+    fn add_torque(&self, chain: &Chain, motion: &Motion, c: f64, q: &mut [f64]) {
+        stations(chain, motion, GAUSS_5, |at| at.add_force(-c * at.speed_m_s.abs() * at.speed_m_s, q));
+    }
+
+    fn add_partials(&self, chain: &Chain, motion: &Motion, c: f64, partials: &mut Partials) {
+        stations(chain, motion, GAUSS_5, |at| {
+            let speed = at.speed_m_s;
+            at.add_force_partials(-c * speed.abs() * speed, -2.0 * c * speed.abs(), partials);
+        });
     }
 }
 
-/// `added_mass`: kinetic energy ½∫mₐvₙ²ds of the air that moves with the strip.
-///
-/// Lagrange's equations give, with tᵢ = dnᵢ/dθᵢ, nₖ·tᵢ = −sin(θᵢ−θₖ) and b the part of the upper end's acceleration without θ̈:
+/// `added_mass`: kinetic energy ½∫mₐvₙ²ds of the air that moves with the strip. Lagrange's equations give
 ///
 /// ```text
-/// Σⱼ mₐ∫JₖJⱼds θ̈ⱼ = −mₐ∫[Jₖ(b·nᵢ + θ̇ᵢ u·tᵢ) + vₙwₖ]ds      wₖ = θ̇ᵢLₖ nₖ·tᵢ for k < i,  wᵢ = −u·tᵢ
+/// Qₖ = −mₐ∫[Jₖ v̇ₙ + vₙ Wₖ]ds      Wₖ = J̇ₖ − ∂vₙ/∂θₖ
+/// v̇ₙ = Σ Jₗθ̈ₗ − Σ_{l<i} Lₗ sin(θᵢ−θₗ)(θ̇ᵢ−θ̇ₗ)θ̇ₗ + ẍₚ cos θᵢ − ẋₚ θ̇ᵢ sin θᵢ
+/// Wₖ = −Lₖ sin(θᵢ−θₖ) θ̇ᵢ for k < i,   Wᵢ = U = Σ_{l<i} Lₗ sin(θᵢ−θₗ) θ̇ₗ + ẋₚ sin θᵢ
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct AddedMass {
-    /// mₐ.
-    pub mass_kg_m: f64,
-}
+pub struct AddedMass;
 
-impl Effect for AddedMass {
-    fn add_torque(&self, chain: &Chain, motion: &Motion, torque_n_m: &mut DVector<f64>) {
-        for i in 0..chain.count() {
-            let link = LinkAir::new(chain, motion, i);
-            let bias_m_s2 = link.bias_across_m_s2 + motion.omega_rad_s[i] * link.end_along_m_s;
-            for (s_m, weight_m) in link.stations() {
-                let v_m_s = link.speed_m_s(motion, s_m);
-                for k in 0..=i {
-                    let turn = if k < i {
-                        motion.omega_rad_s[i] * -chain.links()[k].length_m * motion.sin_difference(i, k)
-                    } else {
-                        -link.end_along_m_s
-                    };
-                    let arm_m = link.arm_m(chain, motion, k, s_m);
-                    torque_n_m[k] -= self.mass_kg_m * weight_m * (arm_m * bias_m_s2 + v_m_s * turn);
-                }
+impl Law for AddedMass {
+    const PARAMETER: Parameter = Parameter::AddedMass;
+
+    fn add_torque(&self, chain: &Chain, motion: &Motion, mass: f64, q: &mut [f64]) {
+        stations(chain, motion, GAUSS_2, |at| {
+            let acceleration = at.acceleration_m_s2();
+            for k in 0..=at.i {
+                q[k] -= mass * at.weight_m * (at.arm_m(k) * acceleration + at.speed_m_s * at.turn_m_s(k));
             }
-        }
+        });
     }
 
-    fn add_inertia(&self, chain: &Chain, motion: &Motion, inertia_kg_m2: &mut DMatrix<f64>) {
-        for i in 0..chain.count() {
-            let link = LinkAir::new(chain, motion, i);
-            for (s_m, weight_m) in link.stations() {
-                for k in 0..=i {
-                    for j in 0..=i {
-                        let arms_m2 = link.arm_m(chain, motion, k, s_m) * link.arm_m(chain, motion, j, s_m);
-                        inertia_kg_m2[(k, j)] += self.mass_kg_m * weight_m * arms_m2;
-                    }
-                }
-            }
-        }
-    }
-
-    fn energy_j(&self, chain: &Chain, motion: &Motion) -> f64 {
-        let of_link = |i: usize| -> f64 {
-            let link = LinkAir::new(chain, motion, i);
-            link.stations().map(|(s_m, weight_m)| weight_m * link.speed_m_s(motion, s_m).powi(2)).sum()
-        };
-        0.5 * self.mass_kg_m * (0..chain.count()).map(of_link).sum::<f64>()
-    }
-}
-
-/// What the air sees of one link.
-struct LinkAir {
-    i: usize,
-    length_m: f64,
-    /// u·nᵢ.
-    end_across_m_s: f64,
-    /// u·tᵢ.
-    end_along_m_s: f64,
-    /// b·nᵢ.
-    bias_across_m_s2: f64,
-}
-
-impl LinkAir {
-    fn new(chain: &Chain, motion: &Motion, i: usize) -> Self {
-        let mut link = Self {
-            i,
-            length_m: chain.links()[i].length_m,
-            end_across_m_s: motion.pivot_m_s * motion.cos[i],
-            end_along_m_s: -motion.pivot_m_s * motion.sin[i],
-            bias_across_m_s2: motion.pivot_m_s2 * motion.cos[i],
-        };
-        for k in 0..i {
-            let (length_m, omega_rad_s) = (chain.links()[k].length_m, motion.omega_rad_s[k]);
-            link.end_across_m_s += length_m * omega_rad_s * motion.cos_difference(i, k);
-            link.end_along_m_s -= length_m * omega_rad_s * motion.sin_difference(i, k);
-            link.bias_across_m_s2 += length_m * omega_rad_s.powi(2) * motion.sin_difference(i, k);
-        }
-        link
-    }
-
-    /// Quadrature stations: (s, weight), both in metres.
-    fn stations(&self) -> impl Iterator<Item = (f64, f64)> + use<> {
-        let length_m = self.length_m;
-        GAUSS.iter().map(move |(node, weight)| (node * length_m, weight * length_m))
-    }
-
-    /// vₙ(s).
-    fn speed_m_s(&self, motion: &Motion, s_m: f64) -> f64 {
-        self.end_across_m_s + s_m * motion.omega_rad_s[self.i]
-    }
-
-    /// Jₖ(s).
-    fn arm_m(&self, chain: &Chain, motion: &Motion, k: usize, s_m: f64) -> f64 {
-        if k < self.i { chain.links()[k].length_m * motion.cos_difference(self.i, k) } else { s_m }
-    }
-}
-
-fn add_force_per_length(chain: &Chain, motion: &Motion, torque_n_m: &mut DVector<f64>, law: impl Fn(f64) -> f64) {
-    for i in 0..chain.count() {
-        let link = LinkAir::new(chain, motion, i);
-        for (s_m, weight_m) in link.stations() {
-            let force_n = weight_m * law(link.speed_m_s(motion, s_m));
+    fn add_partials(&self, chain: &Chain, motion: &Motion, mass: f64, partials: &mut Partials) {
+        stations(chain, motion, GAUSS_2, |at| {
+            let (i, v, a) = (at.i, at.speed_m_s, at.acceleration_m_s2());
+            let factor = -mass * at.weight_m;
             for k in 0..=i {
-                torque_n_m[k] += force_n * link.arm_m(chain, motion, k, s_m);
+                let (arm, turn) = (at.arm_m(k), at.turn_m_s(k));
+                for l in 0..=i {
+                    partials.acceleration[(k, l)] += factor * arm * at.arm_m(l);
+                    partials.rate[(k, l)] += factor
+                        * (arm * at.acceleration_with_rate(l) + at.arm_m(l) * turn + v * at.turn_with_rate(k, l));
+                    partials.theta[(k, l)] += factor
+                        * (at.arm_with_angle(k, l) * a
+                            + arm * at.acceleration_with_angle(l)
+                            + at.speed_with_angle(l) * turn
+                            + v * at.turn_with_angle(k, l));
+                }
+                let (sin, cos) = (motion.sin[i], motion.cos[i]);
+                let turn_with_pivot = if k == i { sin } else { 0.0 };
+                partials.pivot_velocity[k] += factor * (arm * -sin * motion.rate[i] + cos * turn + v * turn_with_pivot);
+                partials.pivot_acceleration[k] += factor * arm * cos;
+            }
+        });
+    }
+
+    fn energy_j(&self, chain: &Chain, motion: &Motion, mass: f64) -> f64 {
+        let mut energy_j = 0.0;
+        stations(chain, motion, GAUSS_2, |at| energy_j += 0.5 * mass * at.weight_m * at.speed_m_s.powi(2));
+        energy_j
+    }
+}
+
+/// A point of the strip, at distance s down link i.
+struct Station<'a> {
+    chain: &'a Chain,
+    motion: &'a Motion,
+    i: usize,
+    s_m: f64,
+    weight_m: f64,
+    /// vₙ.
+    speed_m_s: f64,
+    /// U.
+    slip_m_s: f64,
+}
+
+fn stations(chain: &Chain, motion: &Motion, rule: Quadrature, mut visit: impl FnMut(&Station<'_>)) {
+    for i in 0..chain.count() {
+        let mut end_m_s = motion.pivot_m_s * motion.cos[i];
+        let mut slip_m_s = motion.pivot_m_s * motion.sin[i];
+        for l in 0..i {
+            end_m_s += chain.length_m(l) * motion.cos_difference(i, l) * motion.rate[l];
+            slip_m_s += chain.length_m(l) * motion.sin_difference(i, l) * motion.rate[l];
+        }
+        for (node, weight) in rule {
+            let (s_m, weight_m) = (node * chain.length_m(i), weight * chain.length_m(i));
+            let speed_m_s = end_m_s + s_m * motion.rate[i];
+            visit(&Station { chain, motion, i, s_m, weight_m, speed_m_s, slip_m_s });
+        }
+    }
+}
+
+impl Station<'_> {
+    /// Jₖ.
+    fn arm_m(&self, k: usize) -> f64 {
+        if k < self.i { self.chain.length_m(k) * self.motion.cos_difference(self.i, k) } else { self.s_m }
+    }
+
+    /// Lₖ sin(θᵢ−θₖ).
+    fn cross_m(&self, k: usize) -> f64 {
+        self.chain.length_m(k) * self.motion.sin_difference(self.i, k)
+    }
+
+    /// ∂Jₖ/∂θₗ.
+    fn arm_with_angle(&self, k: usize, l: usize) -> f64 {
+        match (k < self.i, l == k, l == self.i) {
+            (true, true, _) => self.cross_m(k),
+            (true, _, true) => -self.cross_m(k),
+            _ => 0.0,
+        }
+    }
+
+    /// ∂vₙ/∂θₗ.
+    fn speed_with_angle(&self, l: usize) -> f64 {
+        if l < self.i { self.cross_m(l) * self.motion.rate[l] } else { -self.slip_m_s }
+    }
+
+    fn add_force(&self, force_n_m: f64, q: &mut [f64]) {
+        for k in 0..=self.i {
+            q[k] += self.weight_m * force_n_m * self.arm_m(k);
+        }
+    }
+
+    /// For a force per length f(vₙ) with its slope f′.
+    fn add_force_partials(&self, force_n_m: f64, slope: f64, partials: &mut Partials) {
+        for k in 0..=self.i {
+            let arm = self.weight_m * self.arm_m(k);
+            for l in 0..=self.i {
+                partials.rate[(k, l)] += arm * slope * self.arm_m(l);
+                partials.theta[(k, l)] +=
+                    arm * slope * self.speed_with_angle(l) + self.weight_m * force_n_m * self.arm_with_angle(k, l);
+            }
+            partials.pivot_velocity[k] += arm * slope * self.motion.cos[self.i];
+        }
+    }
+
+    /// v̇ₙ.
+    fn acceleration_m_s2(&self) -> f64 {
+        let Motion { rate, acceleration, sin, cos, .. } = self.motion;
+        let i = self.i;
+        let pivot = self.motion.pivot_m_s2 * cos[i] - self.motion.pivot_m_s * rate[i] * sin[i];
+        let of_link = |l: usize| self.arm_m(l) * acceleration[l] - self.cross_m(l) * (rate[i] - rate[l]) * rate[l];
+        (0..i).map(of_link).sum::<f64>() + self.s_m * acceleration[i] + pivot
+    }
+
+    /// ∂v̇ₙ/∂θ̇ₗ.
+    fn acceleration_with_rate(&self, l: usize) -> f64 {
+        if l < self.i {
+            -self.cross_m(l) * (self.motion.rate[self.i] - 2.0 * self.motion.rate[l])
+        } else {
+            -self.slip_m_s
+        }
+    }
+
+    /// ∂v̇ₙ/∂θₗ.
+    fn acceleration_with_angle(&self, l: usize) -> f64 {
+        let Motion { rate, acceleration, sin, cos, .. } = self.motion;
+        let i = self.i;
+        let of_link = |k: usize| self.cross_m(k) * acceleration[k] + self.arm_m(k) * (rate[i] - rate[k]) * rate[k];
+        if l < i {
+            of_link(l)
+        } else {
+            -(0..i).map(of_link).sum::<f64>()
+                - self.motion.pivot_m_s2 * sin[i]
+                - self.motion.pivot_m_s * rate[i] * cos[i]
+        }
+    }
+
+    /// Wₖ.
+    fn turn_m_s(&self, k: usize) -> f64 {
+        if k < self.i { -self.cross_m(k) * self.motion.rate[self.i] } else { self.slip_m_s }
+    }
+
+    /// ∂Wₖ/∂θ̇ₗ.
+    fn turn_with_rate(&self, k: usize, l: usize) -> f64 {
+        match (k < self.i, l < self.i) {
+            (true, false) => -self.cross_m(k),
+            (false, true) => self.cross_m(l),
+            _ => 0.0,
+        }
+    }
+
+    /// ∂Wₖ/∂θₗ.
+    fn turn_with_angle(&self, k: usize, l: usize) -> f64 {
+        let rate = &self.motion.rate;
+        match (k < self.i, l < self.i) {
+            (true, true) if k == l => self.arm_m(k) * rate[self.i],
+            (true, true) => 0.0,
+            (true, false) => -self.arm_m(k) * rate[self.i],
+            (false, true) => -self.arm_m(l) * rate[l],
+            (false, false) => {
+                (0..self.i).map(|l| self.arm_m(l) * rate[l]).sum::<f64>()
+                    + self.motion.pivot_m_s * self.motion.cos[self.i]
             }
         }
     }
@@ -168,42 +254,46 @@ mod tests {
     use super::*;
     use crate::experiment::Specimen;
 
-    fn one_rod() -> Chain {
-        Chain::of(&Specimen { link_lengths_m: vec![0.2], ..Specimen::default() }).unwrap()
+    fn one_rod() -> (Chain, Motion) {
+        let chain = Chain::of(&Specimen { link_lengths_m: vec![0.2], ..Specimen::default() }).unwrap();
+        let mut motion = Motion::zero(1, 0);
+        motion.place(&[0.3]);
+        motion.rate[0] = 2.0;
+        (chain, motion)
     }
 
     #[test]
     fn drag_on_one_rod_is_the_hand_integral() {
-        let (chain, motion) = (one_rod(), Motion::new(0.0, &[0.3], &[2.0]));
-        let mut torque = DVector::zeros(1);
-        LinearDrag { drag_n_s_m2: 0.7 }.add_torque(&chain, &motion, &mut torque);
-        assert!((torque[0] + 0.7 * 2.0 * 0.2f64.powi(3) / 3.0).abs() < 1e-15);
-        torque.fill(0.0);
-        QuadraticDrag { drag_kg_m2: 0.7 }.add_torque(&chain, &motion, &mut torque);
-        assert!((torque[0] + 0.7 * 4.0 * 0.2f64.powi(4) / 4.0).abs() < 1e-15);
+        let (chain, motion) = one_rod();
+        let mut q = [0.0];
+        LinearDrag.add_torque(&chain, &motion, 0.7, &mut q);
+        assert!((q[0] + 0.7 * 2.0 * 0.2f64.powi(3) / 3.0).abs() < 1e-15);
+        q[0] = 0.0;
+        QuadraticDrag.add_torque(&chain, &motion, 0.7, &mut q);
+        assert!((q[0] + 0.7 * 4.0 * 0.2f64.powi(4) / 4.0).abs() < 1e-15);
     }
 
     #[test]
     fn added_mass_on_one_rod_is_a_uniform_rod_of_that_mass() {
-        let (chain, motion) = (one_rod(), Motion::new(0.0, &[0.3], &[2.0]));
-        let (mut inertia, mut torque) = (DMatrix::zeros(1, 1), DVector::zeros(1));
-        let air = AddedMass { mass_kg_m: 0.6 };
-        air.add_inertia(&chain, &motion, &mut inertia);
-        air.add_torque(&chain, &motion, &mut torque);
-        assert!((inertia[(0, 0)] - 0.6 * 0.2f64.powi(3) / 3.0).abs() < 1e-15);
-        assert_eq!(torque[0], 0.0);
+        let (chain, mut motion) = one_rod();
+        motion.acceleration[0] = -3.0;
+        let mut q = [0.0];
+        AddedMass.add_torque(&chain, &motion, 0.6, &mut q);
+        assert!((q[0] - 3.0 * 0.6 * 0.2f64.powi(3) / 3.0).abs() < 1e-15);
     }
 
     #[test]
     fn the_power_of_the_drag_is_its_work_along_the_strip() {
         let chain = Chain::of(&Specimen::default()).unwrap();
-        let motion = Motion::new(0.0, &[0.3, -0.4], &[2.0, -5.0]);
-        let mut torque = DVector::zeros(2);
-        QuadraticDrag { drag_kg_m2: 0.01 }.add_torque(&chain, &motion, &mut torque);
-        let power: f64 = torque[0] * 2.0 + torque[1] * -5.0;
+        let mut motion = Motion::zero(2, 0);
+        motion.place(&[0.3, -0.4]);
+        motion.rate.copy_from_slice(&[2.0, -5.0]);
+        let mut q = [0.0; 2];
+        QuadraticDrag.add_torque(&chain, &motion, 0.01, &mut q);
+        let power = q[0] * 2.0 + q[1] * -5.0;
         let station = |i: usize, s: f64| {
             let end = if i == 0 { 0.0 } else { 0.1 * 2.0 * 0.7f64.cos() };
-            (end + s * motion.omega_rad_s[i]).abs().powi(3)
+            (end + s * motion.rate[i]).abs().powi(3)
         };
         let steps = 20_000;
         let direct: f64 = (0..2)

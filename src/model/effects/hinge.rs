@@ -1,56 +1,57 @@
 //! Torques at the hinge: they act on θ₁ alone.
 
-use nalgebra::DVector;
-
-use super::Effect;
-use crate::model::chain::{Chain, Motion};
+use super::Law;
+use crate::model::{Chain, Motion, Parameter, Partials};
 
 /// `hinge_viscous`: Q₁ = −c θ̇₁.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Viscous {
-    /// c.
-    pub damping_n_m_s_per_rad: f64,
-}
+pub struct Viscous;
 
-impl Effect for Viscous {
-    fn add_torque(&self, _: &Chain, motion: &Motion, torque_n_m: &mut DVector<f64>) {
-        torque_n_m[0] -= self.damping_n_m_s_per_rad * motion.omega_rad_s[0];
+impl Law for Viscous {
+    const PARAMETER: Parameter = Parameter::HingeViscous;
+
+    fn add_torque(&self, _: &Chain, motion: &Motion, c: f64, q: &mut [f64]) {
+        q[0] -= c * motion.rate[0];
+    }
+
+    fn add_partials(&self, _: &Chain, _: &Motion, c: f64, partials: &mut Partials) {
+        partials.rate[(0, 0)] -= c;
     }
 }
 
-/// `hinge_coulomb`: dry friction, Q₁ = −τ sgn θ̇₁, smoothed to −τ tanh(θ̇₁/ω₀).
+/// `hinge_coulomb`: dry friction, Q₁ = −τ sgn θ̇₁ while it slides; it holds as long as it takes no more than τ to hold.
 ///
-/// Below ω₀ it is the viscous damper τ/ω₀: a hinge that dry friction would hold creeps towards its rest slower than ω₀.
+/// The sign is not smoothed: the integrator steps from reversal to reversal, and there asks whether the hinge holds
+/// ([`Hinge`](crate::model::Hinge)).
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Coulomb {
-    /// τ.
-    pub torque_n_m: f64,
-}
+pub struct Coulomb;
 
-impl Coulomb {
-    /// ω₀: a swing of 1 mrad at 1.3 Hz is eight times faster.
-    pub const SMOOTHING_RAD_S: f64 = 1e-3;
-}
+impl Law for Coulomb {
+    const PARAMETER: Parameter = Parameter::HingeCoulomb;
 
-impl Effect for Coulomb {
-    fn add_torque(&self, _: &Chain, motion: &Motion, torque_n_m: &mut DVector<f64>) {
-        torque_n_m[0] -= self.torque_n_m * (motion.omega_rad_s[0] / Self::SMOOTHING_RAD_S).tanh();
+    fn add_torque(&self, _: &Chain, motion: &Motion, tau: f64, q: &mut [f64]) {
+        q[0] -= tau * motion.hinge.sign();
     }
+
+    fn add_partials(&self, _: &Chain, _: &Motion, _: f64, _: &mut Partials) {}
 }
 
 /// `hinge_stiffness`: Q₁ = −k θ₁, energy ½ k θ₁².
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Stiffness {
-    /// k.
-    pub stiffness_n_m_per_rad: f64,
-}
+pub struct Stiffness;
 
-impl Effect for Stiffness {
-    fn add_torque(&self, _: &Chain, motion: &Motion, torque_n_m: &mut DVector<f64>) {
-        torque_n_m[0] -= self.stiffness_n_m_per_rad * motion.theta_rad[0];
+impl Law for Stiffness {
+    const PARAMETER: Parameter = Parameter::HingeStiffness;
+
+    fn add_torque(&self, _: &Chain, motion: &Motion, k: f64, q: &mut [f64]) {
+        q[0] -= k * motion.theta_rad[0];
     }
 
-    fn energy_j(&self, _: &Chain, motion: &Motion) -> f64 {
-        0.5 * self.stiffness_n_m_per_rad * motion.theta_rad[0].powi(2)
+    fn add_partials(&self, _: &Chain, _: &Motion, k: f64, partials: &mut Partials) {
+        partials.theta[(0, 0)] -= k;
+    }
+
+    fn energy_j(&self, _: &Chain, motion: &Motion, k: f64) -> f64 {
+        0.5 * k * motion.theta_rad[0].powi(2)
     }
 }

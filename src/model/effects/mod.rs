@@ -3,85 +3,152 @@
 //! | file | effects |
 //! |---|---|
 //! | [`hinge`] | `hinge_viscous`, `hinge_coulomb`, `hinge_stiffness` |
-//! | [`joint`] | the joint's spring and damper, `rest_curl`, `joint_cubic_stiffness` |
+//! | [`joint`] | the joint's spring and damper, `rest_curl`, `joint_cubic_stiffness`, `joint_hysteretic` |
 //! | [`air`] | `air_linear`, `air_quadratic`, `added_mass` |
-//! | [`outside`] | `side_force`, `support_motion` |
+//! | [`outside`] | `side_force`, `support_motion`, nodal forces |
 //!
-//! `joint_hysteretic` and `distributed_flexibility` are not simulated. Camera effects (`time_base`, `dropped_frames`, `camera_tilt`,
-//! `angle_gain`, `differential_lag`) change the observation, not the motion: see [`crate::synth::swing`].
+//! `distributed_flexibility` is a chain of more links, see [`Chain::of`](super::Chain::of). Camera effects (`time_base`, `dropped_frames`,
+//! `camera_tilt`, `angle_gain`, `differential_lag`) change the observation, not the motion.
 
 pub mod air;
 pub mod hinge;
 pub mod joint;
 pub mod outside;
 
-use nalgebra::{DMatrix, DVector};
-
-use super::chain::{Chain, Motion};
-use crate::error::{Error, Result};
+use super::{Chain, Motion, Parameter, Partials};
 use crate::experiment::Model;
 
-/// One law: what it adds to the equations of motion.
+/// One law: what it adds to the sum of torques Q = 0 (d'Alembert: inertia is a torque, too).
+///
+/// `q` and the rows of the partials are the n links' equations (N·m), then those of the laws' own variables.
 pub trait Effect: std::fmt::Debug + Send + Sync {
-    /// Adds its generalised torques Qᵢ (N·m), of the work Qᵢ δθᵢ.
-    fn add_torque(&self, chain: &Chain, motion: &Motion, torque_n_m: &mut DVector<f64>);
+    /// Adds its generalised torques, of the work Qᵢ δθᵢ.
+    fn add_torque(&self, chain: &Chain, motion: &Motion, q: &mut [f64]);
 
-    /// Adds to the inertia matrix (kg·m²).
-    fn add_inertia(&self, _chain: &Chain, _motion: &Motion, _inertia_kg_m2: &mut DMatrix<f64>) {}
+    /// Adds the derivatives of these torques.
+    fn add_partials(&self, chain: &Chain, motion: &Motion, partials: &mut Partials);
+
+    /// Its coefficients.
+    fn parameters(&self) -> Vec<(Parameter, f64)> {
+        Vec::new()
+    }
+
+    /// Sets a coefficient; those of other laws are left alone.
+    fn set(&mut self, _parameter: Parameter, _value: f64) {}
+
+    /// Adds ∂Q/∂coefficient.
+    fn add_sensitivity(&self, _parameter: Parameter, _chain: &Chain, _motion: &Motion, _q: &mut [f64]) {}
 
     /// Energy it stores (J).
     fn energy_j(&self, _chain: &Chain, _motion: &Motion) -> f64 {
         0.0
     }
+
+    /// Number of variables it keeps in mind between instants.
+    fn hidden(&self, _chain: &Chain) -> usize {
+        0
+    }
+
+    /// Instants at which it changes suddenly.
+    fn breaks_s(&self) -> Vec<f64> {
+        Vec::new()
+    }
+
+    /// The pivot's motion, from the law that prescribes it.
+    fn pivot(&self) -> Option<&outside::SupportMotion> {
+        None
+    }
 }
 
-/// The laws switched on in a model.
-///
-/// # Errors
-/// [`Error::Simulation`] for a law that is not simulated.
-pub fn effects_of(model: &Model) -> Result<Vec<Box<dyn Effect>>> {
-    let on = &model.effects;
-    for (id, present) in [
-        ("joint_hysteretic", on.joint_hysteretic.is_some()),
-        ("distributed_flexibility", on.distributed_flexibility.is_some()),
-    ] {
-        if present {
-            return Err(Error::Simulation { detail: format!("model.effects.{id} is not simulated; remove it") });
+/// A law that is proportional to one coefficient.
+pub trait Law: std::fmt::Debug + Send + Sync {
+    /// The coefficient.
+    const PARAMETER: Parameter;
+
+    /// Adds its torques for a coefficient.
+    fn add_torque(&self, chain: &Chain, motion: &Motion, coefficient: f64, q: &mut [f64]);
+
+    /// Adds their derivatives.
+    fn add_partials(&self, chain: &Chain, motion: &Motion, coefficient: f64, partials: &mut Partials);
+
+    /// Energy it stores (J).
+    fn energy_j(&self, _chain: &Chain, _motion: &Motion, _coefficient: f64) -> f64 {
+        0.0
+    }
+}
+
+/// A [`Law`] with its coefficient.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Proportional<L> {
+    /// The law.
+    pub law: L,
+    /// In the unit of its [`Parameter`].
+    pub coefficient: f64,
+}
+
+impl<L: Law> Effect for Proportional<L> {
+    fn add_torque(&self, chain: &Chain, motion: &Motion, q: &mut [f64]) {
+        self.law.add_torque(chain, motion, self.coefficient, q);
+    }
+
+    fn add_partials(&self, chain: &Chain, motion: &Motion, partials: &mut Partials) {
+        self.law.add_partials(chain, motion, self.coefficient, partials);
+    }
+
+    fn parameters(&self) -> Vec<(Parameter, f64)> {
+        vec![(L::PARAMETER, self.coefficient)]
+    }
+
+    fn set(&mut self, parameter: Parameter, value: f64) {
+        if parameter == L::PARAMETER {
+            self.coefficient = value;
         }
     }
+
+    fn add_sensitivity(&self, parameter: Parameter, chain: &Chain, motion: &Motion, q: &mut [f64]) {
+        if parameter == L::PARAMETER {
+            self.law.add_torque(chain, motion, 1.0, q);
+        }
+    }
+
+    fn energy_j(&self, chain: &Chain, motion: &Motion) -> f64 {
+        self.law.energy_j(chain, motion, self.coefficient)
+    }
+}
+
+/// The laws switched on in a model; `mark_length_m` is the length between marks, of which EI = Kℓ.
+pub fn effects_of(model: &Model, mark_length_m: f64) -> Vec<Box<dyn Effect>> {
+    fn add<L: Law + 'static>(effects: &mut Vec<Box<dyn Effect>>, law: L, coefficient: Option<f64>) {
+        if let Some(coefficient) = coefficient {
+            effects.push(Box::new(Proportional { law, coefficient }));
+        }
+    }
+    let on = &model.effects;
+    let stiffness = on.distributed_flexibility.map(|bending| bending / mark_length_m);
     let mut effects: Vec<Box<dyn Effect>> = vec![Box::new(joint::SpringDamper {
-        stiffness_n_m_per_rad: model.k_eq_n_m_per_rad,
+        stiffness_n_m_per_rad: stiffness.unwrap_or(model.k_eq_n_m_per_rad),
         damping_n_m_s_per_rad: model.c_eq_n_m_s_per_rad,
         rest_rad: on.rest_curl.unwrap_or(0.0),
+        length_m: mark_length_m,
     })];
-    let mut add = |effect: Box<dyn Effect>| effects.push(effect);
-    if let Some(damping_n_m_s_per_rad) = on.hinge_viscous {
-        add(Box::new(hinge::Viscous { damping_n_m_s_per_rad }));
+    add(&mut effects, hinge::Viscous, on.hinge_viscous);
+    add(&mut effects, hinge::Coulomb, on.hinge_coulomb);
+    add(&mut effects, hinge::Stiffness, on.hinge_stiffness);
+    add(&mut effects, joint::CubicSpring, on.joint_cubic_stiffness);
+    add(&mut effects, air::LinearDrag, on.air_linear);
+    add(&mut effects, air::QuadraticDrag, on.air_quadratic);
+    add(&mut effects, air::AddedMass, on.added_mass);
+    add(&mut effects, outside::SideForce, on.side_force);
+    if let Some(law) = on.joint_hysteretic {
+        effects.push(Box::new(joint::Hysteresis { torque_n_m: law.torque_n_m, yield_rad: law.yield_rad }));
     }
-    if let Some(torque_n_m) = on.hinge_coulomb {
-        add(Box::new(hinge::Coulomb { torque_n_m }));
+    if let Some(support) = on.support_motion {
+        let (sin, cos) = support.phase_rad.sin_cos();
+        effects.push(Box::new(outside::SupportMotion {
+            sine_m: support.amplitude_m * cos,
+            cosine_m: support.amplitude_m * sin,
+            frequency_hz: support.frequency_hz,
+        }));
     }
-    if let Some(stiffness_n_m_per_rad) = on.hinge_stiffness {
-        add(Box::new(hinge::Stiffness { stiffness_n_m_per_rad }));
-    }
-    if let Some(stiffness_n_m_per_rad3) = on.joint_cubic_stiffness {
-        let rest_rad = on.rest_curl.unwrap_or(0.0);
-        add(Box::new(joint::CubicSpring { stiffness_n_m_per_rad3, rest_rad }));
-    }
-    if let Some(drag_n_s_m2) = on.air_linear {
-        add(Box::new(air::LinearDrag { drag_n_s_m2 }));
-    }
-    if let Some(drag_kg_m2) = on.air_quadratic {
-        add(Box::new(air::QuadraticDrag { drag_kg_m2 }));
-    }
-    if let Some(mass_kg_m) = on.added_mass {
-        add(Box::new(air::AddedMass { mass_kg_m }));
-    }
-    if let Some(acceleration_m_s2) = on.side_force {
-        add(Box::new(outside::SideForce { acceleration_m_s2 }));
-    }
-    if on.support_motion.is_some() {
-        add(Box::new(outside::SupportMotion));
-    }
-    Ok(effects)
+    effects
 }

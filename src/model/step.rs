@@ -1,0 +1,295 @@
+//! One step of the collocation: the accelerations at its stages, and their sensitivities.
+
+use nalgebra::{DMatrix, DVector, Dyn, LU};
+
+use super::collocation::{RADAU, STAGES, Weights};
+use super::{ForwardModel, Hinge, Motion, Parameter, Partials};
+
+/// Newton's iterations before a step is shortened.
+const MOST_ITERATIONS: usize = 12;
+/// Newton stops when the angles change by less than this part of the tolerance.
+const NEWTON_SHARE: f64 = 1e-3;
+
+/// An accepted step: a polynomial in time.
+#[derive(Debug, Clone)]
+pub struct Step {
+    /// Its start.
+    pub from_s: f64,
+    /// Its length.
+    pub length_s: f64,
+    /// θ at the start.
+    pub theta_rad: Vec<f64>,
+    /// ω, then the laws' own variables, at the start.
+    pub rate: Vec<f64>,
+    /// Accelerations, stage after stage.
+    pub stages: Vec<f64>,
+    /// What the dry hinge does.
+    pub hinge: Hinge,
+    /// Derivatives, where asked for.
+    pub slopes: Option<Slopes>,
+}
+
+/// Derivatives with parameters and initial values, one column each.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Slopes {
+    /// ∂θ at the step's start, n × columns.
+    pub theta: DMatrix<f64>,
+    /// ∂rate at the step's start, m × columns.
+    pub rate: DMatrix<f64>,
+    /// ∂acceleration, stage after stage, 5m × columns.
+    pub stages: DMatrix<f64>,
+}
+
+impl Step {
+    /// θ at τ = 0 … 1 of the step.
+    pub fn theta_rad(&self, tau: f64) -> Vec<f64> {
+        let weights = RADAU.angle_weights(tau);
+        let h = self.length_s;
+        (0..self.theta_rad.len())
+            .map(|i| self.theta_rad[i] + h * tau * self.rate[i] + h * h * self.sum(&weights, i))
+            .collect()
+    }
+
+    /// ω and the laws' own variables at τ.
+    pub fn rate(&self, tau: f64) -> Vec<f64> {
+        let weights = RADAU.rate_weights(tau);
+        (0..self.rate.len()).map(|i| self.rate[i] + self.length_s * self.sum(&weights, i)).collect()
+    }
+
+    /// One rate at τ.
+    pub fn one_rate(&self, i: usize, tau: f64) -> f64 {
+        self.rate[i] + self.length_s * self.sum(&RADAU.rate_weights(tau), i)
+    }
+
+    /// Accelerations at τ.
+    pub fn acceleration(&self, tau: f64) -> Vec<f64> {
+        let weights = RADAU.basis(tau);
+        (0..self.rate.len()).map(|i| self.sum(&weights, i)).collect()
+    }
+
+    /// Accelerations at the end.
+    pub fn last_acceleration(&self) -> &[f64] {
+        &self.stages[(STAGES - 1) * self.rate.len()..]
+    }
+
+    /// Derivatives of θ and of the rates at τ.
+    pub fn slopes(&self, tau: f64) -> Option<(DMatrix<f64>, DMatrix<f64>)> {
+        let slopes = self.slopes.as_ref()?;
+        let (n, m, h) = (self.theta_rad.len(), self.rate.len(), self.length_s);
+        let (angle, rate) = (RADAU.angle_weights(tau), RADAU.rate_weights(tau));
+        let sum = |weights: &Weights, i: usize, c: usize| -> f64 {
+            weights.iter().enumerate().map(|(k, w)| w * slopes.stages[(k * m + i, c)]).sum()
+        };
+        let theta = DMatrix::from_fn(n, slopes.theta.ncols(), |i, c| {
+            slopes.theta[(i, c)] + h * tau * slopes.rate[(i, c)] + h * h * sum(&angle, i, c)
+        });
+        let rate = DMatrix::from_fn(m, slopes.rate.ncols(), |i, c| slopes.rate[(i, c)] + h * sum(&rate, i, c));
+        Some((theta, rate))
+    }
+
+    fn sum(&self, weights: &Weights, i: usize) -> f64 {
+        let m = self.rate.len();
+        weights.iter().enumerate().map(|(k, w)| w * self.stages[k * m + i]).sum()
+    }
+}
+
+/// Solves for the stages of one step after another.
+pub struct Stages<'a> {
+    model: &'a ForwardModel,
+    motion: Motion,
+    partials: Vec<Partials>,
+    /// Q of every stage, scaled.
+    residual: DVector<f64>,
+    /// ∂Q/∂accelerations of all stages, scaled.
+    matrix: DMatrix<f64>,
+    /// 1 / own inertia, by row.
+    scale: Vec<f64>,
+}
+
+/// Where a step begins.
+pub struct Start<'a> {
+    /// Time.
+    pub from_s: f64,
+    /// θ.
+    pub theta_rad: &'a [f64],
+    /// Rates.
+    pub rate: &'a [f64],
+    /// What the dry hinge does.
+    pub hinge: Hinge,
+}
+
+impl<'a> Stages<'a> {
+    /// For a model.
+    pub fn new(model: &'a ForwardModel) -> Self {
+        let (n, m) = (model.chain().count(), model.rates());
+        Self {
+            model,
+            motion: Motion::zero(n, m - n),
+            partials: vec![Partials::zero(n, m); STAGES],
+            residual: DVector::zeros(STAGES * m),
+            matrix: DMatrix::zeros(STAGES * m, STAGES * m),
+            scale: (0..m).map(|i| if i < n { 1.0 / model.chain().inertia_kg_m2()[(i, i)] } else { 1.0 }).collect(),
+        }
+    }
+
+    /// Solves the balance at all stages for the accelerations `k`, from a first guess. `None` where Newton's method does not converge.
+    pub fn solve(&mut self, start: &Start<'_>, length_s: f64, k: &mut DVector<f64>, tolerance_rad: f64) -> Option<()> {
+        let lu = self.linearise(start, length_s, k);
+        let mut before = f64::INFINITY;
+        for _ in 0..MOST_ITERATIONS {
+            self.balance(start, length_s, k);
+            let mut change = -&self.residual;
+            if !lu.solve_mut(&mut change) {
+                return None;
+            }
+            *k += &change;
+            let size_rad = length_s * length_s * change.amax();
+            if !size_rad.is_finite() {
+                return None;
+            }
+            // what is left is the next change over (1 − its ratio to this one)
+            let ratio = size_rad / before;
+            if size_rad * ratio.min(1.0) < NEWTON_SHARE * tolerance_rad || size_rad < 4.0 * f64::EPSILON {
+                return Some(());
+            }
+            if ratio > 0.7 && before.is_finite() {
+                return None;
+            }
+            before = size_rad;
+        }
+        None
+    }
+
+    /// Estimated error of a solved step's angles at its end (rad), after the filter that keeps it meaningful for stiff systems; `first`
+    /// are the accelerations at its start.
+    pub fn error_rad(&self, start: &Start<'_>, length_s: f64, k: &DVector<f64>, first: &[f64]) -> f64 {
+        let (n, m) = (start.theta_rad.len(), start.rate.len());
+        let (h, gamma) = (length_s, RADAU.gamma * length_s);
+        let estimate = |first: f64, stage: &dyn Fn(usize) -> f64| {
+            h * (RADAU.gamma * first + (0..STAGES).map(|i| RADAU.error[i] * stage(i)).sum::<f64>())
+        };
+        let stage_rate = |i: usize, row: usize| {
+            start.rate[row] + h * (0..STAGES).map(|j| RADAU.rate[i][j] * k[j * m + row]).sum::<f64>()
+        };
+        let angle = DVector::from_fn(n, |row, _| estimate(start.rate[row], &|i| stage_rate(i, row)));
+        let rate = DVector::from_fn(m, |row, _| estimate(first[row], &|i| k[i * m + row]));
+        let Partials { theta: with_theta, rate: with_rate, acceleration: inertia, .. } = &self.partials[0];
+        let mut matrix = inertia + with_rate * gamma;
+        let mut corner = matrix.columns_mut(0, n);
+        corner += with_theta * (gamma * gamma);
+        let right = inertia * &rate - with_theta * &angle * gamma;
+        let Some(rate) = matrix.lu().solve(&right) else { return f64::INFINITY };
+        let pace_rad_s = self.model.pace_rad_s();
+        let hidden = rate.rows(n, m - n).amax();
+        (0..n).map(|i| (angle[i] + gamma * rate[i]).abs().max(rate[i].abs() / pace_rad_s)).fold(hidden, f64::max)
+    }
+
+    /// Derivatives of a solved step's stages: exact for the numerical solution itself, as the balance holds at every stage.
+    pub fn slopes(
+        &mut self,
+        start: &Start<'_>,
+        length_s: f64,
+        k: &DVector<f64>,
+        parameters: &[Parameter],
+        (theta, rate): (&DMatrix<f64>, &DMatrix<f64>),
+    ) -> Option<DMatrix<f64>> {
+        let (n, m, columns) = (theta.nrows(), rate.nrows(), theta.ncols());
+        let mut right = DMatrix::zeros(STAGES * m, columns);
+        self.clear_matrix();
+        let mut q = vec![0.0; m];
+        for stage in 0..STAGES {
+            self.go_to(stage, start, length_s, k);
+            self.model.partials(&self.motion, &mut self.partials[stage]);
+            self.fill_rows(stage, length_s);
+            let partials = &self.partials[stage];
+            for (column, parameter) in parameters.iter().enumerate() {
+                self.model.sensitivity(*parameter, &self.motion, partials, &mut q);
+                for row in 0..m {
+                    right[(stage * m + row, column)] = -q[row] * self.scale[row];
+                }
+            }
+            let reach_s = length_s * RADAU.nodes[stage];
+            for column in 0..columns {
+                for row in 0..m {
+                    let of_angles: f64 = (0..n)
+                        .map(|j| partials.theta[(row, j)] * (theta[(j, column)] + reach_s * rate[(j, column)]))
+                        .sum();
+                    let of_rates: f64 = (0..m).map(|j| partials.rate[(row, j)] * rate[(j, column)]).sum();
+                    right[(stage * m + row, column)] -= (of_angles + of_rates) * self.scale[row];
+                }
+            }
+        }
+        let lu = std::mem::replace(&mut self.matrix, DMatrix::zeros(STAGES * m, STAGES * m)).lu();
+        lu.solve_mut(&mut right).then_some(right)
+    }
+
+    fn linearise(&mut self, start: &Start<'_>, length_s: f64, k: &DVector<f64>) -> LU<f64, Dyn, Dyn> {
+        self.clear_matrix();
+        for stage in 0..STAGES {
+            self.go_to(stage, start, length_s, k);
+            self.model.partials(&self.motion, &mut self.partials[stage]);
+            self.fill_rows(stage, length_s);
+        }
+        self.matrix.clone().lu()
+    }
+
+    fn clear_matrix(&mut self) {
+        self.matrix.fill(0.0);
+    }
+
+    /// ∂Qᵢ/∂kⱼ = δᵢⱼ ∂Q/∂acceleration + h wᵢⱼ ∂Q/∂rate + h² uᵢⱼ ∂Q/∂θ.
+    fn fill_rows(&mut self, stage: usize, length_s: f64) {
+        let partials = &self.partials[stage];
+        let (n, m) = (partials.theta.ncols(), partials.rate.ncols());
+        for j in 0..STAGES {
+            let rate = length_s * RADAU.rate[stage][j];
+            let angle = length_s * length_s * RADAU.angle[stage][j];
+            for column in 0..m {
+                for row in 0..m {
+                    let mut value = rate * partials.rate[(row, column)];
+                    if column < n {
+                        value += angle * partials.theta[(row, column)];
+                    }
+                    if stage == j {
+                        value += partials.acceleration[(row, column)];
+                    }
+                    self.matrix[(stage * m + row, j * m + column)] = value * self.scale[row];
+                }
+            }
+        }
+    }
+
+    fn balance(&mut self, start: &Start<'_>, length_s: f64, k: &DVector<f64>) {
+        let m = start.rate.len();
+        for stage in 0..STAGES {
+            self.go_to(stage, start, length_s, k);
+            let mut rows = self.residual.rows_mut(stage * m, m);
+            self.model.torque(&self.motion, rows.as_mut_slice());
+            for (value, scale) in rows.iter_mut().zip(&self.scale) {
+                *value *= scale;
+            }
+        }
+    }
+
+    fn go_to(&mut self, stage: usize, start: &Start<'_>, length_s: f64, k: &DVector<f64>) {
+        let (n, m, h) = (start.theta_rad.len(), start.rate.len(), length_s);
+        let (angle, rate) = (&RADAU.angle[stage], &RADAU.rate[stage]);
+        let k = k.as_slice();
+        let motion = &mut self.motion;
+        for i in 0..m {
+            let (mut moved, mut sped) = (0.0, 0.0);
+            for j in 0..STAGES {
+                moved += angle[j] * k[j * m + i];
+                sped += rate[j] * k[j * m + i];
+            }
+            motion.rate[i] = start.rate[i] + h * sped;
+            motion.acceleration[i] = k[stage * m + i];
+            if i < n {
+                motion.theta_rad[i] = start.theta_rad[i] + h * RADAU.nodes[stage] * start.rate[i] + h * h * moved;
+                (motion.sin[i], motion.cos[i]) = motion.theta_rad[i].sin_cos();
+            }
+        }
+        motion.hinge = start.hinge;
+        self.model.set_time(motion, start.from_s + h * RADAU.nodes[stage]);
+    }
+}

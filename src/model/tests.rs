@@ -1,0 +1,377 @@
+//! The model against known answers: derivatives, frequencies, energy, friction, other formulations of the same motion.
+
+use nalgebra::DMatrix;
+
+use super::integrate::Directions;
+use super::*;
+use crate::experiment::{Effects, Experiment, Hysteresis, Inertia, Model, Rig, SupportMotion};
+
+fn experiment(k: f64, c: f64, effects: Effects) -> Experiment {
+    let model = Model { k_eq_n_m_per_rad: k, c_eq_n_m_s_per_rad: c, effects, ..Model::default() };
+    Experiment { model, ..Experiment::default() }
+}
+
+/// Every effect at once, on three links.
+fn everything() -> ForwardModel {
+    let effects = Effects {
+        hinge_viscous: Some(2e-7),
+        hinge_coulomb: Some(1e-6),
+        hinge_stiffness: Some(1e-5),
+        joint_cubic_stiffness: Some(3e-4),
+        joint_hysteretic: Some(Hysteresis { torque_n_m: 3e-6, yield_rad: 0.05 }),
+        rest_curl: Some(0.1),
+        air_linear: Some(1e-3),
+        air_quadratic: Some(2e-3),
+        added_mass: Some(3e-4),
+        side_force: Some(0.4),
+        support_motion: Some(SupportMotion { amplitude_m: 1e-3, frequency_hz: 0.8, phase_rad: 0.3 }),
+        ..Effects::default()
+    };
+    let mut experiment = experiment(2e-4, 1e-6, effects);
+    experiment.specimen.link_lengths_m = vec![0.06, 0.09, 0.05];
+    ForwardModel::of(&experiment).unwrap()
+}
+
+fn some_motion(model: &ForwardModel) -> Motion {
+    let mut motion = model.motion(0.37, &[0.4, -0.3, 0.8], &[2.0, -3.0, 4.0, 0.3, -0.2]);
+    motion.acceleration.copy_from_slice(&[30.0, -50.0, 20.0, 1.0, 2.0]);
+    motion
+}
+
+/// The change of the torques when `change` is applied forwards and backwards, over 2 ε.
+fn slope(model: &ForwardModel, motion: &Motion, epsilon: f64, change: impl Fn(&mut Motion, f64)) -> Vec<f64> {
+    let torque = |step: f64| {
+        let mut moved = motion.clone();
+        change(&mut moved, step);
+        let mut q = vec![0.0; model.rates()];
+        model.torque(&moved, &mut q);
+        q
+    };
+    torque(epsilon).iter().zip(torque(-epsilon)).map(|(a, b)| (a - b) / (2.0 * epsilon)).collect()
+}
+
+#[test]
+fn partials_are_the_differences_of_the_torques() {
+    let model = everything();
+    let motion = some_motion(&model);
+    let mut partials = Partials::zero(3, 5);
+    model.partials(&motion, &mut partials);
+    let close = |column: &[f64], exact: Vec<f64>, what: &str| {
+        for (row, (a, b)) in column.iter().zip(&exact).enumerate() {
+            let unit = if row < 3 { 1e-4 } else { 10.0 };
+            assert!((a - b).abs() < 1e-7 * unit, "{what}, row {row}: {a} {b}");
+        }
+    };
+    for j in 0..3 {
+        let turned = slope(&model, &motion, 1e-5, |m, e| {
+            let mut theta = m.theta_rad.clone();
+            theta[j] += e;
+            m.place(&theta);
+        });
+        close(partials.theta.column(j).as_slice(), turned, "θ");
+    }
+    for j in 0..5 {
+        close(partials.rate.column(j).as_slice(), slope(&model, &motion, 1e-5, |m, e| m.rate[j] += e), "rate");
+        let sped = slope(&model, &motion, 1e-3, |m, e| m.acceleration[j] += e);
+        close(partials.acceleration.column(j).as_slice(), sped, "acceleration");
+    }
+    close(partials.pivot_velocity.as_slice(), slope(&model, &motion, 1e-5, |m, e| m.pivot_m_s += e), "ẋₚ");
+    close(partials.pivot_acceleration.as_slice(), slope(&model, &motion, 1e-3, |m, e| m.pivot_m_s2 += e), "ẍₚ");
+}
+
+#[test]
+fn sensitivities_are_the_differences_of_the_torques() {
+    let mut model = everything();
+    let motion = some_motion(&model);
+    let mut partials = Partials::zero(3, 5);
+    model.partials(&motion, &mut partials);
+    for (parameter, value) in model.parameters() {
+        let mut exact = vec![0.0; 5];
+        model.sensitivity(parameter, &motion, &partials, &mut exact);
+        let epsilon = 1e-6 * value.abs().max(1e-8);
+        let mut torque = |value: f64| {
+            model.set(parameter, value);
+            let mut moved = motion.clone();
+            model.set_time(&mut moved, motion.t_s);
+            let mut q = vec![0.0; 5];
+            model.torque(&moved, &mut q);
+            q
+        };
+        let (above, below) = (torque(value + epsilon), torque(value - epsilon));
+        torque(value);
+        for row in 0..5 {
+            let difference = (above[row] - below[row]) / (2.0 * epsilon);
+            let size = exact.iter().fold(1e-12f64, |a, b| a.max(b.abs()));
+            assert!(
+                (exact[row] - difference).abs() < 1e-5 * size,
+                "{parameter}, row {row}: {} {difference}",
+                exact[row]
+            );
+        }
+    }
+}
+
+#[test]
+fn derivatives_of_the_motion_are_its_differences_across_reversals() {
+    let mut model = everything();
+    // the hinge of three links would otherwise mostly stick to its rail
+    let start = State { theta_rad: vec![0.4, 0.5, 0.3], omega_rad_s: vec![0.1, 0.0, 0.2], hidden: Vec::new() };
+    let parameters: Vec<Parameter> = model.parameters().into_iter().map(|(p, _)| p).collect();
+    let directions =
+        Directions { parameters: parameters.clone(), theta: DMatrix::identity(3, 3), rate: DMatrix::zeros(5, 3) };
+    let (accuracy, until_s) = (Accuracy { step_error_rad: 1e-12, ..Accuracy::default() }, 2.0);
+    let swing = Trajectory::with(&model, &start, (0.0, until_s), Some(&directions), &accuracy).unwrap();
+    let reversals = swing.steps().windows(2).filter(|s| s[0].hinge != s[1].hinge).count();
+    assert!(reversals >= 3, "{reversals}");
+    let (theta, _) = swing.instant(until_s).unwrap().slopes.unwrap();
+    let end = |model: &ForwardModel, start: &State| {
+        Trajectory::with(model, start, (0.0, until_s), None, &accuracy).unwrap().at(until_s).theta_rad
+    };
+    for (column, parameter) in parameters.iter().enumerate() {
+        let value = model.value(*parameter).unwrap();
+        let epsilon = 1e-4 * value.abs();
+        model.set(*parameter, value + epsilon);
+        let above = end(&model, &start);
+        model.set(*parameter, value - epsilon);
+        let below = end(&model, &start);
+        model.set(*parameter, value);
+        let size = theta.column(column).amax();
+        for row in 0..3 {
+            let difference = (above[row] - below[row]) / (2.0 * epsilon);
+            let exact = theta[(row, column)];
+            assert!((exact - difference).abs() < 2e-4 * size, "{parameter}, link {row}: {exact} {difference}");
+        }
+    }
+    for link in 0..3 {
+        let moved = |step: f64| {
+            let mut start = start.clone();
+            start.theta_rad[link] += step;
+            end(&model, &start)
+        };
+        let (above, below) = (moved(1e-5), moved(-1e-5));
+        for row in 0..3 {
+            let difference = (above[row] - below[row]) / 2e-5;
+            let exact = theta[(row, parameters.len() + link)];
+            assert!((exact - difference).abs() < 2e-4, "θ of link {link}, link {row}: {exact} {difference}");
+        }
+    }
+}
+
+#[test]
+fn two_limp_rods_swing_at_1_3489_and_3_6180_hz() {
+    let limp = Experiment {
+        rig: Rig { gravity_m_s2: 9.81, ..Rig::default() },
+        model: Model { k_eq_n_m_per_rad: 0.0, c_eq_n_m_s_per_rad: 0.0, ..Model::default() },
+        ..Experiment::default()
+    };
+    let model = ForwardModel::of(&limp).unwrap();
+    let mut partials = Partials::zero(2, 2);
+    model.partials(&model.motion(0.0, &[0.0; 2], &[0.0; 2]), &mut partials);
+    let squares = (partials.acceleration.try_inverse().unwrap() * partials.theta).complex_eigenvalues();
+    let mut hz: Vec<f64> = squares.iter().map(|l| l.re.sqrt() / std::f64::consts::TAU).collect();
+    hz.sort_by(f64::total_cmp);
+    assert!((hz[0] - 1.3489).abs() < 5e-5 && (hz[1] - 3.6180).abs() < 5e-5, "{hz:?}");
+}
+
+#[test]
+fn a_steady_side_force_turns_gravity() {
+    let mut windy = Experiment::default();
+    windy.model.effects.side_force = Some(1.3);
+    let model = ForwardModel::of(&windy).unwrap();
+    let rest = (1.3f64 / windy.rig.gravity_m_s2).atan();
+    let mut motion = model.motion(0.0, &[rest; 2], &[0.0; 2]);
+    model.accelerate(&mut motion).unwrap();
+    assert!(motion.acceleration.iter().all(|a| a.abs() < 1e-9));
+}
+
+fn energies_j(experiment: &Experiment, release: &[f64], until_s: f64) -> Vec<f64> {
+    let model = ForwardModel::of(experiment).unwrap();
+    let accuracy = Accuracy { step_error_rad: 1e-12, ..Accuracy::default() };
+    let swing = Trajectory::with(&model, &State::at_rest(release), (0.0, until_s), None, &accuracy).unwrap();
+    let at = |i: i32| {
+        let t_s = until_s * f64::from(i) / 400.0;
+        let instant = swing.instant(t_s).unwrap();
+        model.energy_j(&model.motion(t_s, &instant.theta_rad, &instant.rate))
+    };
+    (0..=400).map(at).collect()
+}
+
+#[test]
+fn energy_is_conserved_without_losses() {
+    let stored = Effects {
+        hinge_stiffness: Some(1e-5),
+        joint_cubic_stiffness: Some(1e-4),
+        rest_curl: Some(0.1),
+        added_mass: Some(3e-4),
+        side_force: Some(0.4),
+        ..Effects::default()
+    };
+    for (effects, release) in [(Effects::default(), [0.9, -0.6]), (stored, [0.5, 0.8])] {
+        let energies = energies_j(&experiment(2e-4, 0.0, effects), &release, 20.0);
+        let worst = energies.iter().map(|e| (e / energies[0] - 1.0).abs()).fold(0.0, f64::max);
+        assert!(worst < 1e-8, "{worst}");
+    }
+}
+
+#[test]
+fn energy_never_rises_where_every_effect_dissipates() {
+    let losses = Effects {
+        hinge_viscous: Some(1e-7),
+        hinge_coulomb: Some(2e-7),
+        joint_hysteretic: Some(Hysteresis { torque_n_m: 1e-6, yield_rad: 0.05 }),
+        air_linear: Some(1e-4),
+        air_quadratic: Some(2e-3),
+        ..Effects::default()
+    };
+    let energies = energies_j(&experiment(2e-4, 1e-7, losses), &[0.5, 0.7], 5.0);
+    assert!(energies.windows(2).all(|e| e[1] <= e[0] * (1.0 + 1e-10)));
+    assert!(energies[400] < 0.9 * energies[0]);
+}
+
+#[test]
+fn hysteresis_loses_the_same_in_a_slow_cycle_as_in_a_fast_one() {
+    let law = effects::joint::Hysteresis { torque_n_m: 2e-6, yield_rad: 0.05 };
+    let chain = Chain::of(&crate::experiment::Specimen::default()).unwrap();
+    let work_j = |rate: f64| {
+        let (mut motion, mut work_j, steps) = (Motion::zero(2, 1), 0.0, 40_000);
+        let dt_s = 3.0 * std::f64::consts::TAU / rate / f64::from(steps);
+        for step in 0..steps {
+            let t_s = dt_s * f64::from(step);
+            motion.place(&[0.0, 0.3 * (rate * t_s).sin()]);
+            motion.rate[1] = 0.3 * rate * (rate * t_s).cos();
+            let mut q = [0.0; 3];
+            effects::Effect::add_torque(&law, &chain, &motion, &mut q);
+            motion.rate[2] += q[2] * dt_s;
+            if step >= steps / 3 {
+                work_j -= q[1] * motion.rate[1] * dt_s;
+            }
+        }
+        work_j / 2.0
+    };
+    let (slow, fast) = (work_j(1.0), work_j(20.0));
+    assert!((slow / fast - 1.0).abs() < 1e-3 && slow > 0.0, "{slow} {fast}");
+    // far beyond yield the loop is a parallelogram of height 2T and width 4(A − Δ_y), with rounded corners
+    assert!(slow < 4.0 * 2e-6 * 0.3 && slow > 4.0 * 2e-6 * (0.3 - 3.0 * 0.05), "{slow}");
+}
+
+#[test]
+fn a_dry_hinge_loses_four_bands_a_cycle_and_then_holds() {
+    let mut dry = experiment(0.0, 0.0, Effects { hinge_coulomb: Some(1e-8), ..Effects::default() });
+    dry.specimen.link_lengths_m = vec![0.2];
+    let model = ForwardModel::of(&dry).unwrap();
+    // small enough for a linear pendulum: each half swing ends 2τ/(gh) nearer to the middle
+    let band_rad = 1e-8 / (model.gravity_m_s2() * model.chain().static_moment_kg_m(0));
+    let release = 20.5 * band_rad;
+    let swing = Trajectory::swing(&model, &State::at_rest(&[release]), 0.0, 20.0).unwrap();
+    let turns: Vec<f64> =
+        swing.steps().windows(2).filter(|s| s[0].hinge != s[1].hinge).map(|s| s[1].theta_rad[0] / band_rad).collect();
+    assert!(turns.len() >= 10, "{turns:?}");
+    for (turn, expected) in turns.iter().zip([-18.5, 16.5, -14.5, 12.5, -10.5, 8.5, -6.5, 4.5, -2.5, 0.5]) {
+        assert!((turn - expected).abs() < 1e-3, "{turns:?}");
+    }
+    assert_eq!(swing.at(20.0).omega_rad_s[0], 0.0);
+    assert!((swing.at(20.0).theta_rad[0] / band_rad - 0.5).abs() < 1e-3);
+}
+
+#[test]
+fn a_held_hinge_is_let_go_when_the_lower_link_pulls() {
+    // the lower link swings beneath a hinge that holds the upper one at first
+    let model =
+        ForwardModel::of(&experiment(0.0, 0.0, Effects { hinge_coulomb: Some(6e-5), ..Effects::default() })).unwrap();
+    let swing = Trajectory::swing(&model, &State::at_rest(&[0.0, 1.2]), 0.0, 2.0).unwrap();
+    let states: Vec<Hinge> = swing.steps().iter().map(|s| s.hinge).collect();
+    assert!(states.contains(&Hinge::Sticks) && states.iter().any(|s| *s != Hinge::Sticks), "{states:?}");
+    for step in swing.steps().iter().filter(|s| s.hinge != Hinge::Sticks) {
+        let middle = step.one_rate(0, 0.5);
+        assert!(middle * step.hinge.sign() > 0.0, "{middle} while {:?}", step.hinge);
+    }
+}
+
+#[test]
+fn a_pivot_that_moves_slowly_carries_the_chain_with_it() {
+    let slow = SupportMotion { amplitude_m: 0.01, frequency_hz: 0.05, phase_rad: 0.0 };
+    let moved = experiment(2e-4, 0.0, Effects { support_motion: Some(slow), ..Effects::default() });
+    let model = ForwardModel::of(&moved).unwrap();
+    let swing = Trajectory::swing(&model, &State::at_rest(&[0.0, 0.0]), 0.0, 10.0).unwrap();
+    // Sudden start of the pivot at 3 mm/s: the chain rings by v/√(gL) at most.
+    assert!((0..100).all(|i| swing.at(0.1 * f64::from(i)).theta_rad[0].abs() < 0.01));
+}
+
+#[test]
+fn stiffness_from_0_to_1_n_m_per_rad_takes_few_steps() {
+    for (k, c) in [(0.0, 0.0), (2e-4, 2e-6), (0.0251, 2.652e-4), (0.1162, 4.153e-4), (1.0, 1e-3), (1.0, 1.0)] {
+        for inertia in [Inertia::Rods, Inertia::Lumps] {
+            let mut stiff = experiment(k, c, Effects::default());
+            stiff.specimen.inertia = inertia;
+            let model = ForwardModel::of(&stiff).unwrap();
+            let start = State::at_rest(&[0.5, 0.6]);
+            let swing = Trajectory::swing(&model, &start, 0.0, 5.0).unwrap();
+            let steps = swing.steps().len();
+            assert!(steps < 1000, "K = {k}, C = {c}: {steps} steps");
+            let end = swing.at(5.0);
+            assert!(end.theta_rad.iter().all(|a| a.abs() < 0.6), "{end:?}");
+        }
+    }
+}
+
+#[test]
+fn a_very_stiff_joint_makes_one_rod() {
+    let model = ForwardModel::of(&experiment(1.0, 1e-2, Effects::default())).unwrap();
+    let mut rigid = experiment(0.0, 0.0, Effects::default());
+    rigid.specimen.link_lengths_m = vec![0.2];
+    let rod = ForwardModel::of(&rigid).unwrap();
+    let two = Trajectory::swing(&model, &State::at_rest(&[0.5, 0.5]), 0.0, 10.0).unwrap();
+    let one = Trajectory::swing(&rod, &State::at_rest(&[0.5]), 0.0, 10.0).unwrap();
+    for i in 0..100 {
+        let t_s = 0.1 * f64::from(i);
+        let (two, one) = (two.at(t_s).theta_rad, one.at(t_s).theta_rad[0]);
+        assert!((two[0] - one).abs() < 2e-4 && (two[1] - one).abs() < 2e-4, "{t_s}: {two:?} {one}");
+    }
+}
+
+#[test]
+fn the_period_of_one_rod_is_the_elliptic_integral() {
+    let mut limp = experiment(0.0, 0.0, Effects::default());
+    limp.specimen.link_lengths_m = vec![0.2];
+    let model = ForwardModel::of(&limp).unwrap();
+    let swing = Trajectory::swing(&model, &State::at_rest(&[1.2]), 0.0, 30.0).unwrap();
+    // T = 4 K(sin θ₀/2)/ω₀ with K by the arithmetic–geometric mean
+    let (mut a, mut b) = (1.0f64, (0.6f64).cos());
+    for _ in 0..8 {
+        (a, b) = (0.5 * (a + b), (a * b).sqrt());
+    }
+    let rate = (1.5 * model.gravity_m_s2() / 0.2).sqrt();
+    let period_s = std::f64::consts::TAU / (a * rate);
+    for cycle in 1..30 {
+        let theta = swing.at(period_s * f64::from(cycle)).theta_rad[0];
+        if period_s * f64::from(cycle) < 30.0 {
+            assert!((theta - 1.2).abs() < 1e-8, "{cycle}: {theta}");
+        }
+    }
+}
+
+#[test]
+fn the_wrong_number_of_angles_is_refused() {
+    let model = ForwardModel::of(&Experiment::default()).unwrap();
+    let error = Trajectory::swing(&model, &State::at_rest(&[0.5]), 0.0, 1.0).unwrap_err().to_string();
+    assert!(error.contains("1 angles for 2 links"), "{error}");
+}
+
+#[test]
+fn a_bending_strip_hangs_together_like_its_two_rods() {
+    let mut strip = experiment(0.0, 0.0, Effects { distributed_flexibility: Some(1e-2), ..Effects::default() });
+    strip.model.release_rad = vec![0.4, 0.4];
+    let model = ForwardModel::of(&strip).unwrap();
+    assert_eq!((model.chain().count(), model.chain().groups().len()), (12, 2));
+    let start = State::released(model.chain(), &strip.model.release_rad).unwrap();
+    let swing = Trajectory::swing(&model, &start, 0.0, 2.0).unwrap();
+    let mut rigid = experiment(0.0, 0.0, Effects::default());
+    rigid.specimen.link_lengths_m = vec![0.2];
+    let rod = Trajectory::swing(&ForwardModel::of(&rigid).unwrap(), &State::at_rest(&[0.4]), 0.0, 2.0).unwrap();
+    for i in 0..20 {
+        let t_s = 0.1 * f64::from(i);
+        let seen = observe::chord_angles_rad(model.chain(), &swing.at(t_s).theta_rad);
+        let rigid = rod.at(t_s).theta_rad[0];
+        assert!((seen[0] - rigid).abs() < 5e-3 && (seen[1] - rigid).abs() < 5e-3, "{t_s}: {seen:?} {rigid}");
+    }
+}
