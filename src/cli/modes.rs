@@ -45,7 +45,7 @@ impl ModesArgs {
 }
 
 fn survey_text(survey: &Survey) -> String {
-    let mut text = format!("{}, g = {} m/s²\n", survey.specimen, survey.gravity_m_s2);
+    let mut text = format!("{}, g = {} m/s²\n", survey.specimen, setting(survey.gravity_m_s2));
     floor(survey, &mut text);
     chain(survey, &mut text);
     rods(survey, &mut text);
@@ -75,8 +75,11 @@ fn chain(survey: &Survey, text: &mut String) {
         (None, bending) => format!("EI = {} N·m²", setting(bending.unwrap_or(0.0))),
     };
     let damper = setting(chain.joint_damping_n_m_s_per_rad);
-    let plural = if links == 1 { "" } else { "s" };
-    let _ = writeln!(text, "\nChain of {links} link{plural}: {spring}, C = {damper} N·m·s/rad at each joint");
+    if links == 1 {
+        text.push_str("\nOne link\n");
+    } else {
+        let _ = writeln!(text, "\nChain of {links} links: {spring}, C = {damper} N·m·s/rad at each joint");
+    }
     if chain.rest_rad.iter().any(|a| a.abs() > 1e-9) {
         let angles: Vec<String> =
             chain.rest_rad.iter().map(|a| format!("{:.2}°", (100.0 * a.to_degrees()).round() / 100.0 + 0.0)).collect();
@@ -84,7 +87,8 @@ fn chain(survey: &Survey, text: &mut String) {
     }
     let shown: Vec<String> = shown_links(links).map(|i| (i + 1).to_string()).collect();
     let shape_heading = match links {
-        1 | 2 => "shape θ₁ : θ₂".to_owned(),
+        1 => "shape".to_owned(),
+        2 => "shape θ₁ : θ₂".to_owned(),
         _ => format!("shape, links {}", shown.join(" : ")),
     };
     let mut table = Table::with_sentences(["mode", "Hz", "ξ", &shape_heading]);
