@@ -99,7 +99,7 @@ fn bad_configurations_are_one_line_and_exit_code_2() {
         config("[specimen]\ninertia = \"lumps\"\nlumps = [0.5, 0.5, 0.0]\n").path(),
         "a link swings without inertia",
     );
-    refused(config("[model.effects]\nrest_curl = 40.0\n[specimen]\n").path(), "no rest position");
-    refused(config("[model.effects]\nhinge_stiffness = nan\n").path(), "no rest position");
+    refused(config("[model.effects]\nrest_curl = 40.0\n[specimen]\n").path(), "no stable rest position");
+    refused(config("[model.effects]\nhinge_stiffness = nan\n").path(), "no stable rest position");
     refused(config("[model.effects]\nadded_mass = -1.0\n").path(), "cannot be");
 }

@@ -45,7 +45,7 @@ impl ModesArgs {
 }
 
 fn survey_text(survey: &Survey) -> String {
-    let mut text = format!("{}, g = {} m/s²\n", survey.specimen, survey.gravity_m_s2);
+    let mut text = format!("{}, g = {} m/s²\n", survey.specimen, setting(survey.gravity_m_s2));
     floor(survey, &mut text);
     chain(survey, &mut text);
     rods(survey, &mut text);
@@ -70,23 +70,28 @@ fn floor(survey: &Survey, text: &mut String) {
 fn chain(survey: &Survey, text: &mut String) {
     let chain = &survey.chain;
     let links = chain.rest_rad.len();
-    let _ = writeln!(
-        text,
-        "\nChain of {links} link{}: K = {} N·m/rad, C = {} N·m·s/rad at each joint",
-        if links == 1 { "" } else { "s" },
-        setting(chain.joint_stiffness_n_m_per_rad),
-        setting(chain.joint_damping_n_m_s_per_rad)
-    );
+    let spring = match (chain.joint_stiffness_n_m_per_rad, chain.bending_stiffness_n_m2) {
+        (Some(stiffness), _) => format!("K = {} N·m/rad", setting(stiffness)),
+        (None, bending) => format!("EI = {} N·m²", setting(bending.unwrap_or(0.0))),
+    };
+    let damper = setting(chain.joint_damping_n_m_s_per_rad);
+    if links == 1 {
+        text.push_str("\nOne link\n");
+    } else {
+        let _ = writeln!(text, "\nChain of {links} links: {spring}, C = {damper} N·m·s/rad at each joint");
+    }
     if chain.rest_rad.iter().any(|a| a.abs() > 1e-9) {
-        let angles: Vec<String> = chain.rest_rad.iter().map(|a| format!("{:.2}°", a.to_degrees())).collect();
+        let angles: Vec<String> =
+            chain.rest_rad.iter().map(|a| format!("{:.2}°", (100.0 * a.to_degrees()).round() / 100.0 + 0.0)).collect();
         text.push_str(&paragraph("  at rest at ", &angles.join(", ")));
     }
+    let shown: Vec<String> = shown_links(links).map(|i| (i + 1).to_string()).collect();
     let shape_heading = match links {
-        1 => "shape",
-        2 => "shape θ₁ : θ₂",
-        _ => "shape θ₁ : θ₂ : …",
+        1 => "shape".to_owned(),
+        2 => "shape θ₁ : θ₂".to_owned(),
+        _ => format!("shape, links {}", shown.join(" : ")),
     };
-    let mut table = Table::with_sentences(["mode", "Hz", "ξ", shape_heading]);
+    let mut table = Table::with_sentences(["mode", "Hz", "ξ", &shape_heading]);
     for (k, mode) in chain.modes.modes.iter().enumerate().take(PRINTED_MODES) {
         let ratio = if mode.damping_ratio == 0.0 { "0".to_owned() } else { number(mode.damping_ratio, 4) };
         table.row([(k + 1).to_string(), hz(mode.frequency_hz), ratio, shape_text(&mode.shape)]);
@@ -185,9 +190,11 @@ fn shape_text(shape: &[Component]) -> String {
             format!("{:.4}", c.amplitude * c.phase_rad.cos().signum())
         }
     };
-    let mut components: Vec<String> = shape.iter().take(PRINTED_COMPONENTS).map(component).collect();
-    if shape.len() > PRINTED_COMPONENTS {
-        components.push("…".to_owned());
-    }
-    components.join(" : ")
+    shown_links(shape.len()).map(|i| component(&shape[i])).collect::<Vec<_>>().join(" : ")
+}
+
+/// The links whose part of a shape is printed: all of a short chain, else some, evenly from the first to the last.
+fn shown_links(links: usize) -> impl Iterator<Item = usize> {
+    let shown = links.min(PRINTED_COMPONENTS);
+    (0..shown).map(move |k| if shown > 1 { (k * (links - 1) + (shown - 1) / 2) / (shown - 1) } else { k })
 }

@@ -27,6 +27,16 @@ pub enum Support {
     Clamped,
 }
 
+impl Support {
+    /// Freedoms of the first node that it holds: w, and at a clamp φ.
+    fn held(self) -> usize {
+        match self {
+            Self::Hinged => 1,
+            Self::Clamped => 2,
+        }
+    }
+}
+
 /// A uniform strip hung by its upper end.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Strip {
@@ -66,27 +76,46 @@ impl Strip {
             stiffness_n_m: DMatrix::zeros(freedoms, freedoms),
             pressure_load_m: DVector::zeros(freedoms),
         };
-        for (k, ends_m) in mesh.nodes_m.windows(2).enumerate() {
-            let element = Element { from_m: ends_m[0], length_m: ends_m[1] - ends_m[0] };
+        for (k, element) in mesh.elements().enumerate() {
             let mut mass_kg = whole.mass_kg.fixed_view_mut::<4, 4>(2 * k, 2 * k);
             mass_kg += element.mass_m() * self.mass_per_length_kg_m;
             let mut stiffness_n_m = whole.stiffness_n_m.fixed_view_mut::<4, 4>(2 * k, 2 * k);
             stiffness_n_m += element.bending_per_m3() * self.bending_stiffness_n_m2;
-            stiffness_n_m +=
-                element.tension(|x_m| self.mass_per_length_kg_m * self.gravity_m_s2 * (self.length_m - x_m));
+            stiffness_n_m += element.tension(|x_m| self.tension_n(x_m));
             let mut load_m = whole.pressure_load_m.fixed_rows_mut::<4>(2 * k);
             load_m += element.load_m();
         }
-        let held = match support {
-            Support::Hinged => 1,
-            Support::Clamped => 2,
-        };
-        // A hinge holds w of the first node, freedom 0; a clamp its slope, freedom 1, too.
+        let held = support.held();
         StripMatrices {
             mass_kg: whole.mass_kg.remove_rows(0, held).remove_columns(0, held),
             stiffness_n_m: whole.stiffness_n_m.remove_rows(0, held).remove_columns(0, held),
             pressure_load_m: whole.pressure_load_m.remove_rows(0, held),
         }
+    }
+
+    /// ω² (rad²/s²) that a shape given by its freedoms would swing with: Rayleigh's quotient, twice the stored energy over twice the kinetic
+    /// energy at unit rate.
+    ///
+    /// It is summed over the elements, whose bending ∫w″²dx = 4(a² + ab + b²)/h follows from the slopes a, b of their ends against their
+    /// chord: a stiff strip that swings without bending keeps its digits, which the assembled matrix would lose.
+    pub fn rayleigh_quotient_rad2_s2(&self, mesh: &Mesh, support: Support, shape: &[f64]) -> f64 {
+        let held = support.held();
+        let freedom = |k: usize| if k < held { 0.0 } else { shape[k - held] };
+        let (mut stored_j, mut kinetic_kg_m2) = (0.0, 0.0);
+        for (k, element) in mesh.elements().enumerate() {
+            let ends = Vector4::from_fn(|i, _| freedom(2 * k + i));
+            let chord = (ends[2] - ends[0]) / element.length_m;
+            let (a, b) = (ends[1] - chord, ends[3] - chord);
+            stored_j += self.bending_stiffness_n_m2 * 4.0 * (a * a + a * b + b * b) / element.length_m;
+            stored_j += ends.dot(&(element.tension(|x_m| self.tension_n(x_m)) * ends));
+            kinetic_kg_m2 += self.mass_per_length_kg_m * ends.dot(&(element.mass_m() * ends));
+        }
+        stored_j / kinetic_kg_m2
+    }
+
+    /// T(x).
+    fn tension_n(&self, x_m: f64) -> f64 {
+        self.mass_per_length_kg_m * self.gravity_m_s2 * (self.length_m - x_m)
     }
 
     /// Displacement of the free end (m) under a steady force per length across the strip.
@@ -120,6 +149,10 @@ impl Mesh {
         };
         let nodes_m = part(0.0, fine_m).chain(part(fine_m, strip.length_m)).chain([strip.length_m]).collect();
         Self { nodes_m }
+    }
+
+    fn elements(&self) -> impl Iterator<Item = Element> {
+        self.nodes_m.windows(2).map(|ends_m| Element { from_m: ends_m[0], length_m: ends_m[1] - ends_m[0] })
     }
 
     /// Nodes, from the support down.

@@ -84,7 +84,7 @@ fn load_component() -> Row {
 fn rotation_rate() -> Row {
     let lumps = limp();
     let gain = |slips: &[Slip]| {
-        Quantity::new(lumps.power_from_nothing_w(&SWING, slips) / lumps.kinetic_energy_j(&SWING), "E/s")
+        Quantity::new(lumps.power_from_nothing_w(&SWING, slips) / lumps.kinetic_energy_j(&SWING), "1/s")
     };
     Row::new(
         "Eq. 23, energy from nothing",

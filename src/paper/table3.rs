@@ -67,7 +67,7 @@ fn ratios() -> String {
     let above = |k: usize| 100.0 * (MATERIALS[1].frequencies.finite_element_hz[k] / weightless[k] - 1.0);
     format!(
         "f₂/f₁ of theory and FE: {}. Of the models: limp strip {:.3}, two rods {:.3}, clamped beam without gravity {:.3}. PET 5 mils' \
-         FE pair lies {:.1} and {:.1} % above that beam's: a strip clamped and weightless, which being wide bends as a plate.",
+         FE pair lies {:.1} and {:.1} % above that beam's own: it is such a beam, not a hinged strip in gravity.",
         pairs.collect::<Vec<_>>().join(", "),
         ratio(limp),
         fast / slow,

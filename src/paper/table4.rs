@@ -73,38 +73,44 @@ pub fn section(distance_m: f64) -> Result<Section> {
     for material in &MATERIALS {
         rows.push(displacement(material, force_n, distance_m)?);
     }
-    let mut remarks = vec!["Eq. 40 and 41 at 2000 W, light upon the whole strip; the paper does not give d. It reports displacements of \
-                            the order of micrometres, measured to 0.1 µm."
-        .to_owned(), "Table 4 gives errors against a measured displacement that Fig. 20 only draws, so multibody over finite elements, \
-                            (1+Δ)/(1+Δ), is all that can be compared; d drops out of it. Both models are linear at a micrometre, so for \
-                            each strip it is one number; a hinged strip under an even pressure hangs straight, and it is 1."
-        .to_owned()];
     for material in &MATERIALS {
         rows.extend(ratio_rows(material, force_n)?);
     }
+    Ok(Section { title: "Eq. 40, 41, Fig. 20 and Table 4: light pressure", rows, remarks: remarks(force_n)? })
+}
+
+fn remarks(force_n: f64) -> Result<Vec<String>> {
     let tilt_rad = multibody_tip_m(&MATERIALS[2], force_n)? / LENGTH_M;
     let clamped = MATERIALS.iter().map(|material| -> Result<String> {
         let ratio = multibody_tip_m(material, force_n)? / finite_element_tip_m(material, Support::Clamped, force_n)?;
         Ok(format!("{} {ratio:.3}", material.name))
     });
-    remarks.push(format!(
-        "Held by a clamp instead of a hinge the beam moves less and the ratio is above one ({}); Table 4's are all below.",
-        clamped.collect::<Result<Vec<_>>>()?.join(", ")
-    ));
-    remarks.push(format!(
-        "The text calls the finite elements' answer non-linear. The strip turns by {tilt_rad:.1e} rad at 2000 W; what is not linear in \
-         that angle is of its square, {:.0e}. Heat, which is in proportion to no force, is left.",
-        tilt_rad * tilt_rad
-    ));
-    let worst = |m: &Material| {
+    let worst = MATERIALS.iter().map(|m| {
         let at = (0..4).max_by(|a, b| m.multibody_error[*a].abs().total_cmp(&m.multibody_error[*b].abs()));
         format!("{} at {} W", m.name, POWERS_W[at.unwrap_or(0)])
-    };
-    remarks.push(format!(
-        "The text says that the multibody error is largest at 1000 W. By Table 4: {}.",
-        MATERIALS.iter().map(worst).collect::<Vec<_>>().join(", ")
-    ));
-    Ok(Section { title: "Eq. 40, 41, Fig. 20 and Table 4: light pressure", rows, remarks })
+    });
+    Ok(vec![
+        "Eq. 40 and 41 at 2000 W, light upon the whole strip; the paper does not give d. It reports displacements of the order of \
+         micrometres, measured to 0.1 µm."
+            .to_owned(),
+        "Table 4 gives errors against a measured displacement that Fig. 20 only draws, so multibody over finite elements, (1+Δ)/(1+Δ), is \
+         all that can be compared; d drops out of it. Both models are linear at a micrometre, so for each strip it is one number; a hinged \
+         strip under an even pressure hangs straight, and it is 1."
+            .to_owned(),
+        format!(
+            "Held by a clamp instead of a hinge the beam moves less and the ratio is above one ({}); Table 4's are all below.",
+            clamped.collect::<Result<Vec<_>>>()?.join(", ")
+        ),
+        format!(
+            "The text calls the finite elements' answer non-linear. The strip turns by {tilt_rad:.1e} rad at 2000 W, and what is not linear \
+             in that angle is of its square, {:.0e}. What is left is heat, which the paper itself suspects.",
+            tilt_rad * tilt_rad
+        ),
+        format!(
+            "The text says that the multibody error is largest at 1000 W. By Table 4: {}.",
+            worst.collect::<Vec<_>>().join(", ")
+        ),
+    ])
 }
 
 /// The paper says "in the order of micrometres"; the force falls with the square of the distance.

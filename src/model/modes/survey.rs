@@ -44,8 +44,10 @@ pub struct Floor {
 pub struct ChainModes {
     /// θ₀, top to bottom.
     pub rest_rad: Vec<f64>,
-    /// K of each joint as configured.
-    pub joint_stiffness_n_m_per_rad: f64,
+    /// K of each joint as configured, where the strip bends only there.
+    pub joint_stiffness_n_m_per_rad: Option<f64>,
+    /// EI as configured, where the strip bends everywhere.
+    pub bending_stiffness_n_m2: Option<f64>,
     /// C of each joint as configured.
     pub joint_damping_n_m_s_per_rad: f64,
     /// Vibrations and decays.
@@ -88,6 +90,7 @@ impl Survey {
     /// [`crate::Error::Simulation`] when the specimen cannot swing.
     pub fn of(experiment: &Experiment) -> Result<Self> {
         let linear = Linearised::of(experiment)?;
+        let bending = experiment.model.effects.distributed_flexibility;
         Ok(Self {
             schema: "freeswing.modes/1",
             specimen: experiment.specimen.name.clone(),
@@ -96,7 +99,8 @@ impl Survey {
             chain: ChainModes {
                 modes: Modes::of(&linear)?,
                 rest_rad: linear.rest_rad,
-                joint_stiffness_n_m_per_rad: experiment.model.k_eq_n_m_per_rad,
+                joint_stiffness_n_m_per_rad: bending.is_none().then_some(experiment.model.k_eq_n_m_per_rad),
+                bending_stiffness_n_m2: bending,
                 joint_damping_n_m_s_per_rad: experiment.model.c_eq_n_m_s_per_rad,
                 not_linear: Linearised::left_out(&experiment.model.effects),
             },
@@ -133,7 +137,8 @@ impl RodForms {
     fn of(experiment: &Experiment) -> Option<Self> {
         let Specimen { link_lengths_m, links, inertia, mass_kg, .. } = &experiment.specimen;
         let &[upper_m, lower_m] = link_lengths_m.as_slice() else { return None };
-        if !links.is_empty() || *inertia != Inertia::Rods {
+        let bends_everywhere = experiment.model.effects.distributed_flexibility.is_some();
+        if !links.is_empty() || *inertia != Inertia::Rods || bends_everywhere {
             return None;
         }
         let per_length_kg_m = mass_kg / (upper_m + lower_m);
