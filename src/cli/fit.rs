@@ -139,7 +139,12 @@ fn free_parameters(experiment: &Experiment, marks: usize, more: &[String], fix: 
     }
     free.retain(|p| !fix.contains(p));
     let mut once = Vec::new();
-    free.retain(|p| !once.contains(p) && { once.push(*p); true });
+    free.retain(|p| {
+        !once.contains(p) && {
+            once.push(*p);
+            true
+        }
+    });
     Ok(free)
 }
 

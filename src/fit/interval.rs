@@ -71,7 +71,8 @@ pub(super) fn uncertainty(problem: &Problem<'_>, outcome: &Outcome) -> Uncertain
     let correlation = DMatrix::from_fn(free, free, |i, j| covariance[(i, j)] / (sd[i] * sd[j]).max(1e-300));
     let estimates = (0..free)
         .map(|i| {
-            let profile = Profile { problem, outcome, inverse: &inverse, variance, index: i, sd: sd[i], lower: lower[i] };
+            let profile =
+                Profile { problem, outcome, inverse: &inverse, variance, index: i, sd: sd[i], lower: lower[i] };
             Estimate {
                 parameter: problem.free[i],
                 value: outcome.x[i],

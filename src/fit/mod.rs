@@ -108,13 +108,17 @@ pub fn fit(records: &[Record], experiment: &Experiment, free: &[Parameter]) -> R
     let start = shooting::multiple_shooting(&mut problem)?;
     let noise_rad = problem.noise_rad.clone();
     problem.learn_noise(&[], 0);
-    let refused = || Error::Simulation { detail: "no motion near the start values follows the recording; check [specimen] and [model]".into() };
+    let refused = || Error::Simulation {
+        detail: "no motion near the start values follows the recording; check [specimen] and [model]".into(),
+    };
     let lower = problem.lower();
     let robust = Descent { huber: 4.0, most_steps: 30, enough: 0.03 };
     let first = robust.run(start, &lower, |x| problem.blocks(x)).ok_or_else(refused)?;
     let (kept, outliers) = without_outliers(&problem, &first.x)?;
     let problem = Problem { records: &kept, ..problem };
-    let outcome = Descent { most_steps: 30, enough: 1e-3, ..Descent::default() }.run(first.x, &lower, |x| problem.blocks(x)).ok_or_else(refused)?;
+    let outcome = Descent { most_steps: 30, enough: 1e-3, ..Descent::default() }
+        .run(first.x, &lower, |x| problem.blocks(x))
+        .ok_or_else(refused)?;
     let uncertainty = interval::uncertainty(&problem, &outcome);
     let residuals = residuals(&problem, &outcome.x, &noise_rad)?;
     let (marks, free) = (problem.marks(), problem.free.len());
@@ -131,9 +135,9 @@ pub fn fit(records: &[Record], experiment: &Experiment, free: &[Parameter]) -> R
     })
 }
 
-/// The recordings without values that stand out from their neighbours: whose residual is further from the cubic through two on each side than
-/// six robust standard deviations of that distance, here and in the recording as a whole. A misfit of the model is smooth in time and moves
-/// neighbours together. Where more than one value in fifty stands out, the noise is not normal, and none is left out.
+/// The recordings without values that stand out from their neighbours: whose residual is further from the median of three on each side
+/// than six robust standard deviations of that distance, here and in the recording as a whole. A misfit of the model is smooth in time and
+/// moves neighbours together. Where more than one value in fifty stands out, the noise is not normal, and none is left out.
 fn without_outliers(problem: &Problem<'_>, x: &[f64]) -> Result<(Vec<Record>, Vec<Vec<(usize, usize)>>)> {
     let mut kept = problem.records.to_vec();
     let mut outliers = vec![Vec::new(); kept.len()];
@@ -154,13 +158,14 @@ fn without_outliers(problem: &Problem<'_>, x: &[f64]) -> Result<(Vec<Record>, Ve
     Ok((kept, outliers))
 }
 
-/// Rows whose residual stands out; the farthest first, as it pulls at its neighbours' cubics.
+/// Rows whose residual stands out; the farthest first, as it moves its neighbours' medians.
 fn standing_out(mut own: Vec<(usize, f64)>) -> Vec<usize> {
     let most = own.len() / 50;
     let sizes: Vec<f64> = (0..own.len()).map(|i| apart(&own, i).abs()).collect();
     let scale = |sizes: &[f64]| 1.4826 * median(sizes.to_vec());
     let everywhere = scale(&sizes);
-    let here: Vec<f64> = (0..own.len()).map(|i| scale(&sizes[i.saturating_sub(30)..(i + 31).min(sizes.len())])).collect();
+    let here: Vec<f64> =
+        (0..own.len()).map(|i| scale(&sizes[i.saturating_sub(30)..(i + 31).min(sizes.len())])).collect();
     let mut limits: Vec<f64> = here.iter().map(|here| OUTLIER * here.max(everywhere)).collect();
     let mut rows = Vec::new();
     loop {
@@ -174,13 +179,14 @@ fn standing_out(mut own: Vec<(usize, f64)>) -> Vec<usize> {
     }
 }
 
-/// How far a residual is from the cubic through the two before and the two after it; zero at the ends.
+/// How far a residual is from the median of the three before and the three after it; zero at the ends.
 fn apart(own: &[(usize, f64)], i: usize) -> f64 {
-    if i < 2 || i + 2 >= own.len() {
+    if i < 3 || i + 3 >= own.len() {
         return 0.0;
     }
-    let [a, b, c, d] = [own[i - 2].1, own[i - 1].1, own[i + 1].1, own[i + 2].1];
-    own[i].1 - (4.0 * (b + c) - a - d) / 6.0
+    let mut near = [own[i - 3].1, own[i - 2].1, own[i - 1].1, own[i + 1].1, own[i + 2].1, own[i + 3].1];
+    near.sort_by(f64::total_cmp);
+    own[i].1 - 0.5 * (near[2] + near[3])
 }
 
 fn residuals(problem: &Problem<'_>, x: &[f64], noise_rad: &[Vec<f64>]) -> Result<Vec<Residuals>> {

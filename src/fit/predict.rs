@@ -155,9 +155,7 @@ fn end_of(
         for link in 0..marks {
             let clock = Camera { gain: 0.0, ..*camera };
             let moved = match parameter {
-                Parameter::TimeBase | Parameter::DroppedFrames => {
-                    clock.slope(*parameter, request.until_s, 0, 0.0, 1.0)
-                }
+                Parameter::TimeBase | Parameter::DroppedFrames => clock.slope(*parameter, request.until_s, 0, 0.0, 1.0),
                 _ => 0.0,
             };
             let acceleration: f64 = (0..n).map(|i| along[(link, i)] * instant.acceleration[i]).sum();

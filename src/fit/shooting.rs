@@ -62,7 +62,8 @@ pub fn multiple_shooting(problem: &mut Problem<'_>) -> Result<Vec<f64>> {
     problem.accuracy = Accuracy { step_error_rad: 1e-6, ..Accuracy::default() };
     for (round, seam) in SEAMS.iter().enumerate() {
         let descent = Descent { huber: 4.0, most_steps: STEPS_EACH, enough: 0.3 };
-        let Some(outcome) = descent.run(x.clone(), &lower, |x| blocks(problem, &stretches, x, *seam, pace_rad_s)) else {
+        let Some(outcome) = descent.run(x.clone(), &lower, |x| blocks(problem, &stretches, x, *seam, pace_rad_s))
+        else {
             break;
         };
         x = outcome.x;

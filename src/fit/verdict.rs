@@ -143,8 +143,7 @@ fn judge(values: &[super::Residual], noise_rad: f64, chance: f64) -> WindowLink 
         mean(&|r| r.rate_rad_s * (r.predicted_rad - middle_model)),
         mean(&|r| (r.predicted_rad - middle_model).powi(2)),
     );
-    let (er, et) =
-        (mean(&|r| r.left_rad() * r.rate_rad_s), mean(&|r| r.left_rad() * (r.predicted_rad - middle_model)));
+    let (er, et) = (mean(&|r| r.left_rad() * r.rate_rad_s), mean(&|r| r.left_rad() * (r.predicted_rad - middle_model)));
     let determinant = (rr * tt - rt * rt).max(1e-300);
     WindowLink {
         amplitude_rad: values.iter().map(|r| (r.measured_rad - middle).abs()).fold(0.0, f64::max),
@@ -159,7 +158,8 @@ fn judge(values: &[super::Residual], noise_rad: f64, chance: f64) -> WindowLink 
 fn chi2_limit(n: f64, chance: f64) -> f64 {
     // the normal quantile's tail expansion, good to 1 % for chances below 10⁻²
     let t = (-2.0 * chance.ln()).sqrt();
-    let z = t - (2.515_517 + t * (0.802_853 + t * 0.010_328)) / (1.0 + t * (1.432_788 + t * (0.189_269 + t * 0.001_308)));
+    let z =
+        t - (2.515_517 + t * (0.802_853 + t * 0.010_328)) / (1.0 + t * (1.432_788 + t * (0.189_269 + t * 0.001_308)));
     n * (1.0 - 2.0 / (9.0 * n) + z * (2.0 / (9.0 * n)).sqrt()).powi(3)
 }
 
@@ -204,9 +204,8 @@ fn peaks(values: &[super::Residual]) -> Vec<Peak> {
         .filter_map(|i| {
             let (t_s, measured_rad) = turn(i, &|r| r.measured_rad)?;
             let near = |p: &&(f64, f64)| (p.0 - t_s).abs() < 0.25 * spacing(&simulated);
-            let (at_s, simulated_rad) = simulated.iter().filter(near).min_by(|a, b| {
-                (a.0 - t_s).abs().total_cmp(&(b.0 - t_s).abs())
-            })?;
+            let (at_s, simulated_rad) =
+                simulated.iter().filter(near).min_by(|a, b| (a.0 - t_s).abs().total_cmp(&(b.0 - t_s).abs()))?;
             Some(Peak { t_s, measured_rad, simulated_rad: *simulated_rad, lag_s: t_s - at_s })
         })
         .collect()

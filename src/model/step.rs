@@ -94,8 +94,7 @@ impl Step {
         for (column, value) in row.iter_mut().enumerate() {
             let stages = slopes.stages.column(column);
             let bent: f64 = at.angle.iter().enumerate().map(|(k, w)| w * stages[k * m + link]).sum();
-            *value +=
-                factor * (slopes.theta[(link, column)] + h * at.tau * slopes.rate[(link, column)] + h * h * bent);
+            *value += factor * (slopes.theta[(link, column)] + h * at.tau * slopes.rate[(link, column)] + h * h * bent);
         }
     }
 
