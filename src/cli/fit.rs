@@ -319,7 +319,7 @@ impl Report<'_> {
         json!({
             "file": record.path,
             "rows": record.len(),
-            "outliers": self.fitted.fit.outliers[index].iter().map(|(link, row)| json!({"angle": link + 1, "t_s": record.t_s[*row]})).collect::<Vec<_>>(),
+            "outliers": self.fitted.fit.outliers[index].iter().map(|o| json!({"angle": o.link + 1, "t_s": record.t_s[o.row]})).collect::<Vec<_>>(),
             "fitted": side(&self.fitted),
             "given": side(&self.given),
         })

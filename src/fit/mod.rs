@@ -48,14 +48,23 @@ pub struct Fit {
     pub starts: Vec<Vec<f64>>,
     /// What each recording shows beyond the model.
     pub residuals: Vec<Residuals>,
-    /// Rows left out as outliers, of each recording: link and row.
-    pub outliers: Vec<Vec<(usize, usize)>>,
+    /// Values left out, of each recording.
+    pub outliers: Vec<Vec<Outlier>>,
     /// Steps of the last descent.
     pub steps: usize,
     /// How it ended.
     pub ending: Ending,
     /// Whether the residuals are correlated in time, so that the intervals are widened.
     pub coloured: bool,
+}
+
+/// A value left out, for it stands apart from its neighbours.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Outlier {
+    /// Which angle.
+    pub link: usize,
+    /// Which row.
+    pub row: usize,
 }
 
 /// The residuals of one recording.
@@ -138,7 +147,7 @@ pub fn fit(records: &[Record], experiment: &Experiment, free: &[Parameter]) -> R
 /// The recordings without values that stand out from their neighbours: whose residual is further from the median of three on each side
 /// than six robust standard deviations of that distance, here and in the recording as a whole. A misfit of the model is smooth in time and
 /// moves neighbours together. Where more than one value in fifty stands out, the noise is not normal, and none is left out.
-fn without_outliers(problem: &Problem<'_>, x: &[f64]) -> Result<(Vec<Record>, Vec<Vec<(usize, usize)>>)> {
+fn without_outliers(problem: &Problem<'_>, x: &[f64]) -> Result<(Vec<Record>, Vec<Vec<Outlier>>)> {
     let mut kept = problem.records.to_vec();
     let mut outliers = vec![Vec::new(); kept.len()];
     for (index, record) in kept.iter_mut().enumerate() {
@@ -151,7 +160,7 @@ fn without_outliers(problem: &Problem<'_>, x: &[f64]) -> Result<(Vec<Record>, Ve
                 .collect();
             for row in standing_out(own) {
                 record.theta_rad[link][row] = None;
-                outliers[index].push((link, row));
+                outliers[index].push(Outlier { link, row });
             }
         }
     }
