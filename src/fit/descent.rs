@@ -93,14 +93,12 @@ impl Descent {
         let mut steps = 0;
         while steps < self.most_steps {
             steps += 1;
-            let held: Vec<bool> = (0..x.len()).map(|i| x[i] <= lower[i] && normals.gradient[i] > 0.0).collect();
-            let Some(step) = damped_step(&normals, &held, damping) else {
+            let Some(taken) = step_within(&normals, &x, lower, damping) else {
                 damping *= 10.0;
                 continue;
             };
-            let mut moved: Vec<f64> = x.iter().zip(step.iter()).map(|(x, s)| x + s).collect();
-            moved.iter_mut().zip(lower).for_each(|(x, low)| *x = x.max(*low));
-            let taken = DVector::from_iterator(x.len(), moved.iter().zip(&x).map(|(new, old)| new - old));
+            let moved: Vec<f64> =
+                x.iter().zip(taken.iter()).zip(lower).map(|((x, s), low)| (x + s).max(*low)).collect();
             let promised = -2.0 * normals.gradient.dot(&taken) - taken.dot(&(&normals.matrix * &taken));
             let mean_square = normals.cost / blocks.iter().map(|b| b.residual.len()).sum::<usize>().max(1) as f64;
             if !(promised > self.enough * mean_square) {
@@ -157,18 +155,37 @@ impl Descent {
     }
 }
 
-/// Solves (N + λ diag N) step = −gradient, variables that are held left out.
-fn damped_step(normals: &Normals, held: &[bool], damping: f64) -> Option<DVector<f64>> {
-    let count = held.len();
+/// The damped step that stays within the bounds: variables that would cross theirs stop there, and the others follow.
+fn step_within(normals: &Normals, x: &[f64], lower: &[f64], damping: f64) -> Option<DVector<f64>> {
+    let held = |i: usize| x[i] <= lower[i] && normals.gradient[i] > 0.0;
+    let mut stopped: Vec<Option<f64>> = (0..x.len()).map(|i| held(i).then_some(0.0)).collect();
+    loop {
+        let step = damped_step(normals, &stopped, damping)?;
+        let crossing: Vec<usize> =
+            (0..x.len()).filter(|i| stopped[*i].is_none() && x[*i] + step[*i] < lower[*i]).collect();
+        if crossing.is_empty() {
+            return Some(step);
+        }
+        crossing.into_iter().for_each(|i| stopped[i] = Some(lower[i] - x[i]));
+    }
+}
+
+/// Solves (N + λ diag N) step = −gradient for the variables whose step is not given.
+fn damped_step(normals: &Normals, given: &[Option<f64>], damping: f64) -> Option<DVector<f64>> {
+    let count = given.len();
     let scale: Vec<f64> = (0..count).map(|i| normals.matrix[(i, i)].max(1e-300).sqrt()).collect();
     let matrix = DMatrix::from_fn(count, count, |i, j| {
-        if held[i] || held[j] {
+        if given[i].is_some() || given[j].is_some() {
             return f64::from(u8::from(i == j));
         }
         let extra = if i == j { damping } else { 0.0 };
         normals.matrix[(i, j)] / (scale[i] * scale[j]) + extra
     });
-    let right = DVector::from_fn(count, |i, _| if held[i] { 0.0 } else { -normals.gradient[i] / scale[i] });
+    let carried = |i: usize| (0..count).map(|j| normals.matrix[(i, j)] * given[j].unwrap_or(0.0)).sum::<f64>();
+    let right = DVector::from_fn(count, |i, _| match given[i] {
+        Some(step) => step * scale[i],
+        None => -(normals.gradient[i] + carried(i)) / scale[i],
+    });
     let solved = matrix.cholesky()?.solve(&right);
     solved.iter().all(|v| v.is_finite()).then(|| DVector::from_fn(count, |i, _| solved[i] / scale[i]))
 }

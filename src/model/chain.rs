@@ -173,7 +173,9 @@ impl Chain {
     /// ```text
     /// ∂aᵢᵢ/∂Iᵢ = 1      ∂aᵢᵢ/∂cᵢ = 2mᵢcᵢ,  ∂aᵢⱼ/∂cᵢ = Lⱼmᵢ for j < i,  ∂hᵢ/∂cᵢ = mᵢ
     /// ```
-    pub fn add_sensitivity(&self, parameter: Parameter, gravity_m_s2: f64, motion: &Motion, q: &mut [f64]) {
+    ///
+    /// `field_m_s2` is what acts on every mass, sideways and down.
+    pub fn add_sensitivity(&self, parameter: Parameter, field_m_s2: [f64; 2], motion: &Motion, q: &mut [f64]) {
         let (i, of_com) = match parameter {
             Parameter::FirstInertia => (0, false),
             Parameter::FirstCom => (0, true),
@@ -187,7 +189,8 @@ impl Chain {
             return;
         }
         let mass_kg = link.mass_kg;
-        q[i] -= gravity_m_s2 * mass_kg * motion.sin[i] + 2.0 * mass_kg * link.com_m * motion.acceleration[i];
+        let pull_m_s2 = field_m_s2[0] * motion.cos[i] - field_m_s2[1] * motion.sin[i];
+        q[i] += mass_kg * (pull_m_s2 - 2.0 * link.com_m * motion.acceleration[i]);
         for j in 0..i {
             let a = self.links[j].length_m * mass_kg;
             let (sin, cos) = (motion.sin_difference(i, j), motion.cos_difference(i, j));

@@ -152,7 +152,10 @@ impl ForwardModel {
     /// ∂Q/∂parameter; `partials` are those of the same instant.
     pub fn sensitivity(&self, parameter: Parameter, motion: &Motion, partials: &Partials, q: &mut [f64]) {
         q.fill(0.0);
-        self.chain.add_sensitivity(parameter, self.gravity_m_s2, motion, q);
+        if self.chain.value(parameter).is_some() {
+            let sideways_m_s2 = self.value(Parameter::SideForce).unwrap_or(0.0) - motion.pivot_m_s2;
+            self.chain.add_sensitivity(parameter, [sideways_m_s2, self.gravity_m_s2], motion, q);
+        }
         self.effects.iter().for_each(|e| e.add_sensitivity(parameter, &self.chain, motion, q));
         if let Some(support) = self.support() {
             let [velocity, acceleration] = support.slopes(parameter, motion.t_s);
