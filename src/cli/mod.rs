@@ -1,6 +1,7 @@
 //! The command line: parse → options → stage → write → exit code. One file a command.
 
 mod bar;
+mod identify;
 mod render;
 mod track;
 
@@ -21,6 +22,7 @@ pub struct Cli {
 #[derive(Debug, Subcommand)]
 enum Command {
     Track(track::TrackArgs),
+    Identify(identify::IdentifyArgs),
     Render(render::RenderArgs),
 }
 
@@ -37,6 +39,7 @@ impl Cli {
     pub fn run() -> ExitCode {
         exit(match Self::parse().command {
             Command::Track(args) => args.run(),
+            Command::Identify(args) => args.run(),
             Command::Render(args) => args.run(),
         })
     }

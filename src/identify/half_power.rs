@@ -10,7 +10,9 @@
 //! ```
 //! A long record (σT ≫ 1) shows the width 2σ of Eq. 28; a short one shows about 0.89/T, whatever the damping. σ is solved from the measured
 //! width by the formula above, so that the record's end does not pass for damping, and the literal Eq. 28 stands beside it. Where less than
-//! half of the width is the motion's own, the method cannot tell damping from the record's end and says so.
+//! half of the width is the motion's own, the method cannot tell damping from the record's end and says so. The line's mirror image at −ω_d reaches
+//! into it with a relative amplitude of σ/2ω = ξ/2 and a phase that nobody knows: an uncertainty of ξ of about ξ, of f about ξ²/2, which
+//! the intervals hold.
 
 use nalgebra::Complex;
 use serde::Serialize;
@@ -69,8 +71,9 @@ impl HalfPower {
         let noise2: f64 = signal.links.iter().zip(noise_rad).map(|(l, s)| 0.5 * s * s * l.t_s.len() as f64).sum();
         let relative = (noise2 / signal.links.len() as f64 / power(peak_hz)).sqrt();
         let stretch = width_hz / own_hz;
-        let damping = Estimate::new(decay / natural_rad_s, decay / natural_rad_s * 2.5 * relative * stretch, 1e6);
-        let frequency_sd_hz = own_hz * 1.5 * relative * stretch;
+        let ratio = decay / natural_rad_s;
+        let damping = Estimate::new(ratio, ratio * (2.5 * relative * stretch).hypot(ratio), 1e6);
+        let frequency_sd_hz = (own_hz * 1.5 * relative * stretch).hypot(0.4 * ratio * ratio * peak_hz);
         Ok(Self {
             width_hz,
             damping_ratio_literal: std::f64::consts::PI * width_hz / natural_rad_s,

@@ -25,6 +25,7 @@ pub mod pencil;
 pub mod signal;
 pub mod sinusoids;
 pub mod spectrum;
+mod table;
 pub mod windows;
 
 use serde::Serialize;

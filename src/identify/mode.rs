@@ -142,7 +142,7 @@ impl Mode {
         let excess = residual_excess(&fit.residuals(whole.signal), fit.poles[mode].omega_rad_s);
         let raw = [fit.frequency_hz(mode), fit.damping_ratio(mode)];
         let estimators = vec![
-            spectral(whole, mode, raw[1].value),
+            spectral(whole, &alone, mode, raw[1].value),
             half_power(whole, &alone, mode),
             decrement(whole, &alone, mode),
             sinusoids(raw, excess, envelope.as_ref().ok()),
@@ -283,16 +283,14 @@ fn choose(sinusoids: &Estimator, envelope: Option<&Envelope>, excess: f64) -> (E
     }
 }
 
-fn spectral(whole: &Whole, mode: usize, xi: f64) -> Estimator {
+fn spectral(whole: &Whole, alone: &Signal, mode: usize, xi: f64) -> Estimator {
     let near_hz = whole.fit.poles[mode].omega_rad_s / std::f64::consts::TAU;
-    let reach_hz = whole.spectrum.window_width_hz.max(0.02 * near_hz);
-    let peak = whole.spectrum.peaks.iter().find(|p| (p.frequency_hz.value - near_hz).abs() < reach_hz);
     let natural = 1.0 / (1.0 - xi * xi).max(0.1).sqrt();
     Estimator {
         method: Method::Spectrum,
-        frequency_hz: peak.map(|p| p.frequency_hz.times(natural)),
+        frequency_hz: Some(Spectrum::line(alone, near_hz, whole.noise_rad).times(natural)),
         damping_ratio: None,
-        note: peak.is_none().then(|| format!("no peak within {reach_hz:.3} Hz")),
+        note: Some(format!("resolution {:.4} Hz", whole.spectrum.resolution_hz)),
     }
 }
 

@@ -88,6 +88,12 @@ impl Spectrum {
         spectrum
     }
 
+    /// The maximum of a signal's windowed sum near a frequency, with the interval that this noise of each link gives it.
+    pub fn line(signal: &Signal, near_hz: f64, noise_rad: &[f64]) -> Estimate {
+        let (frequency_hz, _) = refine(signal, near_hz, 1.0 / signal.duration_s());
+        Estimate::new(frequency_hz, line_sd_hz(signal, frequency_hz, noise_rad), 1e6)
+    }
+
     fn find_peaks(&self, signal: &Signal, power: &[f64]) -> Vec<Peak> {
         let lobe = (0.5 * HANN_LOBE * self.resolution_hz / self.step_hz).round() as usize;
         let first = (1.5 * self.resolution_hz / self.step_hz).ceil() as usize;
@@ -100,10 +106,12 @@ impl Spectrum {
         found.sort_by(|a, b| power[*b].total_cmp(&power[*a]));
         found.truncate(8);
         // the median of a sum of n exponentials is its mean times about 1 − 1/3n
-        let noise_power = floor / (1.0 - 1.0 / (3.0 * signal.links.len() as f64));
+        let links = signal.links.len() as f64;
+        let noise_power = floor / (1.0 - 1.0 / (3.0 * links)) / links;
+        let noise_rad: Vec<f64> = signal.links.iter().map(|link| noise_of_power(link, signal, noise_power)).collect();
         let peak = |k: &usize| {
             let refined = refine(signal, *k as f64 * self.step_hz, self.resolution_hz);
-            let sd_hz = line_sd_hz(signal, refined.0, noise_power);
+            let sd_hz = line_sd_hz(signal, refined.0, &noise_rad);
             Peak {
                 frequency_hz: Estimate::new(refined.0, sd_hz, 1e6),
                 amplitude_rad: refined.1,
@@ -221,18 +229,17 @@ fn refine(signal: &Signal, near_hz: f64, resolution_hz: f64) -> (f64, f64) {
 /// δω = s √(½ Σ w²(t−t̄)²) / (|X| V),   t̄ = Re(X₁/X),  V = Re(X₂/X) − t̄²,   Xₖ = Σ w tᵏ θ e^{−iωt}
 /// ```
 /// V is the spread in time of the windowed oscillation, so that damping is allowed for. With a flat window and no damping it is the Cramér–Rao
-/// bound √24 s/(A√N T). A noise of variance s² has the mean power 4 s² Σw²/(Σw)² on the spectrum's scale.
-fn line_sd_hz(signal: &Signal, f_hz: f64, noise_power: f64) -> f64 {
+/// bound √24 s/(A√N T).
+fn line_sd_hz(signal: &Signal, f_hz: f64, noise_rad: &[f64]) -> f64 {
     let (mut variance, mut curvature) = (0.0, 0.0);
-    for link in &signal.links {
+    for (link, noise_rad) in signal.links.iter().zip(noise_rad) {
         let mean = weighted_mean(link, signal);
         let mut moments = [Complex::new(0.0, 0.0); 3];
-        let (mut w1, mut w2) = (0.0, [0.0; 3]);
+        let mut w2 = [0.0; 3];
         for (t, a) in link.t_s.iter().zip(&link.theta_rad) {
             let (w, tau) = (hann(signal, *t), t - signal.span_s[0]);
             let x = Complex::from_polar(w * (a - mean), -std::f64::consts::TAU * f_hz * tau);
             let powers = [1.0, tau, tau * tau];
-            w1 += w;
             for k in 0..3 {
                 moments[k] += x * powers[k];
                 w2[k] += w * w * powers[k];
@@ -240,11 +247,21 @@ fn line_sd_hz(signal: &Signal, f_hz: f64, noise_power: f64) -> f64 {
         }
         let centre = (moments[1] / moments[0]).re;
         let spread = (moments[2] / moments[0]).re - centre * centre;
-        let noise2 = noise_power / signal.links.len() as f64 * w1 * w1 / (4.0 * w2[0]);
-        variance += moments[0].norm_sqr() * 0.5 * noise2 * (w2[2] - 2.0 * centre * w2[1] + centre * centre * w2[0]);
+        variance += moments[0].norm_sqr()
+            * 0.5
+            * noise_rad
+            * noise_rad
+            * (w2[2] - 2.0 * centre * w2[1] + centre * centre * w2[0]);
         curvature += moments[0].norm_sqr() * spread;
     }
     variance.max(0.0).sqrt() / curvature.max(f64::MIN_POSITIVE) / std::f64::consts::TAU
+}
+
+/// s of white noise whose mean power on the spectrum's scale is 4 s² Σw²/(Σw)².
+fn noise_of_power(link: &LinkSamples, signal: &Signal, power: f64) -> f64 {
+    let weights = link.t_s.iter().map(|t| hann(signal, *t));
+    let (sum, squares) = weights.fold((0.0, 0.0), |(s, q), w| (s + w, q + w * w));
+    (power * sum * sum / (4.0 * squares.max(f64::MIN_POSITIVE))).sqrt()
 }
 
 fn median(values: &[f64]) -> f64 {
