@@ -3,8 +3,11 @@
 use std::f64::consts::TAU;
 use std::path::{Path, PathBuf};
 
+use freeswing::experiment::{Effects, Experiment};
 use freeswing::identify::{Damping, Estimate, Identification, Method, Mode, identify};
+use freeswing::model::chain::Chain;
 use freeswing::series::AngleSeries;
+use freeswing::synth::Swing;
 use rand::rngs::Xoshiro256PlusPlus;
 use rand::{RngExt, SeedableRng};
 use rand_distr::{Distribution, StandardNormal};
@@ -167,4 +170,125 @@ fn four_hundred_synthetic_decays_are_identified_with_true_intervals() {
     for score in [f, xi] {
         assert!((0.93..=0.97).contains(&score.coverage()), "{}", score.coverage());
     }
+}
+
+/// A recording of `../shared/data`; a line tells when it is not there.
+fn real(file: &str) -> Option<AngleSeries> {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../shared/data").join(file);
+    if !path.exists() {
+        println!("skipped: {} is not there", path.display());
+        return None;
+    }
+    Some(AngleSeries::read(&path).unwrap())
+}
+
+#[test]
+fn the_tail_of_a_real_double_pendulum_has_its_published_frequencies() {
+    let Some(series) = real("multiarm_double.csv") else { return };
+    let tail = series.slice(series.rows(35.0, f64::INFINITY));
+    let rig = "[rig]\ngravity_m_s2 = 9.809\n\
+        [[specimen.links]]\nlength_m = 0.1727\nmass_kg = 0.0938\ncom_m = 0.1086\ninertia_kg_m2 = 4.375e-4\n\
+        [[specimen.links]]\nlength_m = 0.2667\nmass_kg = 0.1376\ncom_m = 0.1168\ninertia_kg_m2 = 1.269e-3\n";
+    let experiment = Experiment::parse(rig, Path::new("rig.toml")).unwrap();
+    let found = identify(&tail, Some(&experiment)).unwrap();
+    println!("{found}");
+    let [slow, fast] = &found.modes[..] else { panic!("{} modes", found.modes.len()) };
+    let envelope = slow.envelope.as_ref().unwrap();
+    let late: Vec<f64> = envelope.steps.iter().map(|s| s.frequency_hz.value).collect();
+    let middle = late[late.len() / 2];
+    assert!((0.903..0.905).contains(&middle), "{late:?}");
+    // the published parameters, linearised: 0.909 and 2.013 Hz
+    assert!((slow.frequency_hz.value - 0.909).abs() < 0.002 && (fast.frequency_hz.value - 2.013).abs() < 0.02);
+    assert!(!found.floor.unwrap().below);
+    assert!(found.notes.iter().any(|n| n.contains("damping depends on amplitude")), "{:?}", found.notes);
+}
+
+#[test]
+fn real_single_pendulums_lose_frequency_with_amplitude_as_theory_says() {
+    for (file, f0_hz, kappa) in [("multiarm_single.csv", 1.274, 0.0625), ("video_pendulum.csv", 0.6126, 0.070)] {
+        let Some(series) = real(file) else { continue };
+        let found = identify(&series, None).unwrap();
+        let [mode] = &found.modes[..] else { panic!("{file}: {} modes", found.modes.len()) };
+        let law = mode.envelope.as_ref().unwrap().frequency.unwrap();
+        assert!((law.f0_hz.value - f0_hz).abs() < 0.001, "{file}: {law:?}");
+        assert!((law.kappa_per_rad2.value - kappa).abs() < 0.001, "{file}: {law:?}");
+        assert!(!mode.frequency_consistency.unwrap().agree && !mode.damping_consistency.unwrap().agree, "{file}");
+    }
+}
+
+/// The simulated swing of `videos/kapton.toml`, with noise.
+#[test]
+fn a_simulated_strip_gives_back_its_frequencies_and_its_friction() {
+    let text = include_str!("../videos/kapton.toml");
+    let mut experiment = Experiment::parse(text, Path::new("kapton.toml")).unwrap();
+    experiment.model.effects = Effects { hinge_coulomb: Some(2.0e-7), ..Effects::default() };
+    experiment.render.duration_s = 40.0;
+    let swing = Swing::of(&experiment).unwrap();
+    let mut rng = Xoshiro256PlusPlus::seed_from_u64(7);
+    let t_s: Vec<f64> = (0..1200).map(|k| f64::from(k) / 30.0).collect();
+    let mut theta_rad = vec![Vec::new(); 2];
+    for t in &t_s {
+        for (link, angle) in swing.angles_rad(*t).into_iter().enumerate() {
+            let noise: f64 = StandardNormal.sample(&mut rng);
+            theta_rad[link].push(Some(angle + 2e-4 * noise));
+        }
+    }
+    let sd_rad = theta_rad.iter().map(|l| vec![None; l.len()]).collect();
+    let series = AngleSeries { path: PathBuf::from("simulated"), t_s, theta_rad, sd_rad };
+    let found = identify(&series, Some(&experiment)).unwrap();
+    println!("{found}");
+    let natural = natural_hz(&experiment);
+    for (mode, truth) in found.modes.iter().zip(natural) {
+        assert!((mode.frequency_hz.value / truth - 1.0).abs() < 5e-4, "{} against {truth}", mode.frequency_hz.value);
+    }
+    let decay = found.modes[0].envelope.as_ref().unwrap().decay.unwrap();
+    // b₀ = 2c₀/πIω of the straight strip (physics.md)
+    let expected = 2.0 * 2.0e-7 / (std::f64::consts::PI * 4.808e-6 * TAU * natural[0]);
+    assert!((decay.b0_rad_per_s.value / expected - 1.0).abs() < 0.15, "{decay:?} against {expected}");
+    assert!(decay.p_viscous < 1e-6);
+}
+
+/// Roots of det(G + K − ω²a) = 0 for two links.
+fn natural_hz(experiment: &Experiment) -> [f64; 2] {
+    let chain = Chain::of(&experiment.specimen).unwrap();
+    let (a, g, k) = (chain.inertia_kg_m2(), experiment.rig.gravity_m_s2, experiment.model.k_eq_n_m_per_rad);
+    let [k11, k22] = [0, 1].map(|i| g * chain.static_moment_kg_m(i) + k);
+    let (p, q) = (a[(0, 0)] * a[(1, 1)] - a[(0, 1)].powi(2), a[(0, 0)] * k22 + a[(1, 1)] * k11 + 2.0 * a[(0, 1)] * k);
+    let r = k11 * k22 - k * k;
+    let root = (q * q - 4.0 * p * r).sqrt();
+    [(q - root) / (2.0 * p), (q + root) / (2.0 * p)].map(|square: f64| square.sqrt() / TAU)
+}
+
+#[test]
+fn noise_alone_is_no_oscillation() {
+    let mut identified = 0;
+    for seed in 0..40 {
+        let case = Case::of(Vec::new(), 0.01, 25.0, &mut Xoshiro256PlusPlus::seed_from_u64(seed));
+        let found = identify(&case.series, None).unwrap();
+        identified += usize::from(!found.modes.is_empty());
+        assert!(!found.modes.is_empty() || found.notes.iter().any(|n| n.contains("no oscillation is identifiable")));
+    }
+    assert!(identified <= 1, "{identified} of 40");
+}
+
+#[test]
+fn one_mode_is_not_taken_for_two() {
+    let mode = Truth { frequency_hz: 1.3, damping_ratio: 0.004, amplitude_rad: [0.2, 0.25], phase_rad: 0.3 };
+    let mut two = 0;
+    for seed in 0..40 {
+        let case = Case::of(vec![mode], 0.003, 25.0, &mut Xoshiro256PlusPlus::seed_from_u64(seed));
+        two += usize::from(identify(&case.series, None).unwrap().modes.len() == 2);
+    }
+    assert_eq!(two, 0);
+}
+
+#[test]
+fn damping_lost_in_noise_is_not_identifiable_and_a_short_record_resolves_no_half_power() {
+    let mode = Truth { frequency_hz: 1.0, damping_ratio: 1e-5, amplitude_rad: [0.02, 0.02], phase_rad: 0.3 };
+    let case = Case::of(vec![mode], 0.004, 20.0, &mut Xoshiro256PlusPlus::seed_from_u64(3));
+    let found = identify(&case.series, None).unwrap();
+    let Damping::NotIdentifiable { estimate, reason } = &found.modes[0].damping else { panic!("{found}") };
+    assert!(estimate.holds(1e-5) && reason.contains("ξ ≤"), "{reason}");
+    let half = found.modes[0].estimators.iter().find(|e| e.method == Method::HalfPower).unwrap();
+    assert!(half.damping_ratio.is_none() && half.note.as_ref().unwrap().starts_with("not resolved"), "{half:?}");
 }

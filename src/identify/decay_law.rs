@@ -98,7 +98,8 @@ impl DecayFit {
             values[*parameter] = solved.scaled[k] * scale[*parameter];
             sd[*parameter] = (covariance[(k, k)] * widening.variance).sqrt() * scale[*parameter];
         }
-        chi2.is_finite().then_some(Self { values, sd, chi2, p_value, degrees_of_freedom: widening.degrees_of_freedom })
+        let sound = chi2.is_finite() && sd.iter().all(|s| s.is_finite());
+        sound.then_some(Self { values, sd, chi2, p_value, degrees_of_freedom: widening.degrees_of_freedom })
     }
 }
 

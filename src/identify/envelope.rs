@@ -103,6 +103,15 @@ impl Envelope {
     }
 }
 
+impl Envelope {
+    /// ξ as if viscous; where the decay is not exponential, stretched to what the steps show that tell it to a tenth.
+    pub fn damping_range(&self) -> Estimate {
+        let certain = |s: &&Step| self.p_exponential < 0.01 && s.damping_ratio.sd < 0.1 * s.damping_ratio.value;
+        let steps = self.steps.iter().filter(certain).map(|s| s.damping_ratio.value);
+        steps.fold(self.damping_ratio, |range, xi| range.covering(xi, xi))
+    }
+}
+
 /// Phases without jumps. Neighbours are joined by the frequency found within their windows; where the mode has become weak, by that of the step
 /// before, which is sharper.
 fn unwrapped(moments: &[Moment]) -> Vec<f64> {

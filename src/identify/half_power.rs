@@ -47,7 +47,8 @@ impl HalfPower {
     pub fn of(signal: &Signal, near: Pole, noise_rad: &[f64]) -> Result<Self, String> {
         let duration_s = signal.duration_s();
         let resolution_hz = 1.0 / duration_s;
-        let power = |f_hz: f64| line_power(signal, f_hz);
+        let cells: Vec<Vec<f64>> = signal.links.iter().map(|l| l.cells(signal.step_s)).collect();
+        let power = |f_hz: f64| line_power(signal, &cells, f_hz);
         let near_hz = near.omega_rad_s / std::f64::consts::TAU;
         let reach_hz = resolution_hz.max(2.0 * near.decay_per_s.abs() / std::f64::consts::TAU);
         let peak_hz = maximum(&power, near_hz - reach_hz, near_hz + reach_hz);
@@ -84,16 +85,12 @@ impl HalfPower {
 }
 
 /// |X(f)|² over the true time stamps, each sample standing for the time around it, summed over the links.
-fn line_power(signal: &Signal, f_hz: f64) -> f64 {
+fn line_power(signal: &Signal, cells: &[Vec<f64>], f_hz: f64) -> f64 {
     let omega = std::f64::consts::TAU * f_hz;
-    let each = signal.links.iter().map(|link| {
-        let x: Complex<f64> = link
-            .t_s
-            .iter()
-            .zip(&link.theta_rad)
-            .map(|(t, a)| Complex::from_polar(*a, -omega * (t - signal.span_s[0])))
-            .sum();
-        x.norm_sqr()
+    let each = signal.links.iter().zip(cells).map(|(link, cells)| {
+        let samples = link.t_s.iter().zip(&link.theta_rad).zip(cells);
+        let turned = samples.map(|((t, a), cell)| Complex::from_polar(a * cell, -omega * (t - signal.span_s[0])));
+        turned.sum::<Complex<f64>>().norm_sqr()
     });
     each.sum()
 }

@@ -6,7 +6,7 @@ use serde::Serialize;
 use super::consistency::Consistency;
 use super::decrement::Decrement;
 use super::envelope::Envelope;
-use super::estimate::{Estimate, chi_squared_tail};
+use super::estimate::{Estimate, chi_squared_tail, probability};
 use super::floor::amplitude_dependence;
 use super::half_power::HalfPower;
 use super::signal::Signal;
@@ -137,13 +137,21 @@ pub(super) struct Whole<'a> {
 impl Mode {
     pub(super) fn of(whole: &Whole, mode: usize, chain: Option<&Chain>, gravity_m_s2: f64) -> Self {
         let fit = whole.fit;
-        let alone = fit.isolate(whole.signal, mode);
         let envelope = whole.windows.as_ref().map_err(Clone::clone).and_then(|w| Envelope::of(w, mode));
-        let excess = residual_excess(&fit.residuals(whole.signal), fit.poles[mode].omega_rad_s);
+        let excesses: Vec<f64> =
+            fit.poles.iter().map(|p| residual_excess(&fit.residuals(whole.signal), p.omega_rad_s)).collect();
+        let misfits = excesses.iter().any(|e| *e > 1.0);
+        // where the whole record is no sum of damped sinusoids, the other modes are taken away window by window
+        let alone = match whole.windows {
+            Ok(windows) if misfits => windows.isolate(whole.signal, fit, mode),
+            _ => fit.isolate(whole.signal, mode),
+        };
+        let excess = excesses[mode];
+        let filled = alone.bridged();
         let raw = [fit.frequency_hz(mode), fit.damping_ratio(mode)];
         let estimators = vec![
-            spectral(whole, &alone, mode, raw[1].value),
-            half_power(whole, &alone, mode),
+            spectral(whole, &filled, mode, raw[1].value),
+            half_power(whole, &filled, mode),
             decrement(whole, &alone, mode),
             sinusoids(raw, excess, envelope.as_ref().ok()),
             windowed(&envelope),
@@ -212,8 +220,10 @@ impl Mode {
                 notes.push(format!("{name}: the frequency falls with amplitude as a pendulum's does (κ = {:.4}, expected {expected:.4}): no missing stiffness", k.value));
             } else if !k.holds(expected) {
                 notes.push(format!(
-                    "{name}: f = f₀(1 − κA²) has κ = {:.4} ± {:.4} /rad², a pendulum of this shape {expected:.4}: a nonlinear stiffness, or another mode, is at work",
-                    k.value, k.sd
+                    "{name}: f = f₀(1 − κA²) has κ = {:.4} ± {:.4} /rad², a pendulum of this shape {expected:.4}: a nonlinear stiffness is at work, or all angles are {:.3} of what is stated",
+                    k.value,
+                    k.sd,
+                    (k.value / expected).max(0.0).sqrt()
                 ));
             }
         }
@@ -224,7 +234,7 @@ impl Mode {
                 "amplitude does not explain it; look for dropped frames, a neighbouring mode or forcing"
             };
             notes.push(format!(
-                "{name}: the frequencies disagree (χ² = {:.0} of {}, p = {:.1e}): {meaning}",
+                "{name}: the frequencies disagree (χ² = {:.0} of {}, p = {}): {meaning}",
                 test.chi2,
                 test.estimators - 1,
                 test.p_value
@@ -239,7 +249,7 @@ impl Mode {
                 "the decay is no exponential; look at the envelope before using one ξ"
             };
             notes.push(format!(
-                "{name}: the damping ratios disagree (χ² = {:.0} of {}, p = {:.1e}): {meaning}",
+                "{name}: the damping ratios disagree (χ² = {:.0} of {}, p = {}): {meaning}",
                 test.chi2,
                 test.estimators - 1,
                 test.p_value
@@ -267,7 +277,7 @@ fn choose(sinusoids: &Estimator, envelope: Option<&Envelope>, excess: f64) -> (E
             .is_some_and(|l| !l.kappa_per_rad2.holds(0.0) && l.kappa_per_rad2.value.abs() > 3.0 * l.kappa_per_rad2.sd);
     match (varies, envelope) {
         (true, Some(envelope)) => {
-            let xi = envelope.damping_ratio;
+            let xi = envelope.damping_range();
             match law {
                 Some(law) => (
                     law.f0_hz,
@@ -286,11 +296,15 @@ fn choose(sinusoids: &Estimator, envelope: Option<&Envelope>, excess: f64) -> (E
 fn spectral(whole: &Whole, alone: &Signal, mode: usize, xi: f64) -> Estimator {
     let near_hz = whole.fit.poles[mode].omega_rad_s / std::f64::consts::TAU;
     let natural = 1.0 / (1.0 - xi * xi).max(0.1).sqrt();
+    let line = Spectrum::line(alone, near_hz, whole.noise_rad);
     Estimator {
         method: Method::Spectrum,
-        frequency_hz: Some(Spectrum::line(alone, near_hz, whole.noise_rad).times(natural)),
+        frequency_hz: line.map(|f| f.times(natural)),
         damping_ratio: None,
-        note: Some(format!("resolution {:.4} Hz", whole.spectrum.resolution_hz)),
+        note: Some(match line {
+            Some(_) => format!("resolution {:.4} Hz", whole.spectrum.resolution_hz),
+            None => format!("no single peak within {:.4} Hz", whole.spectrum.resolution_hz),
+        }),
     }
 }
 

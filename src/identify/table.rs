@@ -2,7 +2,7 @@
 
 use std::fmt::{self, Display, Formatter};
 
-use super::estimate::Estimate;
+use super::estimate::{Estimate, probability};
 use super::mode::{Damping, Method, Mode};
 use super::{Identification, Record};
 
@@ -111,11 +111,11 @@ impl Display for Mode {
             if let Some(t) = test {
                 writeln!(
                     f,
-                    "  {what} {} (χ² = {:.1} of {}, p = {:.2e})",
+                    "  {what} {} (χ² = {:.1} of {}, p = {})",
                     verdict(t.agree),
                     t.chi2,
                     t.estimators - 1,
-                    t.p_value
+                    probability(t.p_value)
                 )?;
             }
         }
@@ -153,11 +153,11 @@ impl Mode {
         if let Some(law) = envelope.decay {
             writeln!(
                 f,
-                "  dA/dt = −(b₀ + b₁A + b₂A²): b₀ = {} rad/s, b₁ = {} /s, b₂ = {} /(rad s); viscous alone p = {:.1e} (a picture, no verdict)",
+                "  dA/dt = −(b₀ + b₁A + b₂A²): b₀ = {} rad/s, b₁ = {} /s, b₂ = {} /(rad s); viscous alone p = {} (a picture, no verdict)",
                 scientific(&law.b0_rad_per_s),
                 scientific(&law.b1_per_s),
                 scientific(&law.b2_per_rad_s),
-                law.p_viscous
+                probability(law.p_viscous)
             )?;
         }
         Ok(())

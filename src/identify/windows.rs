@@ -4,7 +4,7 @@
 
 use nalgebra::Complex;
 
-use super::signal::Signal;
+use super::signal::{LinkSamples, Signal};
 use super::sinusoids::{Pole, SinusoidFit};
 
 /// Cycles of the slowest mode in a window.
@@ -45,6 +45,8 @@ pub struct Windows {
     pub shapes: Vec<Vec<Complex<f64>>>,
     /// Standard deviation of the real and imaginary part of each.
     pub shape_sd: Vec<Vec<f64>>,
+    /// In the order of time; a window without a sound fit is left out.
+    fits: Vec<SinusoidFit>,
 }
 
 impl Windows {
@@ -78,7 +80,14 @@ impl Windows {
         }
         let noise_rad: Vec<f64> = (0..signal.links.len()).map(|link| pooled_noise(&fits, link)).collect();
         let modes = fit.poles.len();
-        let mut windows = Self { window_s, moments: Vec::new(), noise_rad, shapes: Vec::new(), shape_sd: Vec::new() };
+        let mut windows = Self {
+            window_s,
+            moments: Vec::new(),
+            noise_rad,
+            shapes: Vec::new(),
+            shape_sd: Vec::new(),
+            fits: Vec::new(),
+        };
         for mode in 0..modes {
             let local: Vec<&SinusoidFit> = fits.iter().filter(|f| f.poles.len() > mode).collect();
             let (shape, sd) = shape(&local, fit, mode);
@@ -86,7 +95,32 @@ impl Windows {
             windows.shapes.push(shape);
             windows.shape_sd.push(sd);
         }
+        windows.fits = fits;
         Ok(windows)
+    }
+
+    /// The signal with the offset and every mode but one taken away as each window shows them; samples outside every window are left out.
+    #[must_use]
+    pub fn isolate(&self, signal: &Signal, whole: &SinusoidFit, mode: usize) -> Signal {
+        let empty = LinkSamples { t_s: Vec::new(), theta_rad: Vec::new() };
+        let links = vec![empty; signal.links.len()];
+        let mut alone = Signal { links, span_s: signal.span_s, step_s: signal.step_s };
+        for fit in self.fits.iter().filter(|f| f.poles.len() > mode) {
+            let from_s = fit.origin_s - 0.5 * self.window_s;
+            let last = fit.origin_s + self.window_s > signal.span_s[1];
+            let until_s = from_s + self.window_s + if last { signal.step_s } else { 0.0 };
+            // the offset of a short window is none of its own: the whole record's serves better
+            let mut local = fit.clone();
+            for (link, whole) in local.links.iter_mut().zip(&whole.links) {
+                link.offset_rad = whole.offset_rad;
+            }
+            let part = local.isolate(&signal.between(from_s, until_s), mode);
+            for (link, part) in alone.links.iter_mut().zip(part.links) {
+                link.t_s.extend(part.t_s);
+                link.theta_rad.extend(part.theta_rad);
+            }
+        }
+        alone
     }
 }
 
