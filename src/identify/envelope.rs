@@ -18,7 +18,7 @@ use nalgebra::{DMatrix, DVector};
 use serde::Serialize;
 
 use super::decay_law::{DecayFit, DecayLaw, Widening};
-use super::estimate::{Estimate, chi_squared_tail};
+use super::estimate::{Estimate, chi_squared_tail, f_tail};
 use super::windows::{Moment, Windows};
 
 /// From here on the frequency within a window is trusted to join it to the next.
@@ -44,6 +44,8 @@ pub struct FrequencyLaw {
     pub f0_hz: Estimate,
     /// κ (1/rad²).
     pub kappa_per_rad2: Estimate,
+    /// Probability that noise alone makes so much dependence on this and the other mode's amplitude; small: the frequency is not constant.
+    pub p_constant: f64,
     /// Probability that the phases scatter so far about the law by noise.
     pub p_value: f64,
 }
@@ -149,14 +151,14 @@ fn steps(moments: &[Moment], phases: &[f64]) -> Vec<Step> {
     (0..moments.len() - 1).map(pair).collect()
 }
 
-/// φ(t) = φ₀ + Ω (t − κ∫A² − κ'∫A'²), weighted linear least squares.
+/// φ(t) = φ₀ + Ω (t − κ∫A² − κ'∫A'²), weighted linear least squares; `None` when there are too few windows for all that is felt.
 fn frequency_law(moments: &[Moment], phases: &[f64], others: &[&[Moment]], xi: f64) -> Option<FrequencyLaw> {
     let own = squares(moments, moments);
     let mut columns = vec![own];
     for other in others {
         let column = squares(moments, other);
         let felt = column.last().copied().unwrap_or(0.0) > 0.01 * columns[0].last().copied().unwrap_or(0.0);
-        if felt && moments.len() >= columns.len() + 6 {
+        if felt {
             columns.push(column);
         }
     }
@@ -178,12 +180,16 @@ fn frequency_law(moments: &[Moment], phases: &[f64], others: &[&[Moment]], xi: f
     let covariance = basis.tr_mul(&basis).try_inverse()? * scale.variance;
     let omega = fit[1];
     let natural = std::f64::consts::TAU * (1.0 - xi * xi).max(1e-9).sqrt();
+    let dependence = fit.rows(2, columns.len());
+    let information = covariance.view((2, 2), (columns.len(), columns.len())).into_owned().try_inverse()?;
+    let wald = dependence.dot(&(information * dependence)) / columns.len() as f64;
     let kappa = fit[2] / omega;
     let kappa_variance =
         (covariance[(2, 2)] - 2.0 * kappa * covariance[(1, 2)] + kappa * kappa * covariance[(1, 1)]) / (omega * omega);
     Some(FrequencyLaw {
         f0_hz: Estimate::new(omega / natural, covariance[(1, 1)].sqrt() / natural, scale.degrees_of_freedom),
         kappa_per_rad2: Estimate::new(kappa, kappa_variance.max(0.0).sqrt(), scale.degrees_of_freedom),
+        p_constant: f_tail(wald, columns.len() as f64, scale.degrees_of_freedom),
         p_value,
     })
 }

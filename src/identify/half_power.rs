@@ -20,6 +20,7 @@ use serde::Serialize;
 use super::estimate::Estimate;
 use super::signal::Signal;
 use super::sinusoids::Pole;
+use super::spectrum::{Window, line_sd_hz};
 
 /// Width at half power, in 1/T, of a steady oscillation cut off by the record.
 const CUT_OFF_WIDTH: f64 = 0.8859;
@@ -74,7 +75,8 @@ impl HalfPower {
         let stretch = width_hz / own_hz;
         let ratio = decay / natural_rad_s;
         let damping = Estimate::new(ratio, ratio * (2.5 * relative * stretch).hypot(ratio), 1e6);
-        let frequency_sd_hz = (own_hz * 1.5 * relative * stretch).hypot(0.4 * ratio * ratio * peak_hz);
+        let frequency_sd_hz =
+            line_sd_hz(signal, Window::Flat, peak_hz, noise_rad).unwrap_or(own_hz).hypot(0.4 * ratio * ratio * peak_hz);
         Ok(Self {
             width_hz,
             damping_ratio_literal: std::f64::consts::PI * width_hz / natural_rad_s,

@@ -207,7 +207,7 @@ impl Mode {
         let name = format!("mode {}", mode + 1);
         let mut notes = Vec::new();
         let law = self.envelope.as_ref().and_then(|e| e.frequency);
-        let bends = law.is_some_and(|l| !l.kappa_per_rad2.holds(0.0));
+        let bends = law.is_some_and(|l| l.p_constant < 0.01);
         if let (Some(law), Some(expected)) = (law, self.expected_kappa_per_rad2) {
             let k = law.kappa_per_rad2;
             let amplitude_rad = self.shape.iter().map(|l| l.amplitude_rad).fold(0.0, f64::max);
@@ -237,7 +237,7 @@ impl Mode {
                 "{name}: the frequencies disagree (χ² = {:.0} of {}, p = {}): {meaning}",
                 test.chi2,
                 test.estimators - 1,
-                test.p_value
+                probability(test.p_value)
             ));
         }
         let decay = self.envelope.as_ref().and_then(|e| e.decay);
@@ -252,7 +252,7 @@ impl Mode {
                 "{name}: the damping ratios disagree (χ² = {:.0} of {}, p = {}): {meaning}",
                 test.chi2,
                 test.estimators - 1,
-                test.p_value
+                probability(test.p_value)
             ));
         } else if varies {
             notes.push(format!(
@@ -272,9 +272,7 @@ fn choose(sinusoids: &Estimator, envelope: Option<&Envelope>, excess: f64) -> (E
     let nowhere = Estimate::new(f64::NAN, f64::NAN, 1.0);
     let (f, xi) = (sinusoids.frequency_hz.unwrap_or(nowhere), sinusoids.damping_ratio.unwrap_or(nowhere));
     let law = envelope.and_then(|e| e.frequency);
-    let varies = excess > 1.0
-        || law
-            .is_some_and(|l| !l.kappa_per_rad2.holds(0.0) && l.kappa_per_rad2.value.abs() > 3.0 * l.kappa_per_rad2.sd);
+    let varies = excess > 1.0 || law.is_some_and(|l| l.p_constant < 0.01);
     match (varies, envelope) {
         (true, Some(envelope)) => {
             let xi = envelope.damping_range();

@@ -21,6 +21,13 @@ const HANN_LOBE: f64 = 4.0;
 /// Width of the Hann window's main lobe at half power, in 1/T.
 const HANN_HALF_POWER: f64 = 1.44;
 
+/// How samples are weighted over the record; an offset is taken away only with the Hann window.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Window {
+    Hann,
+    Flat,
+}
+
 /// A peak of the spectrum.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Peak {
@@ -92,7 +99,7 @@ impl Spectrum {
         let resolution_hz = 1.0 / signal.duration_s();
         let (frequency_hz, _) = refine(signal, near_hz, resolution_hz);
         let inside = (frequency_hz - near_hz).abs() < 0.49 * resolution_hz;
-        let sd_hz = line_sd_hz(signal, frequency_hz, noise_rad).filter(|_| inside)?;
+        let sd_hz = line_sd_hz(signal, Window::Hann, frequency_hz, noise_rad).filter(|_| inside)?;
         Some(Estimate::new(frequency_hz, sd_hz, 1e6))
     }
 
@@ -114,7 +121,7 @@ impl Spectrum {
         let peak = |k: &usize| {
             let refined = refine(signal, *k as f64 * self.step_hz, self.resolution_hz);
             // what is not a line is known to half the resolution
-            let sd_hz = line_sd_hz(signal, refined.0, &noise_rad).unwrap_or(0.25 * self.resolution_hz);
+            let sd_hz = line_sd_hz(signal, Window::Hann, refined.0, &noise_rad).unwrap_or(0.25 * self.resolution_hz);
             Peak {
                 frequency_hz: Estimate::new(refined.0, sd_hz, 1e6),
                 amplitude_rad: refined.1,
@@ -213,28 +220,27 @@ fn refine(signal: &Signal, near_hz: f64, resolution_hz: f64) -> (f64, f64) {
 /// ```
 /// V is the spread in time of the windowed oscillation, so that damping is allowed for. With a flat window and no damping it is the Cramér–Rao
 /// bound √24 s/(A√N T). `None` where the curvature has the wrong sign: no single line.
-fn line_sd_hz(signal: &Signal, f_hz: f64, noise_rad: &[f64]) -> Option<f64> {
+pub(super) fn line_sd_hz(signal: &Signal, window: Window, f_hz: f64, noise_rad: &[f64]) -> Option<f64> {
     let (mut variance, mut curvature) = (0.0, 0.0);
     for (link, noise_rad) in signal.links.iter().zip(noise_rad) {
-        let mean = weighted_mean(link, signal);
+        let (weights, mean) = match window {
+            Window::Hann => (weights(link, signal), weighted_mean(link, signal)),
+            Window::Flat => (link.cells(signal.step_s), 0.0),
+        };
         let mut moments = [Complex::new(0.0, 0.0); 3];
-        let mut w2 = [0.0; 3];
-        for ((t, a), w) in link.t_s.iter().zip(&link.theta_rad).zip(weights(link, signal)) {
+        let mut squares = [0.0; 3];
+        for ((t, a), w) in link.t_s.iter().zip(&link.theta_rad).zip(weights) {
             let tau = t - signal.span_s[0];
             let x = Complex::from_polar(w * (a - mean), -std::f64::consts::TAU * f_hz * tau);
-            let powers = [1.0, tau, tau * tau];
-            for k in 0..3 {
-                moments[k] += x * powers[k];
-                w2[k] += w * w * powers[k];
+            for (k, power) in [1.0, tau, tau * tau].into_iter().enumerate() {
+                moments[k] += x * power;
+                squares[k] += w * w * power;
             }
         }
         let centre = (moments[1] / moments[0]).re;
         let spread = (moments[2] / moments[0]).re - centre * centre;
-        variance += moments[0].norm_sqr()
-            * 0.5
-            * noise_rad
-            * noise_rad
-            * (w2[2] - 2.0 * centre * w2[1] + centre * centre * w2[0]);
+        let lever = squares[2] - 2.0 * centre * squares[1] + centre * centre * squares[0];
+        variance += moments[0].norm_sqr() * 0.5 * noise_rad * noise_rad * lever;
         curvature += moments[0].norm_sqr() * spread;
     }
     (curvature > 0.0).then(|| variance.max(0.0).sqrt() / curvature / std::f64::consts::TAU)
