@@ -65,12 +65,12 @@ pub fn f_tail(value: f64, numerator: f64, denominator: f64) -> f64 {
     FisherSnedecor::new(numerator, denominator).map_or(1.0, |d| d.sf(value.max(0.0)))
 }
 
-/// A probability as a person reads it.
+/// A probability as a person reads it: `p = 0.03`, `p < 1e-12`.
 pub fn probability(p: f64) -> String {
     match p {
-        p if p < 1e-12 => "< 1e-12".to_owned(),
-        p if p < 1e-2 => format!("{p:.0e}"),
-        p => format!("{p:.2}"),
+        p if p < 1e-12 => "p < 1e-12".to_owned(),
+        p if p < 1e-2 => format!("p = {p:.0e}"),
+        p => format!("p = {p:.2}"),
     }
 }
 

@@ -73,13 +73,14 @@ impl HalfPower {
         let noise2: f64 = signal.links.iter().zip(noise_rad).map(|(l, s)| 0.5 * s * s * l.t_s.len() as f64).sum();
         let relative = (noise2 / signal.links.len() as f64 / power(peak_hz)).sqrt();
         let stretch = width_hz / own_hz;
-        let ratio = decay / natural_rad_s;
+        let (ratio, literal) = (decay / natural_rad_s, std::f64::consts::PI * width_hz / natural_rad_s);
         let damping = Estimate::new(ratio, ratio * (2.5 * relative * stretch).hypot(ratio), 1e6);
-        let frequency_sd_hz =
-            line_sd_hz(signal, Window::Flat, peak_hz, noise_rad).unwrap_or(own_hz).hypot(0.4 * ratio * ratio * peak_hz);
+        let frequency_sd_hz = line_sd_hz(signal, Window::Flat, peak_hz, noise_rad)
+            .unwrap_or(own_hz)
+            .hypot(0.4 * literal * literal * peak_hz);
         Ok(Self {
             width_hz,
-            damping_ratio_literal: std::f64::consts::PI * width_hz / natural_rad_s,
+            damping_ratio_literal: literal,
             damping_ratio: damping,
             frequency_hz: Estimate::new(natural_rad_s / std::f64::consts::TAU, frequency_sd_hz, 1e6),
         })

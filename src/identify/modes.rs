@@ -84,13 +84,10 @@ fn decide(signal: &Signal, spectrum: &Spectrum, one: SinusoidFit, two: SinusoidF
             times
         )
     } else if modes == 2 {
-        format!(
-            "two modes: the second lowers the information criterion by {bic_gain:.0} (p = {})",
-            probability(p_value)
-        )
+        format!("two modes: the second lowers the information criterion by {bic_gain:.0} ({})", probability(p_value))
     } else {
         format!(
-            "one mode; a second would change the information criterion by {:.0} (p = {})",
+            "one mode; a second would change the information criterion by {:.0} ({})",
             -bic_gain,
             probability(p_value)
         )

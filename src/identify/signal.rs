@@ -41,6 +41,9 @@ impl LinkSamples {
         if self.t_s.get(after).is_some_and(|t| t - t_s < 1e-6 * longest_s) {
             return Some(self.theta_rad[after]);
         }
+        if n == 0 {
+            return None;
+        }
         if after == 0 || after >= n {
             // the grid's last point may lie a rounding beyond the last sample
             let nearest = after.min(n - 1);

@@ -3,7 +3,8 @@
 use std::fmt::{self, Display, Formatter};
 
 use super::estimate::{Estimate, probability};
-use super::mode::{Damping, Method, Mode};
+use super::estimators::Method;
+use super::mode::{Damping, Mode};
 use super::{Identification, Record};
 
 impl Display for Identification {
@@ -111,7 +112,7 @@ impl Display for Mode {
             if let Some(t) = test {
                 writeln!(
                     f,
-                    "  {what} {} (χ² = {:.1} of {}, p = {})",
+                    "  {what} {} (χ² = {:.1} of {}, {})",
                     verdict(t.agree),
                     t.chi2,
                     t.estimators - 1,
@@ -153,7 +154,7 @@ impl Mode {
         if let Some(law) = envelope.decay {
             writeln!(
                 f,
-                "  dA/dt = −(b₀ + b₁A + b₂A²): b₀ = {} rad/s, b₁ = {} /s, b₂ = {} /(rad s); viscous alone p = {} (a picture, no verdict)",
+                "  dA/dt = −(b₀ + b₁A + b₂A²): b₀ = {} rad/s, b₁ = {} /s, b₂ = {} /(rad s); viscous alone {} (a picture, no verdict)",
                 scientific(&law.b0_rad_per_s),
                 scientific(&law.b1_per_s),
                 scientific(&law.b2_per_rad_s),

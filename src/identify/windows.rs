@@ -53,7 +53,7 @@ impl Windows {
     /// Cuts a signal into windows and fits these modes in each.
     ///
     /// # Errors
-    /// In words, when there are fewer than three windows.
+    /// In words, when there are fewer than three windows, or fewer than three can be fitted.
     pub fn of(signal: &Signal, fit: &SinusoidFit) -> Result<Self, String> {
         let slowest = fit.poles.iter().map(|p| p.omega_rad_s).fold(f64::INFINITY, f64::min);
         let cycles = signal.duration_s() * slowest / std::f64::consts::TAU;
@@ -78,7 +78,14 @@ impl Windows {
                 fits.push(local);
             }
         }
+        if fits.len() < 3 {
+            return Err(format!(
+                "only {} of {count:.0} windows hold enough samples and a clear oscillation",
+                fits.len()
+            ));
+        }
         let noise_rad: Vec<f64> = (0..signal.links.len()).map(|link| pooled_noise(&fits, link)).collect();
+        fits.iter_mut().for_each(|local| share_noise(local, &noise_rad));
         let modes = fit.poles.len();
         let mut windows = Self {
             window_s,
@@ -141,12 +148,19 @@ fn window_fit(window: &Signal, origin_s: f64, previous: &[Pole], whole: &[Pole])
     (1..=whole.len()).rev().filter_map(best).find(clear)
 }
 
+/// Takes the pooled noise for a window's own where the two differ by no more than chance: the pooled one is better known.
+fn share_noise(fit: &mut SinusoidFit, pooled_rad: &[f64]) {
+    for (link, pooled) in fit.links.iter_mut().zip(pooled_rad) {
+        let ratio = pooled / link.noise_rad;
+        if (0.8..1.4).contains(&ratio) {
+            link.amplitude_sd_rad.iter_mut().for_each(|sd| *sd *= ratio);
+        }
+    }
+}
+
 fn pooled_noise(fits: &[SinusoidFit], link: usize) -> f64 {
     // the median is not drawn up by the first, largest swings, where a sinusoid fits worst
     let mut noises: Vec<f64> = fits.iter().map(|f| f.links[link].noise_rad).collect();
-    if noises.is_empty() {
-        return f64::NAN;
-    }
     let middle = noises.len() / 2;
     *noises.select_nth_unstable_by(middle, f64::total_cmp).1
 }

@@ -1,0 +1,236 @@
+//! Every estimator of one mode side by side, and which one to take.
+
+use nalgebra::Complex;
+use serde::Serialize;
+
+use super::consistency::Consistency;
+use super::decrement::Decrement;
+use super::envelope::Envelope;
+use super::estimate::{Estimate, chi_squared_tail};
+use super::half_power::HalfPower;
+use super::signal::Signal;
+use super::sinusoids::SinusoidFit;
+use super::spectrum::Spectrum;
+use super::windows::Windows;
+
+/// A way to a frequency or a damping ratio.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Method {
+    /// Peak of the amplitude spectrum.
+    Spectrum,
+    /// Bandwidth at half power.
+    HalfPower,
+    /// Logarithmic decrement over all peaks.
+    Decrement,
+    /// Damped sinusoids over the whole record.
+    Sinusoids,
+    /// Amplitudes and phases of windows; the frequency at small amplitude.
+    Envelope,
+}
+
+/// What one method says.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Estimator {
+    /// Which.
+    pub method: Method,
+    /// Undamped natural frequency.
+    pub frequency_hz: Option<Estimate>,
+    /// ξ.
+    pub damping_ratio: Option<Estimate>,
+    /// Why a number is absent, or what to know about it.
+    pub note: Option<String>,
+}
+
+/// What all modes share.
+pub(super) struct Whole<'a> {
+    pub signal: &'a Signal,
+    pub spectrum: &'a Spectrum,
+    pub fit: &'a SinusoidFit,
+    pub windows: &'a Result<Windows, String>,
+    pub noise_rad: &'a [f64],
+}
+
+/// What every method says about one mode.
+pub(super) struct Estimators {
+    pub each: Vec<Estimator>,
+    /// Frequency and damping of the damped sinusoids, as noise alone has them.
+    pub raw: [Estimate; 2],
+    /// By how much the residual near the mode exceeds white noise, in power.
+    pub residual_excess: f64,
+}
+
+/// What to take.
+pub(super) struct Choice {
+    pub frequency_hz: Estimate,
+    pub damping_ratio: Estimate,
+    pub basis: String,
+}
+
+impl Estimators {
+    pub fn of(whole: &Whole, mode: usize, envelope: &Result<Envelope, String>) -> Self {
+        let fit = whole.fit;
+        let residual = fit.residuals(whole.signal);
+        let excess: Vec<f64> = fit.poles.iter().map(|p| residual_excess(&residual, p.omega_rad_s)).collect();
+        // where the whole record is no sum of damped sinusoids, the other modes are taken away window by window
+        let alone = match whole.windows {
+            Ok(windows) if excess.iter().any(|e| *e > 1.0) => windows.isolate(whole.signal, fit, mode),
+            _ => fit.isolate(whole.signal, mode),
+        };
+        let filled = alone.bridged();
+        let raw = [fit.frequency_hz(mode), fit.damping_ratio(mode)];
+        let each = vec![
+            spectral(whole, &filled, mode, raw[1].value),
+            half_power(whole, &filled, mode),
+            decrement(whole, &alone, mode),
+            sinusoids(raw, excess[mode], envelope.as_ref().ok()),
+            windowed(envelope),
+        ];
+        Self { each, raw, residual_excess: excess[mode] }
+    }
+
+    /// Whether the methods agree, the damped sinusoids entering with this value.
+    pub fn compare(&self, own: Estimate, quantity: fn(&Estimator) -> Option<Estimate>) -> Option<Consistency> {
+        let others = self.each.iter().filter(|e| e.method != Method::Sinusoids).filter_map(quantity);
+        Consistency::of(&others.chain([own]).collect::<Vec<_>>())
+    }
+
+    /// The damped sinusoids while they describe the record; else the envelope's laws.
+    pub fn choose(&self, envelope: Option<&Envelope>) -> Choice {
+        let sinusoids = self.each.iter().find(|e| e.method == Method::Sinusoids);
+        let frequency_hz = sinusoids.and_then(|e| e.frequency_hz).unwrap_or(self.raw[0]);
+        let damping_ratio = sinusoids.and_then(|e| e.damping_ratio).unwrap_or(self.raw[1]);
+        let law = envelope.and_then(|e| e.frequency);
+        let varies = self.residual_excess > 1.0 || law.is_some_and(|l| l.p_constant < 0.01);
+        match (varies, envelope, law) {
+            (true, Some(envelope), Some(law)) => Choice {
+                frequency_hz: law.f0_hz,
+                damping_ratio: envelope.damping_range(),
+                basis:
+                    "envelope: f at small amplitude, ξ as if viscous; one damped sinusoid does not describe the record"
+                        .to_owned(),
+            },
+            (true, Some(envelope), None) => Choice {
+                frequency_hz,
+                damping_ratio: envelope.damping_range(),
+                basis: "damped sinusoids, f over the record; ξ of the envelope".to_owned(),
+            },
+            (true, None, _) => {
+                let basis = "damped sinusoids, intervals widened: they do not describe the record".to_owned();
+                Choice { frequency_hz, damping_ratio, basis }
+            }
+            (false, ..) => Choice { frequency_hz, damping_ratio, basis: "damped sinusoids".to_owned() },
+        }
+    }
+}
+
+fn spectral(whole: &Whole, alone: &Signal, mode: usize, xi: f64) -> Estimator {
+    let near_hz = whole.fit.poles[mode].omega_rad_s / std::f64::consts::TAU;
+    let natural = 1.0 / (1.0 - xi * xi).max(0.1).sqrt();
+    let line = Spectrum::line(alone, near_hz, whole.noise_rad);
+    Estimator {
+        method: Method::Spectrum,
+        frequency_hz: line.map(|f| f.times(natural)),
+        damping_ratio: None,
+        note: Some(match line {
+            Some(_) => format!("resolution {:.4} Hz", whole.spectrum.resolution_hz),
+            None => format!("no single peak within {:.4} Hz", whole.spectrum.resolution_hz),
+        }),
+    }
+}
+
+fn half_power(whole: &Whole, alone: &Signal, mode: usize) -> Estimator {
+    let found = HalfPower::of(alone, whole.fit.poles[mode], whole.noise_rad);
+    Estimator {
+        method: Method::HalfPower,
+        frequency_hz: found.as_ref().ok().map(|h| h.frequency_hz),
+        damping_ratio: found.as_ref().ok().map(|h| h.damping_ratio),
+        note: Some(match found {
+            Ok(h) => format!("Eq. 28 to the letter: ξ = {:.5}", h.damping_ratio_literal),
+            Err(reason) => reason,
+        }),
+    }
+}
+
+fn decrement(whole: &Whole, alone: &Signal, mode: usize) -> Estimator {
+    let clearness = |link: usize| whole.fit.links[link].amplitudes_rad[mode].norm() / whole.noise_rad[link];
+    let link = (0..alone.links.len()).max_by(|a, b| clearness(*a).total_cmp(&clearness(*b))).unwrap_or(0);
+    let frequency_hz = whole.fit.poles[mode].omega_rad_s / std::f64::consts::TAU;
+    let found = Decrement::of(&alone.links[link], frequency_hz, whole.noise_rad[link]);
+    Estimator {
+        method: Method::Decrement,
+        frequency_hz: found.as_ref().ok().map(|d| d.frequency_hz),
+        damping_ratio: found.as_ref().ok().map(|d| d.damping_ratio),
+        note: Some(match found {
+            Ok(d) => format!("θ{}, {} peaks, δ = {:.5}", link + 1, d.peaks, d.decrement.value),
+            Err(reason) => reason,
+        }),
+    }
+}
+
+/// Widened where the residual near the mode exceeds white noise, and to what the frequency and damping were in the windows.
+fn sinusoids([f, xi]: [Estimate; 2], excess: f64, envelope: Option<&Envelope>) -> Estimator {
+    let widen = |e: Estimate| {
+        let factor = excess.sqrt();
+        Estimate {
+            sd: e.sd * factor,
+            low: e.value + (e.low - e.value) * factor,
+            high: e.value + (e.high - e.value) * factor,
+            ..e
+        }
+    };
+    let (mut f, mut xi) = (widen(f), widen(xi));
+    let misfits = excess > 1.0;
+    if let Some(envelope) = envelope.filter(|_| misfits) {
+        for step in &envelope.steps {
+            f = f.covering(step.frequency_hz.value, step.frequency_hz.value);
+            xi = xi.covering(step.damping_ratio.value, step.damping_ratio.value);
+        }
+    }
+    let note = misfits.then(|| {
+        format!("residual {excess:.1} × white noise near the mode: intervals widened to the range over the record")
+    });
+    Estimator { method: Method::Sinusoids, frequency_hz: Some(f), damping_ratio: Some(xi), note }
+}
+
+fn windowed(envelope: &Result<Envelope, String>) -> Estimator {
+    let law = envelope.as_ref().ok().and_then(|e| e.frequency);
+    Estimator {
+        method: Method::Envelope,
+        frequency_hz: law.map(|l| l.f0_hz),
+        damping_ratio: envelope.as_ref().ok().map(|e| e.damping_ratio),
+        note: Some(match envelope {
+            Ok(e) => match law {
+                Some(l) => format!(
+                    "{} windows; f at small amplitude, κ = {:.4} ± {:.4} /rad²",
+                    e.windows, l.kappa_per_rad2.value, l.kappa_per_rad2.sd
+                ),
+                None => format!("{} windows are too few for f against amplitude", e.windows),
+            },
+            Err(reason) => reason.clone(),
+        }),
+    }
+}
+
+/// Power of the residual in the lines beside a mode (2/T to 9/T away on both sides) over that of white noise of the same variance; 1 unless the
+/// excess would come about by chance less than once in a thousand records. Least squares sees only that part of the residual.
+fn residual_excess(residual: &Signal, omega_rad_s: f64) -> f64 {
+    let line = std::f64::consts::TAU / residual.duration_s();
+    let (mut sum, mut lines) = (0.0, 0.0);
+    for link in &residual.links {
+        let n = link.t_s.len() as f64;
+        let variance = link.theta_rad.iter().map(|r| r * r).sum::<f64>() / n;
+        for k in (2..10).flat_map(|k| [f64::from(k), -f64::from(k)]) {
+            let omega = omega_rad_s + k * line;
+            if omega < 2.0 * line {
+                continue;
+            }
+            let turns = link.t_s.iter().zip(&link.theta_rad).map(|(t, r)| Complex::from_polar(*r, -omega * t));
+            sum += turns.sum::<Complex<f64>>().norm_sqr() / (n * variance.max(f64::MIN_POSITIVE));
+            lines += 1.0;
+        }
+    }
+    // each line's power is half a χ² of two degrees of freedom
+    let p_value = chi_squared_tail(2.0 * sum, 2.0 * lines);
+    if p_value < 1e-3 { (sum / lines).max(1.0) } else { 1.0 }
+}
