@@ -8,6 +8,7 @@ use freeswing::identify::{Damping, Estimate, Identification, Method, Mode, ident
 use freeswing::model::chain::Chain;
 use freeswing::series::AngleSeries;
 use freeswing::synth::Swing;
+use nalgebra::{Matrix2, Matrix4};
 use rand::rngs::Xoshiro256PlusPlus;
 use rand::{RngExt, SeedableRng};
 use rand_distr::{Distribution, StandardNormal};
@@ -246,6 +247,95 @@ fn a_simulated_strip_gives_back_its_frequencies_and_its_friction() {
     let expected = 2.0 * 2.0e-7 / (std::f64::consts::PI * 4.808e-6 * TAU * natural[0]);
     assert!(decay.b0_rad_per_s.holds(expected) && !decay.b0_rad_per_s.holds(0.0), "{decay:?} against {expected}");
     assert!(decay.p_viscous < 1e-6);
+}
+
+/// A simulated strip of two rods with viscous hinge and joint, both modes excited, and its linearised poles (f, ξ), slowest first.
+fn simulated(rng: &mut Xoshiro256PlusPlus, release_rad: f64) -> (AngleSeries, [(f64, f64); 2]) {
+    let log = |rng: &mut Xoshiro256PlusPlus, low: f64, high: f64| low * (high / low).powf(rng.random_range(0.0..1.0));
+    let mut experiment = Experiment::default();
+    experiment.model.k_eq_n_m_per_rad = log(rng, 1e-5, 3e-4);
+    experiment.model.c_eq_n_m_s_per_rad = log(rng, 1e-8, 2e-7);
+    experiment.model.effects = Effects { hinge_viscous: Some(log(rng, 5e-8, 1.5e-6)), ..Effects::default() };
+    experiment.model.release_rad = vec![release_rad, release_rad * rng.random_range(0.7..1.8)];
+    experiment.render.duration_s = rng.random_range(20.0..60.0);
+    let noise_rad = log(rng, 0.02, 0.25).to_radians();
+    let swing = Swing::of(&experiment).unwrap();
+    let t_s: Vec<f64> = (0..(30.0 * experiment.render.duration_s) as usize).map(|k| k as f64 / 30.0).collect();
+    let mut theta_rad = vec![Vec::new(); 2];
+    for t in &t_s {
+        for (link, angle) in swing.angles_rad(*t).into_iter().enumerate() {
+            let noise: f64 = StandardNormal.sample(rng);
+            theta_rad[link].push(Some(angle + noise_rad * noise));
+        }
+    }
+    let sd_rad = theta_rad.iter().map(|l| vec![None; l.len()]).collect();
+    (AngleSeries { path: PathBuf::from("simulated"), t_s, theta_rad, sd_rad }, poles(&experiment))
+}
+
+/// Eigenvalues of the linearised chain with its dampers.
+fn poles(experiment: &Experiment) -> [(f64, f64); 2] {
+    let chain = Chain::of(&experiment.specimen).unwrap();
+    let (g, model) = (experiment.rig.gravity_m_s2, &experiment.model);
+    let (k, c, hinge) = (model.k_eq_n_m_per_rad, model.c_eq_n_m_s_per_rad, model.effects.hinge_viscous.unwrap_or(0.0));
+    let stiffness = Matrix2::new(g * chain.static_moment_kg_m(0) + k, -k, -k, g * chain.static_moment_kg_m(1) + k);
+    let damping = Matrix2::new(c + hinge, -c, -c, c);
+    let inverse = Matrix2::from_fn(|i, j| chain.inertia_kg_m2()[(i, j)]).try_inverse().unwrap();
+    let mut state = Matrix4::zeros();
+    state.fixed_view_mut::<2, 2>(0, 2).fill_with_identity();
+    state.fixed_view_mut::<2, 2>(2, 0).copy_from(&(-inverse * stiffness));
+    state.fixed_view_mut::<2, 2>(2, 2).copy_from(&(-inverse * damping));
+    let mut found: Vec<(f64, f64)> =
+        state.complex_eigenvalues().iter().filter(|s| s.im > 0.0).map(|s| (s.norm() / TAU, -s.re / s.norm())).collect();
+    found.sort_by(|a, b| a.0.total_cmp(&b.0));
+    [found[0], found[1]]
+}
+
+fn simulated_bank(cases: u64, release_rad: f64) -> [Score; 2] {
+    let [mut f, mut xi] = [Score::default(), Score::default()];
+    let mut by_mode = [const {
+        (Score { relative_errors: Vec::new(), inside: 0 }, Score { relative_errors: Vec::new(), inside: 0 })
+    }; 2];
+    let mut two = 0;
+    for seed in 0..cases {
+        let (series, truth) = simulated(&mut Xoshiro256PlusPlus::seed_from_u64(1000 + seed), release_rad);
+        let found = identify(&series, None).unwrap();
+        two += u64::from(found.modes.len() == 2);
+        for mode in &found.modes {
+            let Some(which) = truth.iter().position(|t| (mode.frequency_hz.value / t.0 - 1.0).abs() < 0.1) else {
+                continue;
+            };
+            f.add(&mode.frequency_hz, truth[which].0);
+            by_mode[which].0.add(&mode.frequency_hz, truth[which].0);
+            if let Damping::Identified(estimate) = &mode.damping {
+                xi.add(estimate, truth[which].1);
+                by_mode[which].1.add(estimate, truth[which].1);
+            }
+            if std::env::var_os("SHOW").is_some() {
+                println!(
+                    "{seed} {which} f {:?} {} xi {:?} {} {}",
+                    mode.frequency_hz,
+                    truth[which].0,
+                    mode.damping.interval(),
+                    truth[which].1,
+                    mode.basis
+                );
+            }
+        }
+    }
+    println!("{cases} simulated strips released at {release_rad} rad: two modes in {two}");
+    for (mode, (f, xi)) in by_mode.iter_mut().enumerate() {
+        f.line(&format!("mode {} f", mode + 1));
+        xi.line(&format!("mode {} ξ", mode + 1));
+    }
+    [f, xi]
+}
+
+#[test]
+#[ignore = "slow; `make accuracy` runs it"]
+fn simulated_strips_give_back_their_linearised_poles() {
+    for release_rad in [0.05, 0.2, 0.5] {
+        simulated_bank(60, release_rad);
+    }
 }
 
 /// Roots of det(G + K − ω²a) = 0 for two links.

@@ -25,7 +25,7 @@ pub enum Method {
     Decrement,
     /// Damped sinusoids over the whole record.
     Sinusoids,
-    /// Amplitudes and phases of windows; the frequency at small amplitude.
+    /// Amplitudes and phases of windows; frequency and damping at small amplitude.
     Envelope,
 }
 
@@ -95,31 +95,25 @@ impl Estimators {
         Consistency::of(&others.chain([own]).collect::<Vec<_>>())
     }
 
-    /// The damped sinusoids while they describe the record; else the envelope's laws.
-    pub fn choose(&self, envelope: Option<&Envelope>) -> Choice {
+    /// The laws at small amplitude; the damped sinusoids where the amplitude does not matter or its effect cannot be followed.
+    pub fn choose(&self, envelope: Option<&Envelope>, amplitude_rad: f64) -> Choice {
         let sinusoids = self.each.iter().find(|e| e.method == Method::Sinusoids);
         let frequency_hz = sinusoids.and_then(|e| e.frequency_hz).unwrap_or(self.raw[0]);
         let damping_ratio = sinusoids.and_then(|e| e.damping_ratio).unwrap_or(self.raw[1]);
-        let law = envelope.and_then(|e| e.frequency);
-        let varies = self.residual_excess > 1.0 || law.is_some_and(|l| l.p_constant < 0.01);
-        match (varies, envelope, law) {
-            (true, Some(envelope), Some(law)) => Choice {
+        // what κ = 0.1 would change at the record's start
+        let felt = 0.1 * amplitude_rad.powi(2) * frequency_hz.value > 0.3 * frequency_hz.sd;
+        let law = envelope.and_then(|e| e.frequency.map(|f| (e, f)));
+        match law {
+            Some((envelope, law)) if felt || self.residual_excess > 1.0 => Choice {
                 frequency_hz: law.f0_hz,
-                damping_ratio: envelope.damping_range(),
-                basis:
-                    "envelope: f at small amplitude, ξ as if viscous; one damped sinusoid does not describe the record"
-                        .to_owned(),
+                damping_ratio: envelope.small_amplitude_damping(),
+                basis: "windows: f and ξ at small amplitude".to_owned(),
             },
-            (true, Some(envelope), None) => Choice {
-                frequency_hz,
-                damping_ratio: envelope.damping_range(),
-                basis: "damped sinusoids, f over the record; ξ of the envelope".to_owned(),
-            },
-            (true, None, _) => {
+            None if self.residual_excess > 1.0 => {
                 let basis = "damped sinusoids, intervals widened: they do not describe the record".to_owned();
                 Choice { frequency_hz, damping_ratio, basis }
             }
-            (false, ..) => Choice { frequency_hz, damping_ratio, basis: "damped sinusoids".to_owned() },
+            _ => Choice { frequency_hz, damping_ratio, basis: "damped sinusoids over the whole record".to_owned() },
         }
     }
 }
@@ -195,17 +189,18 @@ fn sinusoids([f, xi]: [Estimate; 2], excess: f64, envelope: Option<&Envelope>) -
 
 fn windowed(envelope: &Result<Envelope, String>) -> Estimator {
     let law = envelope.as_ref().ok().and_then(|e| e.frequency);
+    let damping = envelope.as_ref().ok().and_then(|e| e.damping);
     Estimator {
         method: Method::Envelope,
         frequency_hz: law.map(|l| l.f0_hz),
-        damping_ratio: envelope.as_ref().ok().map(|e| e.damping_ratio),
+        damping_ratio: damping.map(|d| d.xi0),
         note: Some(match envelope {
             Ok(e) => match law {
                 Some(l) => format!(
-                    "{} windows; f at small amplitude, κ = {:.4} ± {:.4} /rad²",
+                    "{} windows; at small amplitude, κ = {:.4} ± {:.4} /rad²",
                     e.windows, l.kappa_per_rad2.value, l.kappa_per_rad2.sd
                 ),
-                None => format!("{} windows are too few for f against amplitude", e.windows),
+                None => format!("{} windows do not tell f against amplitude", e.windows),
             },
             Err(reason) => reason.clone(),
         }),
