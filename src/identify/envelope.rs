@@ -14,9 +14,9 @@
 //! dA/dt = −(b₀ + b₁A + b₂A²)                  friction, viscous, quadratic (physics.md)
 //! ```
 //! The first two give f₀ and ξ₀ at small amplitude. Where the windows are too few or too much alike to tell how amplitude acts, it is bounded by what
-//! hung bodies do: κ = 0.03 ± 0.03 for the slowest mode, 0.4 ± 0.5 for faster ones, κ' = 0 ± 0.1, λ = λ' = 0 ± 0.5 /rad² (one standard deviation)
+//! hung bodies do: κ = 0.03 ± 0.03 for the slowest mode, 0.4 ± 0.5 for faster ones, κ' = 0 ± 0.1, λ = 0 ± 0.15 and 0 ± 0.5, λ' = 0 ± 0.3 /rad² (one standard deviation)
 //! enter as observations, so that the intervals of f₀ and ξ₀ hold what the data leave open. A fourth power of A is added where the second does not
-//! describe the windows.
+//! describe the windows, and half of what it changes is added to the standard deviation for the powers left out.
 //! The third law is for a picture and a first guess, never to decide: Coulomb friction and quadratic drag together imitate a viscous damper.
 
 use nalgebra::{DMatrix, DVector};
@@ -175,6 +175,27 @@ fn steps(moments: &[Moment], phases: &[f64]) -> Vec<Step> {
     (0..moments.len() - 1).map(pair).collect()
 }
 
+/// What is known beforehand of how amplitude acts: mean and standard deviation (1/rad²).
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Bounds {
+    pub kappa: [f64; 2],
+    pub lambda: [f64; 2],
+}
+
+impl Bounds {
+    /// Of the other mode's amplitude.
+    pub const OTHER: Self = Self { kappa: [0.0, 0.1], lambda: [0.0, 0.3] };
+
+    /// Of the mode's own amplitude.
+    pub fn of(slowest: bool) -> Self {
+        if slowest {
+            Self { kappa: [0.03, 0.03], lambda: [0.0, 0.15] }
+        } else {
+            Self { kappa: [0.4, 0.5], lambda: [0.0, 0.5] }
+        }
+    }
+}
+
 /// What stands for a power of an amplitude in a law, with what is known of its coefficient beforehand.
 struct Term {
     /// ∫A² dt up to each window.
@@ -204,14 +225,14 @@ struct Slope {
 
 impl<'a> Regression<'a> {
     fn of(moments: &'a [Moment], others: &[&[Moment]], slowest: bool) -> Self {
-        let kappa = if slowest { [0.03, 0.03] } else { [0.4, 0.5] };
-        let mut terms = vec![Term { integral: powers(moments, moments, 2), kappa, lambda: [0.0, 0.5] }];
+        let Bounds { kappa, lambda } = Bounds::of(slowest);
+        let mut terms = vec![Term { integral: powers(moments, moments, 2), kappa, lambda }];
         terms.extend(others.iter().map(|other| Term {
             integral: powers(moments, other, 2),
-            kappa: [0.0, 0.1],
-            lambda: [0.0, 0.5],
+            kappa: Bounds::OTHER.kappa,
+            lambda: Bounds::OTHER.lambda,
         }));
-        let quartic = Term { integral: powers(moments, moments, 4), kappa: [0.0, kappa[1]], lambda: [0.0, 0.5] };
+        let quartic = Term { integral: powers(moments, moments, 4), kappa: [0.0, kappa[1]], lambda };
         Self { moments, terms, quartic }
     }
 
@@ -252,8 +273,12 @@ impl<'a> Regression<'a> {
             return Some(plain);
         }
         let with_quartic: Vec<&Term> = terms.into_iter().chain([&self.quartic]).collect();
-        let curved = self.least_squares(values, &with_quartic, prior);
-        Some(curved.filter(|c| c.p_value > plain.p_value).unwrap_or(plain))
+        let Some(mut curved) = self.least_squares(values, &with_quartic, prior).filter(|c| c.p_value > plain.p_value)
+        else {
+            return Some(plain);
+        };
+        curved.covariance[(1, 1)] += (0.5 * (curved.rate - plain.rate)).powi(2);
+        Some(curved)
     }
 
     /// Weighted least squares, each coefficient's prior being one more observation.

@@ -37,6 +37,18 @@ impl Estimate {
         Self { value: function(self.value), sd: (self.sd * slope).abs(), low: a.min(b), high: a.max(b) }
     }
 
+    /// With another, independent standard deviation on top.
+    #[must_use]
+    pub fn blurred(self, sd: f64) -> Self {
+        let wider = |half: f64| half.hypot(student_quantile(1e6) * sd);
+        Self {
+            value: self.value,
+            sd: self.sd.hypot(sd),
+            low: self.value - wider(self.value - self.low),
+            high: self.value + wider(self.high - self.value),
+        }
+    }
+
     /// The interval stretched to hold these values, too.
     #[must_use]
     pub fn covering(self, low: f64, high: f64) -> Self {

@@ -5,7 +5,7 @@ use serde::Serialize;
 
 use super::consistency::Consistency;
 use super::decrement::Decrement;
-use super::envelope::Envelope;
+use super::envelope::{Bounds, Envelope};
 use super::estimate::{Estimate, chi_squared_tail};
 use super::half_power::HalfPower;
 use super::signal::Signal;
@@ -96,12 +96,14 @@ impl Estimators {
     }
 
     /// The laws at small amplitude; the damped sinusoids where the amplitude does not matter or its effect cannot be followed.
-    pub fn choose(&self, envelope: Option<&Envelope>, amplitude_rad: f64) -> Choice {
+    pub fn choose(&self, envelope: Option<&Envelope>, amplitudes_rad: &[f64], mode: usize) -> Choice {
         let sinusoids = self.each.iter().find(|e| e.method == Method::Sinusoids);
         let frequency_hz = sinusoids.and_then(|e| e.frequency_hz).unwrap_or(self.raw[0]);
         let damping_ratio = sinusoids.and_then(|e| e.damping_ratio).unwrap_or(self.raw[1]);
-        // what κ = 0.1 would change at the record's start
-        let felt = 0.1 * amplitude_rad.powi(2) * frequency_hz.value > 0.3 * frequency_hz.sd;
+        // what amplitude may have changed, by the bounds on κ and λ; half of A₀² is A² as least squares weighs it
+        let [changed_hz, changed_xi] = unfollowed(amplitudes_rad, mode);
+        let (changed_hz, changed_xi) = (changed_hz * frequency_hz.value, changed_xi * damping_ratio.value);
+        let felt = changed_hz > 0.3 * frequency_hz.sd;
         let law = envelope.and_then(|e| e.frequency.map(|f| (e, f)));
         match law {
             Some((envelope, law)) if felt || self.residual_excess > 1.0 => Choice {
@@ -109,13 +111,26 @@ impl Estimators {
                 damping_ratio: envelope.small_amplitude_damping(),
                 basis: "windows: f and ξ at small amplitude".to_owned(),
             },
-            None if self.residual_excess > 1.0 => {
-                let basis = "damped sinusoids, intervals widened: they do not describe the record".to_owned();
-                Choice { frequency_hz, damping_ratio, basis }
-            }
+            None if felt || self.residual_excess > 1.0 => Choice {
+                frequency_hz: frequency_hz.blurred(changed_hz),
+                damping_ratio: damping_ratio.blurred(changed_xi),
+                basis: "damped sinusoids over the whole record; widened for what amplitude may have changed".to_owned(),
+            },
             _ => Choice { frequency_hz, damping_ratio, basis: "damped sinusoids over the whole record".to_owned() },
         }
     }
+}
+
+/// Relative standard deviation of frequency and damping of a mode whose dependence on the amplitudes cannot be followed.
+fn unfollowed(amplitudes_rad: &[f64], mode: usize) -> [f64; 2] {
+    let rms = |[mean, sd]: [f64; 2]| mean.hypot(sd);
+    let (mut f2, mut xi2) = (0.0, 0.0);
+    for (other, amplitude_rad) in amplitudes_rad.iter().enumerate() {
+        let bounds = if other == mode { Bounds::of(mode == 0) } else { Bounds::OTHER };
+        f2 += (0.5 * amplitude_rad.powi(2) * rms(bounds.kappa)).powi(2);
+        xi2 += (0.5 * amplitude_rad.powi(2) * rms(bounds.lambda)).powi(2);
+    }
+    [f2.sqrt(), xi2.sqrt()]
 }
 
 fn spectral(whole: &Whole, alone: &Signal, mode: usize, xi: f64) -> Estimator {
