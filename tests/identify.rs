@@ -116,7 +116,8 @@ fn matched<'a>(found: &'a Identification, case: &'a Case) -> impl Iterator<Item 
     })
 }
 
-fn bank(cases: u64) -> [Score; 2] {
+/// Frequency and damping to take, then those of the damped sinusoids alone.
+fn bank(cases: u64) -> [Score; 4] {
     let [mut f, mut xi] = [Score::default(), Score::default()];
     let mut methods: Vec<(Method, Score, Score)> =
         [Method::Spectrum, Method::HalfPower, Method::Decrement, Method::Sinusoids, Method::Envelope]
@@ -152,12 +153,13 @@ fn bank(cases: u64) -> [Score; 2] {
         f.line(&format!("{method:?} f"));
         xi.line(&format!("{method:?} ξ"));
     }
-    [f, xi]
+    let sinusoids = methods.swap_remove(3);
+    [f, xi, sinusoids.1, sinusoids.2]
 }
 
 #[test]
 fn forty_synthetic_decays_are_identified() {
-    let [mut f, mut xi] = bank(40);
+    let [mut f, mut xi, ..] = bank(40);
     assert!(f.relative_errors.len() >= 76, "{}", f.relative_errors.len());
     assert!(f.median() < 2e-4 && xi.median() < 0.02, "{} {}", f.median(), xi.median());
     assert!(f.coverage() > 0.88 && xi.coverage() > 0.88, "{} {}", f.coverage(), xi.coverage());
@@ -166,10 +168,16 @@ fn forty_synthetic_decays_are_identified() {
 #[test]
 #[ignore = "slow; `make accuracy` runs it"]
 fn four_hundred_synthetic_decays_are_identified_with_true_intervals() {
-    let [mut f, mut xi] = bank(400);
-    assert!(f.median() < 2e-4 && xi.median() < 0.02, "{} {}", f.median(), xi.median());
-    for score in [f, xi] {
+    let [mut f, mut xi, mut sinusoids_f, mut sinusoids_xi] = bank(400);
+    for (f, xi) in [(&mut f, &mut xi), (&mut sinusoids_f, &mut sinusoids_xi)] {
+        assert!(f.median() < 2e-4 && xi.median() < 0.02, "{} {}", f.median(), xi.median());
+    }
+    for score in [&sinusoids_f, &sinusoids_xi] {
         assert!((0.93..=0.97).contains(&score.coverage()), "{}", score.coverage());
+    }
+    // f and ξ at small amplitude allow for a dependence on amplitude that these linear decays do not have
+    for score in [&f, &xi] {
+        assert!((0.93..=0.995).contains(&score.coverage()), "{}", score.coverage());
     }
 }
 
@@ -295,12 +303,10 @@ fn poles(experiment: &Experiment) -> [(f64, f64); 2] {
 
 fn simulated_bank(cases: u64, release_rad: f64) -> [Score; 2] {
     let [mut f, mut xi] = [Score::default(), Score::default()];
-    let mut by_mode = [const {
-        (Score { relative_errors: Vec::new(), inside: 0 }, Score { relative_errors: Vec::new(), inside: 0 })
-    }; 2];
+    let mut by_mode: [(Score, Score); 2] = Default::default();
     let mut two = 0;
     for seed in 0..cases {
-        let (series, truth) = simulated(&mut Xoshiro256PlusPlus::seed_from_u64(1000 + seed), release_rad);
+        let (series, truth) = simulated(&mut Xoshiro256PlusPlus::seed_from_u64(5000 + seed), release_rad);
         let found = identify(&series, None).unwrap();
         two += u64::from(found.modes.len() == 2);
         for mode in &found.modes {
@@ -312,16 +318,6 @@ fn simulated_bank(cases: u64, release_rad: f64) -> [Score; 2] {
             if let Damping::Identified(estimate) = &mode.damping {
                 xi.add(estimate, truth[which].1);
                 by_mode[which].1.add(estimate, truth[which].1);
-            }
-            if std::env::var_os("SHOW").is_some() {
-                println!(
-                    "{seed} {which} f {:?} {} xi {:?} {} {}",
-                    mode.frequency_hz,
-                    truth[which].0,
-                    mode.damping.interval(),
-                    truth[which].1,
-                    mode.basis
-                );
             }
         }
     }
@@ -337,7 +333,10 @@ fn simulated_bank(cases: u64, release_rad: f64) -> [Score; 2] {
 #[ignore = "slow; `make accuracy` runs it"]
 fn simulated_strips_give_back_their_linearised_poles() {
     for release_rad in [0.05, 0.2, 0.5] {
-        simulated_bank(60, release_rad);
+        let [mut f, mut xi] = simulated_bank(60, release_rad);
+        assert!(f.median() < 1e-3 && xi.median() < 0.05, "{} {}", f.median(), xi.median());
+        // the second mode of a large swing is the weak point
+        assert!(f.coverage() > 0.8 && xi.coverage() > 0.75, "{} {}", f.coverage(), xi.coverage());
     }
 }
 

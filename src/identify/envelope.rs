@@ -180,18 +180,20 @@ fn steps(moments: &[Moment], phases: &[f64]) -> Vec<Step> {
 pub(super) struct Bounds {
     pub kappa: [f64; 2],
     pub lambda: [f64; 2],
+    /// Standard deviation of the next power's relative effect on frequency and damping (1/rad⁴), as simulated two-rod chains have it.
+    pub fourth: [f64; 2],
 }
 
 impl Bounds {
     /// Of the other mode's amplitude.
-    pub const OTHER: Self = Self { kappa: [0.0, 0.1], lambda: [0.0, 0.3] };
+    pub const OTHER: Self = Self { kappa: [0.0, 0.1], lambda: [0.0, 0.3], fourth: [0.0; 2] };
 
     /// Of the mode's own amplitude.
     pub fn of(slowest: bool) -> Self {
         if slowest {
-            Self { kappa: [0.03, 0.03], lambda: [0.0, 0.15] }
+            Self { kappa: [0.03, 0.03], lambda: [0.0, 0.15], fourth: [1e-3, 0.1] }
         } else {
-            Self { kappa: [0.4, 0.5], lambda: [0.0, 0.5] }
+            Self { kappa: [0.4, 0.5], lambda: [0.0, 0.5], fourth: [0.03, 0.5] }
         }
     }
 }
@@ -225,7 +227,7 @@ struct Slope {
 
 impl<'a> Regression<'a> {
     fn of(moments: &'a [Moment], others: &[&[Moment]], slowest: bool) -> Self {
-        let Bounds { kappa, lambda } = Bounds::of(slowest);
+        let Bounds { kappa, lambda, .. } = Bounds::of(slowest);
         let mut terms = vec![Term { integral: powers(moments, moments, 2), kappa, lambda }];
         terms.extend(others.iter().map(|other| Term {
             integral: powers(moments, other, 2),

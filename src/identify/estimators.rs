@@ -100,15 +100,17 @@ impl Estimators {
         let sinusoids = self.each.iter().find(|e| e.method == Method::Sinusoids);
         let frequency_hz = sinusoids.and_then(|e| e.frequency_hz).unwrap_or(self.raw[0]);
         let damping_ratio = sinusoids.and_then(|e| e.damping_ratio).unwrap_or(self.raw[1]);
-        // what amplitude may have changed, by the bounds on κ and λ; half of A₀² is A² as least squares weighs it
+        // what amplitude may have changed, by the bounds on κ and λ
         let [changed_hz, changed_xi] = unfollowed(amplitudes_rad, mode);
         let (changed_hz, changed_xi) = (changed_hz * frequency_hz.value, changed_xi * damping_ratio.value);
+        let squares: f64 = amplitudes_rad.iter().map(|a| a * a).sum();
+        let omitted = Bounds::of(mode == 0).fourth.map(|bound| bound * squares * squares);
         let felt = changed_hz > 0.3 * frequency_hz.sd;
         let law = envelope.and_then(|e| e.frequency.map(|f| (e, f)));
         match law {
             Some((envelope, law)) if felt || self.residual_excess > 1.0 => Choice {
-                frequency_hz: law.f0_hz,
-                damping_ratio: envelope.small_amplitude_damping(),
+                frequency_hz: relatively_blurred(law.f0_hz, omitted[0]),
+                damping_ratio: relatively_blurred(envelope.small_amplitude_damping(), omitted[1]),
                 basis: "windows: f and ξ at small amplitude".to_owned(),
             },
             None if felt || self.residual_excess > 1.0 => Choice {
@@ -121,14 +123,19 @@ impl Estimators {
     }
 }
 
+fn relatively_blurred(estimate: Estimate, relative: f64) -> Estimate {
+    estimate.blurred(relative * estimate.value)
+}
+
 /// Relative standard deviation of frequency and damping of a mode whose dependence on the amplitudes cannot be followed.
 fn unfollowed(amplitudes_rad: &[f64], mode: usize) -> [f64; 2] {
     let rms = |[mean, sd]: [f64; 2]| mean.hypot(sd);
     let (mut f2, mut xi2) = (0.0, 0.0);
     for (other, amplitude_rad) in amplitudes_rad.iter().enumerate() {
-        let bounds = if other == mode { Bounds::of(mode == 0) } else { Bounds::OTHER };
-        f2 += (0.5 * amplitude_rad.powi(2) * rms(bounds.kappa)).powi(2);
-        xi2 += (0.5 * amplitude_rad.powi(2) * rms(bounds.lambda)).powi(2);
+        // least squares sees half of its own A₀², but all of another mode's that outlives it
+        let (bounds, share) = if other == mode { (Bounds::of(mode == 0), 0.5) } else { (Bounds::OTHER, 1.0) };
+        f2 += (share * amplitude_rad.powi(2) * rms(bounds.kappa)).powi(2);
+        xi2 += (share * amplitude_rad.powi(2) * rms(bounds.lambda)).powi(2);
     }
     [f2.sqrt(), xi2.sqrt()]
 }
