@@ -335,8 +335,8 @@ fn simulated_strips_give_back_their_linearised_poles() {
     for release_rad in [0.05, 0.2, 0.5] {
         let [mut f, mut xi] = simulated_bank(60, release_rad);
         assert!(f.median() < 1e-3 && xi.median() < 0.05, "{} {}", f.median(), xi.median());
-        // the second mode of a large swing is the weak point
-        assert!(f.coverage() > 0.8 && xi.coverage() > 0.75, "{} {}", f.coverage(), xi.coverage());
+        // a little low: the second mode of a large swing is the weak point
+        assert!(f.coverage() > 0.88 && xi.coverage() > 0.88, "{} {}", f.coverage(), xi.coverage());
     }
 }
 

@@ -123,6 +123,40 @@ impl Estimators {
     }
 }
 
+/// Nearness to three times the slowest frequency at which a mode and the harmonic of a large swing mix.
+const HARMONIC_BAND: f64 = 0.06;
+
+/// How much a mode at three times the slowest frequency may be that one's third harmonic, 0 to 1.
+///
+/// sin θ and the turning of the links give a swing of amplitude A a harmonic of up to about A³/20 in a chain, more where the mode resonates with it;
+/// within windows of a few cycles it cannot be told from the mode, whose frequency and damping are then neither's.
+fn harmonic_share(fit: &SinusoidFit, mode: usize) -> f64 {
+    let times = fit.poles[mode].omega_rad_s / fit.poles[0].omega_rad_s;
+    if mode == 0 || (times / 3.0 - 1.0).abs() > HARMONIC_BAND {
+        return 0.0;
+    }
+    (fit.amplitude_rad(0).powi(3) / 20.0 / fit.amplitude_rad(mode).max(f64::MIN_POSITIVE)).min(1.0)
+}
+
+impl Choice {
+    /// With intervals that allow for the third harmonic of the slowest mode.
+    pub fn beside_harmonic(self, fit: &SinusoidFit, mode: usize) -> Self {
+        let share = harmonic_share(fit, mode);
+        if share < 0.01 {
+            return self;
+        }
+        let damping_ratio = self.damping_ratio;
+        Self {
+            frequency_hz: relatively_blurred(self.frequency_hz, HARMONIC_BAND * share.sqrt()),
+            damping_ratio: damping_ratio.blurred(2.0 * share.sqrt() * damping_ratio.value.abs()),
+            basis: format!(
+                "{}; widened: it lies on the third harmonic of mode 1, which only a forward model separates",
+                self.basis
+            ),
+        }
+    }
+}
+
 fn relatively_blurred(estimate: Estimate, relative: f64) -> Estimate {
     estimate.blurred(relative * estimate.value)
 }

@@ -101,7 +101,7 @@ impl Mode {
         let envelope = envelope.ok();
         let shape = shape(whole, mode);
         let amplitudes_rad: Vec<f64> = (0..whole.fit.poles.len()).map(|m| whole.fit.amplitude_rad(m)).collect();
-        let choice = estimators.choose(envelope.as_ref(), &amplitudes_rad, mode);
+        let choice = estimators.choose(envelope.as_ref(), &amplitudes_rad, mode).beside_harmonic(whole.fit, mode);
         let mut this = Self {
             expected_kappa_per_rad2: expected_kappa(&shape, whole.fit.poles[mode].frequency_hz(), chain, gravity_m_s2),
             frequency_hz: choice.frequency_hz,
