@@ -27,7 +27,7 @@ test: setup
 	cargo test
 
 accuracy: setup
-	cargo test --release --test accuracy --test fit -- --include-ignored --nocapture
+	cargo test --release --test accuracy --test identify --test fit -- --include-ignored --nocapture
 
 bench: setup
 	cargo bench

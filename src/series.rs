@@ -103,7 +103,7 @@ impl AngleSeries {
     fn check(&self, table: &Table) -> Result<()> {
         let rows = self.len();
         if rows == 0 {
-            return Err(table.refuse(None, "holds a header and no row; measure the recording again"));
+            return Err(table.refuse(None, "holds no row of numbers; measure the recording again"));
         }
         if rows < FEWEST_ROWS {
             let only = if rows == 1 { "one row".to_owned() } else { format!("{rows} rows") };
@@ -185,7 +185,16 @@ impl AngleSeries {
         from..self.t_s.partition_point(|t| *t < until_s).max(from)
     }
 
-    /// The rows of a range, unchecked otherwise.
+    /// The same series if it can be a swing.
+    ///
+    /// # Errors
+    /// As [`AngleSeries::read`], of what a slice may lack.
+    pub fn checked(self) -> Result<Self> {
+        self.check(&Table { path: &self.path })?;
+        Ok(self)
+    }
+
+    /// The rows of a range, not checked again.
     #[must_use]
     pub fn slice(&self, rows: Range<usize>) -> Self {
         let part = |columns: &[Vec<Option<f64>>]| columns.iter().map(|c| c[rows.clone()].to_vec()).collect();

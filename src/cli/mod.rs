@@ -2,6 +2,7 @@
 
 mod bar;
 mod fit;
+mod identify;
 mod modes;
 mod paper;
 mod render;
@@ -29,10 +30,11 @@ pub struct Cli {
 #[derive(Debug, Subcommand)]
 enum Command {
     Track(track::TrackArgs),
+    Identify(identify::IdentifyArgs),
     Fit(fit::FitArgs),
     Simulate(simulate::SimulateArgs),
-    Render(render::RenderArgs),
     Modes(modes::ModesArgs),
+    Render(render::RenderArgs),
     Paper(paper::PaperArgs),
 }
 
@@ -51,6 +53,7 @@ impl Cli {
             Command::Track(args) => args.run(),
             Command::Fit(args) => args.run(),
             Command::Simulate(args) => args.run(),
+            Command::Identify(args) => args.run(),
             Command::Render(args) => args.run(),
             Command::Modes(args) => args.run(),
             Command::Paper(args) => args.run(),

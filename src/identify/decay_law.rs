@@ -98,7 +98,9 @@ impl DecayFit {
             values[*parameter] = solved.scaled[k] * scale[*parameter];
             sd[*parameter] = (covariance[(k, k)] * widening.variance).sqrt() * scale[*parameter];
         }
-        chi2.is_finite().then_some(Self { values, sd, chi2, p_value, degrees_of_freedom: widening.degrees_of_freedom })
+        let sound = chi2.is_finite()
+            && solved.active.iter().all(|parameter| sd[*parameter].is_finite() && sd[*parameter] > 0.0);
+        sound.then_some(Self { values, sd, chi2, p_value, degrees_of_freedom: widening.degrees_of_freedom })
     }
 }
 

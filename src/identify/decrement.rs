@@ -34,8 +34,16 @@ pub struct Decrement {
 /// One extreme.
 struct Extreme {
     index: f64,
+    vertex: Vertex,
+}
+
+/// The top of a parabola.
+#[derive(Clone, Copy)]
+struct Vertex {
     t_s: f64,
     height_rad: f64,
+    /// Standard deviation of the height over the samples' noise: 1.5/√m for m samples spread evenly.
+    spread: f64,
 }
 
 impl Decrement {
@@ -44,22 +52,22 @@ impl Decrement {
     /// # Errors
     /// In words, with the number of peaks, when there are fewer than four.
     pub fn of(link: &LinkSamples, frequency_hz: f64, noise_rad: f64) -> Result<Self, String> {
-        // variance of a vertex: a parabola through m samples has 9/4 s²/m in its middle
         let rate_hz =
             (link.t_s.len() as f64 - 1.0) / (link.t_s.last().unwrap_or(&1.0) - link.t_s.first().unwrap_or(&0.0));
         let samples = 0.25 * rate_hz / frequency_hz;
         if samples < 3.0 {
             return Err(format!("{:.1} samples a cycle; a peak needs 12", 4.0 * samples));
         }
-        let sd_rad = 1.5 * noise_rad / samples.sqrt();
-        let extremes = follow(link, frequency_hz, CLEAR_OF_NOISE * sd_rad);
+        let extremes = follow(link, frequency_hz, noise_rad);
         if extremes.len() < 4 {
             return Err(format!("{} peaks stand clear of the noise; at least 4 are needed", extremes.len()));
         }
-        let weights: Vec<f64> = extremes.iter().map(|e| (e.height_rad / sd_rad).powi(2)).collect();
+        let weights: Vec<f64> =
+            extremes.iter().map(|e| (e.vertex.height_rad / (e.vertex.spread * noise_rad)).powi(2)).collect();
         let index: Vec<f64> = extremes.iter().map(|e| e.index).collect();
-        let logs = Line::through(&index, &extremes.iter().map(|e| e.height_rad.ln()).collect::<Vec<_>>(), &weights);
-        let times = Line::through(&index, &extremes.iter().map(|e| e.t_s).collect::<Vec<_>>(), &weights);
+        let logs =
+            Line::through(&index, &extremes.iter().map(|e| e.vertex.height_rad.ln()).collect::<Vec<_>>(), &weights);
+        let times = Line::through(&index, &extremes.iter().map(|e| e.vertex.t_s).collect::<Vec<_>>(), &weights);
         let free = extremes.len() as f64 - 2.0;
         let p_straight = chi_squared_tail(logs.chi2, free);
         // scatter beyond the noise widens the interval
@@ -85,8 +93,8 @@ fn time_error_s(frequency_hz: f64) -> f64 {
     slope_per_height / (std::f64::consts::TAU * frequency_hz).powi(2)
 }
 
-/// Steps from extreme to extreme, half a cycle each, until they sink below `least_rad` or the record ends.
-fn follow(link: &LinkSamples, frequency_hz: f64, least_rad: f64) -> Vec<Extreme> {
+/// Steps from extreme to extreme, half a cycle each, until they sink into the noise or the record ends.
+fn follow(link: &LinkSamples, frequency_hz: f64, noise_rad: f64) -> Vec<Extreme> {
     let half_s = 0.5 / frequency_hz;
     let (Some(first_s), Some(last_s)) = (link.t_s.first(), link.t_s.last()) else { return Vec::new() };
     // the first whole quarter cycle around an extreme lies within the first cycle
@@ -99,9 +107,9 @@ fn follow(link: &LinkSamples, frequency_hz: f64, least_rad: f64) -> Vec<Extreme>
     let (mut extremes, mut index, mut misses) = (Vec::new(), 0.0, 0);
     while expected_s + 0.25 * half_s <= *last_s {
         match vertex(link, expected_s, half_s, sign) {
-            Some((t_s, height_rad)) if height_rad > least_rad => {
-                extremes.push(Extreme { index, t_s, height_rad });
-                expected_s = t_s;
+            Some(vertex) if vertex.height_rad > CLEAR_OF_NOISE * vertex.spread * noise_rad => {
+                extremes.push(Extreme { index, vertex });
+                expected_s = vertex.t_s;
                 misses = 0;
             }
             Some(_) => break,
@@ -117,10 +125,10 @@ fn follow(link: &LinkSamples, frequency_hz: f64, least_rad: f64) -> Vec<Extreme>
 }
 
 /// Time and height of the parabola through a quarter cycle of samples about an expected extreme; `None` where too many are missing.
-fn vertex(link: &LinkSamples, expected_s: f64, half_s: f64, sign: f64) -> Option<(f64, f64)> {
-    let mut found = (expected_s, 0.0);
+fn vertex(link: &LinkSamples, expected_s: f64, half_s: f64, sign: f64) -> Option<Vertex> {
+    let mut found = Vertex { t_s: expected_s, height_rad: 0.0, spread: 1.0 };
     for _ in 0..3 {
-        let centre_s = found.0;
+        let centre_s = found.t_s;
         let from = link.t_s.partition_point(|t| *t < centre_s - 0.25 * half_s);
         let until = link.t_s.partition_point(|t| *t <= centre_s + 0.25 * half_s);
         let (t, a) = (&link.t_s[from..until], &link.theta_rad[from..until]);
@@ -130,13 +138,18 @@ fn vertex(link: &LinkSamples, expected_s: f64, half_s: f64, sign: f64) -> Option
         }
         let basis = DMatrix::from_fn(t.len(), 3, |i, j| ((t[i] - centre_s) / half_s).powi(j as i32));
         let values = DVector::from_iterator(a.len(), a.iter().map(|a| sign * a));
-        let fit = basis.svd(true, true).solve(&values, 1e-12).ok()?;
+        let inverse = basis.tr_mul(&basis).try_inverse()?;
+        let fit = &inverse * basis.tr_mul(&values);
         let move_by = -0.5 * fit[1] / fit[2];
         if !(fit[2] < 0.0 && move_by.abs() < 0.35) {
             // no hill of this sign here: nothing but noise is left
-            return Some((centre_s, 0.0));
+            return Some(Vertex { t_s: centre_s, height_rad: 0.0, spread: 1.0 });
         }
-        found = (centre_s + move_by * half_s, fit[0] - 0.25 * fit[1] * fit[1] / fit[2]);
+        found = Vertex {
+            t_s: centre_s + move_by * half_s,
+            height_rad: fit[0] - 0.25 * fit[1] * fit[1] / fit[2],
+            spread: inverse[(0, 0)].sqrt(),
+        };
     }
     Some(found)
 }

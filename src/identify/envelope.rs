@@ -6,19 +6,24 @@
 //! ```text
 //! f = Δφ / 2πΔt,   σ = ln(A/A') / Δt
 //! ```
-//! which is far sharper than a frequency or damping fitted within a window. Two laws are then laid through all windows by weighted least squares:
+//! which is far sharper than a frequency or damping fitted within a window. Weighted least squares then lay laws through all windows:
 //!
 //! ```text
-//! φ(t) = φ₀ + 2π ∫ f₀ (1 − κA² − κ'A'²) dt        κ = 1/16 for a rigid pendulum; A' belongs to the other mode
-//! dA/dt = −(b₀ + b₁A + b₂A²)                       friction, viscous, quadratic (physics.md)
+//! dφ/dt = 2πf₀ (1 − κA² − κ'A'²)              κ = 1/16 for a rigid pendulum; A' belongs to the other mode
+//! d ln A/dt = −σ₀ (1 + λA² + λ'A'²)           a linear damper on a swing of finite size
+//! dA/dt = −(b₀ + b₁A + b₂A²)                  friction, viscous, quadratic (physics.md)
 //! ```
-//! The second is for a picture and a first guess, never to decide: Coulomb friction and quadratic drag together imitate a viscous damper.
+//! The first two give f₀ and ξ₀ at small amplitude. Where the windows are too few or too much alike to tell how amplitude acts, it is bounded by what
+//! hung bodies do: κ = 0.03 ± 0.03 for the slowest mode, 0.4 ± 0.5 for faster ones, κ' = 0 ± 0.1, λ = 0 ± 0.15 and 0 ± 0.5, λ' = 0 ± 0.3 /rad² (one standard deviation)
+//! enter as observations, so that the intervals of f₀ and ξ₀ hold what the data leave open. A fourth power of A is added where the second does not
+//! describe the windows, and half of what it changes is added to the standard deviation for the powers left out.
+//! The third law is for a picture and a first guess, never to decide: Coulomb friction and quadratic drag together imitate a viscous damper.
 
 use nalgebra::{DMatrix, DVector};
 use serde::Serialize;
 
 use super::decay_law::{DecayFit, DecayLaw, Widening};
-use super::estimate::{Estimate, chi_squared_tail};
+use super::estimate::{Estimate, chi_squared_tail, f_tail};
 use super::windows::{Moment, Windows};
 
 /// From here on the frequency within a window is trusted to join it to the next.
@@ -44,7 +49,18 @@ pub struct FrequencyLaw {
     pub f0_hz: Estimate,
     /// κ (1/rad²).
     pub kappa_per_rad2: Estimate,
+    /// Probability that noise alone makes so much dependence on this and the other mode's amplitude; small: the frequency is not constant.
+    pub p_constant: f64,
     /// Probability that the phases scatter so far about the law by noise.
+    pub p_value: f64,
+}
+
+/// ξ = ξ₀ (1 + λA²).
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct DampingLaw {
+    /// Damping ratio at small amplitude.
+    pub xi0: Estimate,
+    /// Probability that the amplitudes scatter so far about the law by noise; small: friction, drag, or another law altogether.
     pub p_value: f64,
 }
 
@@ -61,8 +77,10 @@ pub struct Envelope {
     pub damping_ratio: Estimate,
     /// Probability that the amplitudes scatter so far about an exponential by noise.
     pub p_exponential: f64,
-    /// Frequency against amplitude, from five windows on.
+    /// Frequency against amplitude.
     pub frequency: Option<FrequencyLaw>,
+    /// Damping against amplitude.
+    pub damping: Option<DampingLaw>,
     /// Decay against amplitude, from six windows on.
     pub decay: Option<DecayLaw>,
 }
@@ -90,16 +108,33 @@ impl Envelope {
         let b1 = exponential.estimate(2);
         let omega = (phases[phases.len() - 1] - phases[0]) / (moments[moments.len() - 1].t_s - moments[0].t_s);
         let damping_ratio = b1.map(|s| s / s.hypot(omega), omega * omega / b1.value.hypot(omega).powi(3));
-        let xi = damping_ratio.value;
+        let regression = Regression::of(moments, &others, mode == 0);
+        let frequency = regression.frequency_law(&phases, damping_ratio.value);
+        let natural_rad_s = omega.hypot(b1.value);
         Ok(Self {
             windows: moments.len(),
             window_s: windows.window_s,
             steps: steps(moments, &phases),
             damping_ratio,
             p_exponential: exponential.p_value,
-            frequency: frequency_law(moments, &phases, &others, xi),
+            frequency,
+            damping: regression.damping_law(natural_rad_s),
             decay: DecayLaw::of(moments, &exponential),
         })
+    }
+}
+
+impl Envelope {
+    /// ξ₀; where no linear damper explains the decay, ξ as if there were one, stretched to what the steps show that tell it to a tenth.
+    pub fn small_amplitude_damping(&self) -> Estimate {
+        match self.damping.filter(|law| law.p_value >= 0.01) {
+            Some(law) => law.xi0,
+            None => {
+                let certain = |s: &&Step| s.damping_ratio.sd < 0.1 * s.damping_ratio.value;
+                let steps = self.steps.iter().filter(certain).map(|s| s.damping_ratio.value);
+                steps.fold(self.damping_ratio, |range, xi| range.covering(xi, xi))
+            }
+        }
     }
 }
 
@@ -140,52 +175,155 @@ fn steps(moments: &[Moment], phases: &[f64]) -> Vec<Step> {
     (0..moments.len() - 1).map(pair).collect()
 }
 
-/// φ(t) = φ₀ + Ω (t − κ∫A² − κ'∫A'²), weighted linear least squares.
-fn frequency_law(moments: &[Moment], phases: &[f64], others: &[&[Moment]], xi: f64) -> Option<FrequencyLaw> {
-    let own = squares(moments, moments);
-    let mut columns = vec![own];
-    for other in others {
-        let column = squares(moments, other);
-        let felt = column.last().copied().unwrap_or(0.0) > 0.01 * columns[0].last().copied().unwrap_or(0.0);
-        if felt && moments.len() >= columns.len() + 6 {
-            columns.push(column);
-        }
-    }
-    let free = moments.len().checked_sub(2 + columns.len()).filter(|f| *f > 1)? as f64;
-    let weight = |k: usize| moments[k].amplitude_rad() / moments[k].sd_rad;
-    let basis = DMatrix::from_fn(moments.len(), 2 + columns.len(), |k, j| {
-        weight(k)
-            * match j {
-                0 => 1.0,
-                1 => moments[k].t_s - moments[0].t_s,
-                _ => -columns[j - 2][k],
-            }
-    });
-    let values = DVector::from_fn(moments.len(), |k, _| weight(k) * phases[k]);
-    let fit = basis.clone().svd(true, true).solve(&values, 1e-14).ok()?;
-    let chi2 = (&basis * &fit - &values).norm_squared();
-    let p_value = chi_squared_tail(chi2, free);
-    let scale = Widening::of(chi2, free, p_value);
-    let covariance = basis.tr_mul(&basis).try_inverse()? * scale.variance;
-    let omega = fit[1];
-    let natural = std::f64::consts::TAU * (1.0 - xi * xi).max(1e-9).sqrt();
-    let kappa = fit[2] / omega;
-    let kappa_variance =
-        (covariance[(2, 2)] - 2.0 * kappa * covariance[(1, 2)] + kappa * kappa * covariance[(1, 1)]) / (omega * omega);
-    Some(FrequencyLaw {
-        f0_hz: Estimate::new(omega / natural, covariance[(1, 1)].sqrt() / natural, scale.degrees_of_freedom),
-        kappa_per_rad2: Estimate::new(kappa, kappa_variance.max(0.0).sqrt(), scale.degrees_of_freedom),
-        p_value,
-    })
+/// What is known beforehand of how amplitude acts: mean and standard deviation (1/rad²).
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Bounds {
+    pub kappa: [f64; 2],
+    pub lambda: [f64; 2],
+    /// Standard deviation of the next power's relative effect on frequency and damping (1/rad⁴), as simulated two-rod chains have it.
+    pub fourth: [f64; 2],
 }
 
-/// ∫A² dt from the first of `moments` to each of them, A taken from `source`; zero where `source` has died away.
-fn squares(moments: &[Moment], source: &[Moment]) -> Vec<f64> {
+impl Bounds {
+    /// Of the other mode's amplitude.
+    pub const OTHER: Self = Self { kappa: [0.0, 0.1], lambda: [0.0, 0.3], fourth: [0.0; 2] };
+
+    /// Of the mode's own amplitude.
+    pub fn of(slowest: bool) -> Self {
+        if slowest {
+            Self { kappa: [0.03, 0.03], lambda: [0.0, 0.15], fourth: [1e-3, 0.1] }
+        } else {
+            Self { kappa: [0.4, 0.5], lambda: [0.0, 0.5], fourth: [0.03, 0.5] }
+        }
+    }
+}
+
+/// What stands for a power of an amplitude in a law, with what is known of its coefficient beforehand.
+struct Term {
+    /// ∫A² dt up to each window.
+    integral: Vec<f64>,
+    /// Mean and standard deviation of κ.
+    kappa: [f64; 2],
+    /// Mean and standard deviation of λ.
+    lambda: [f64; 2],
+}
+
+/// Windows against time and amplitudes.
+struct Regression<'a> {
+    moments: &'a [Moment],
+    terms: Vec<Term>,
+    quartic: Term,
+}
+
+/// y = y₀ + r (t + Σ cⱼ∫Aⱼ²).
+struct Slope {
+    rate: f64,
+    coefficients: Vec<f64>,
+    /// Of y₀, r, r c₁, r c₂, …
+    covariance: DMatrix<f64>,
+    degrees_of_freedom: f64,
+    p_value: f64,
+}
+
+impl<'a> Regression<'a> {
+    fn of(moments: &'a [Moment], others: &[&[Moment]], slowest: bool) -> Self {
+        let Bounds { kappa, lambda, .. } = Bounds::of(slowest);
+        let mut terms = vec![Term { integral: powers(moments, moments, 2), kappa, lambda }];
+        terms.extend(others.iter().map(|other| Term {
+            integral: powers(moments, other, 2),
+            kappa: Bounds::OTHER.kappa,
+            lambda: Bounds::OTHER.lambda,
+        }));
+        let quartic = Term { integral: powers(moments, moments, 4), kappa: [0.0, kappa[1]], lambda };
+        Self { moments, terms, quartic }
+    }
+
+    fn frequency_law(&self, phases: &[f64], xi: f64) -> Option<FrequencyLaw> {
+        let slope = self.slope(phases, |term| [-term.kappa[0], term.kappa[1]])?;
+        let natural = std::f64::consts::TAU * (1.0 - xi * xi).max(1e-9).sqrt();
+        let kappa = -slope.coefficients[0];
+        let c = &slope.covariance;
+        // of κ = −(r c)/r
+        let variance = (c[(2, 2)] + 2.0 * kappa * c[(1, 2)] + kappa * kappa * c[(1, 1)]) / slope.rate.powi(2);
+        let terms = slope.coefficients.len();
+        let dependence = DVector::from_iterator(terms, slope.coefficients.iter().map(|k| k * slope.rate));
+        let information = c.view((2, 2), (terms, terms)).into_owned().try_inverse()?;
+        let wald = dependence.dot(&(information * &dependence)) / terms as f64;
+        Some(FrequencyLaw {
+            f0_hz: Estimate::new(slope.rate / natural, c[(1, 1)].sqrt() / natural, slope.degrees_of_freedom),
+            kappa_per_rad2: Estimate::new(kappa, variance.max(0.0).sqrt(), slope.degrees_of_freedom),
+            p_constant: f_tail(wald, terms as f64, slope.degrees_of_freedom),
+            p_value: slope.p_value,
+        })
+    }
+
+    fn damping_law(&self, natural_rad_s: f64) -> Option<DampingLaw> {
+        let logs: Vec<f64> = self.moments.iter().map(|m| m.amplitude_rad().ln()).collect();
+        let slope = self.slope(&logs, |term| term.lambda)?;
+        let sd = slope.covariance[(1, 1)].sqrt() / natural_rad_s;
+        Some(DampingLaw {
+            xi0: Estimate::new(-slope.rate / natural_rad_s, sd, slope.degrees_of_freedom),
+            p_value: slope.p_value,
+        })
+    }
+
+    /// With the fourth power of the amplitude where the second leaves a misfit.
+    fn slope(&self, values: &[f64], prior: fn(&Term) -> [f64; 2]) -> Option<Slope> {
+        let terms: Vec<&Term> = self.terms.iter().collect();
+        let plain = self.least_squares(values, &terms, prior)?;
+        if plain.p_value > 0.05 || self.moments.len() < 6 {
+            return Some(plain);
+        }
+        let with_quartic: Vec<&Term> = terms.into_iter().chain([&self.quartic]).collect();
+        let Some(mut curved) = self.least_squares(values, &with_quartic, prior).filter(|c| c.p_value > plain.p_value)
+        else {
+            return Some(plain);
+        };
+        curved.covariance[(1, 1)] += (0.5 * (curved.rate - plain.rate)).powi(2);
+        Some(curved)
+    }
+
+    /// Weighted least squares, each coefficient's prior being one more observation.
+    fn least_squares(&self, values: &[f64], terms: &[&Term], prior: fn(&Term) -> [f64; 2]) -> Option<Slope> {
+        let (moments, n, k) = (self.moments, self.moments.len(), terms.len());
+        let span_s = moments[n - 1].t_s - moments[0].t_s;
+        let about = (values[n - 1] - values[0]) / span_s;
+        let weight = |row: usize| moments[row].amplitude_rad() / moments[row].sd_rad;
+        let basis = DMatrix::from_fn(n + k, 2 + k, |row, column| match (row < n, column) {
+            (true, 0) => weight(row),
+            (true, 1) => weight(row) * (moments[row].t_s - moments[0].t_s),
+            (true, _) => weight(row) * terms[column - 2].integral[row],
+            (false, _) if column == row - n + 2 => 1.0 / (prior(terms[column - 2])[1] * about).abs(),
+            (false, _) => 0.0,
+        });
+        let wanted = DVector::from_fn(n + k, |row, _| {
+            if row < n {
+                weight(row) * values[row]
+            } else {
+                let [mean, sd] = prior(terms[row - n]);
+                mean * about / (sd * about).abs()
+            }
+        });
+        let fit = basis.clone().svd(true, true).solve(&wanted, 1e-14).ok()?;
+        let chi2 = (&basis * &fit - &wanted).norm_squared();
+        let free = n as f64 - 2.0;
+        let p_value = chi_squared_tail(chi2, free);
+        let widening = Widening::of(chi2, free, p_value);
+        let covariance = basis.tr_mul(&basis).try_inverse()? * widening.variance;
+        let coefficients: Vec<f64> = (0..k).map(|j| fit[2 + j] / fit[1]).collect();
+        let sound = fit.iter().chain(covariance.iter()).all(|v| v.is_finite()) && covariance[(1, 1)] > 0.0;
+        let degrees_of_freedom = widening.degrees_of_freedom;
+        sound.then_some(Slope { rate: fit[1], coefficients, covariance, degrees_of_freedom, p_value })
+    }
+}
+
+/// ∫Aᵖ dt from the first of `moments` to each of them, A taken from `source`; zero where `source` has died away.
+fn powers(moments: &[Moment], source: &[Moment], power: i32) -> Vec<f64> {
     let amplitude = |t: f64| source.iter().find(|m| (m.t_s - t).abs() < 1e-9).map_or(0.0, Moment::amplitude_rad);
     let mut sum = 0.0;
     let mut integral = vec![0.0];
     for pair in moments.windows(2) {
-        let (a, b) = (amplitude(pair[0].t_s).powi(2), amplitude(pair[1].t_s).powi(2));
+        let (a, b) = (amplitude(pair[0].t_s).powi(power), amplitude(pair[1].t_s).powi(power));
         // exponential between the two: the logarithmic mean
         let ratio = if a > 0.0 && b > 0.0 { (a / b).ln() } else { 0.0 };
         let mean = if ratio.abs() > 1e-3 { (a - b) / ratio } else { 0.5 * (a + b) };

@@ -37,6 +37,18 @@ impl Estimate {
         Self { value: function(self.value), sd: (self.sd * slope).abs(), low: a.min(b), high: a.max(b) }
     }
 
+    /// With another, independent standard deviation on top.
+    #[must_use]
+    pub fn blurred(self, sd: f64) -> Self {
+        let wider = |half: f64| half.hypot(student_quantile(1e6) * sd);
+        Self {
+            value: self.value,
+            sd: self.sd.hypot(sd),
+            low: self.value - wider(self.value - self.low),
+            high: self.value + wider(self.high - self.value),
+        }
+    }
+
     /// The interval stretched to hold these values, too.
     #[must_use]
     pub fn covering(self, low: f64, high: f64) -> Self {
@@ -63,6 +75,15 @@ pub fn chi_squared_tail(value: f64, degrees_of_freedom: f64) -> f64 {
 /// Probability that F exceeds the value.
 pub fn f_tail(value: f64, numerator: f64, denominator: f64) -> f64 {
     FisherSnedecor::new(numerator, denominator).map_or(1.0, |d| d.sf(value.max(0.0)))
+}
+
+/// A probability as a person reads it: `p = 0.03`, `p < 1e-12`.
+pub fn probability(p: f64) -> String {
+    match p {
+        p if p < 1e-12 => "p < 1e-12".to_owned(),
+        p if p < 1e-2 => format!("p = {p:.0e}"),
+        p => format!("p = {p:.2}"),
+    }
 }
 
 #[cfg(test)]

@@ -10,6 +10,9 @@ use crate::model::chain::Chain;
 /// First zero of the Bessel function J₀.
 const BESSEL_ZERO: f64 = 2.404_825_557_695_773;
 
+/// How far below the floor a frequency must lie, relative to it, before anything is called wrong: a length stated to 1 %.
+const TOLERANCE: f64 = 0.005;
+
 /// The lowest frequency that a specimen can have, and whether the measured one respects it.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Floor {
@@ -19,7 +22,7 @@ pub struct Floor {
     pub floor_hz: f64,
     /// The rigid strip of the same length, for a strip.
     pub rigid_hz: Option<f64>,
-    /// Whether the whole 95 % interval lies below the floor.
+    /// Whether the whole 95 % interval lies below the floor by more than 0.5 %, which a length stated to 1 % explains.
     pub below: bool,
     /// What would mend it.
     pub remedy: Option<Remedy>,
@@ -53,13 +56,19 @@ impl Floor {
         } else {
             ("the given links with free joints", lowest_chain_hz(chain, gravity_m_s2), None)
         };
-        let below = frequency_hz.high < floor_hz;
+        let below = frequency_hz.high < floor_hz * (1.0 - TOLERANCE);
         let ratio = frequency_hz.value / floor_hz;
         let remedy = below.then(|| Remedy { time: ratio, length: ratio.powi(-2), gravity: ratio.powi(2) });
         let statement = match remedy {
             Some(r) => format!(
                 "{:.4} Hz is below the floor of {floor_hz:.4} Hz ({body}): time base, length or gravity is wrong; mended by time × {:.3}, or length × {:.3}, or gravity × {:.3}",
                 frequency_hz.value, r.time, r.length, r.gravity
+            ),
+            None if frequency_hz.high < floor_hz => format!(
+                "{:.4} Hz is {:.2} % below the floor of {floor_hz:.4} Hz ({body}): no more than an error of {:.2} % in length or gravity",
+                frequency_hz.value,
+                100.0 * (1.0 - ratio),
+                100.0 * (ratio.powi(-2) - 1.0)
             ),
             None => format!("{:.4} Hz respects the floor of {floor_hz:.4} Hz ({body})", frequency_hz.value),
         };

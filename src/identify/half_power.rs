@@ -10,7 +10,9 @@
 //! ```
 //! A long record (σT ≫ 1) shows the width 2σ of Eq. 28; a short one shows about 0.89/T, whatever the damping. σ is solved from the measured
 //! width by the formula above, so that the record's end does not pass for damping, and the literal Eq. 28 stands beside it. Where less than
-//! half of the width is the motion's own, the method cannot tell damping from the record's end and says so.
+//! half of the width is the motion's own, the method cannot tell damping from the record's end and says so. The line's mirror image at −ω_d reaches
+//! into it with a relative amplitude of σ/2ω = ξ/2 and a phase that nobody knows: an uncertainty of ξ of about ξ, of f about ξ²/2, which
+//! the intervals hold.
 
 use nalgebra::Complex;
 use serde::Serialize;
@@ -18,6 +20,7 @@ use serde::Serialize;
 use super::estimate::Estimate;
 use super::signal::Signal;
 use super::sinusoids::Pole;
+use super::spectrum::{Window, line_sd_hz};
 
 /// Width at half power, in 1/T, of a steady oscillation cut off by the record.
 const CUT_OFF_WIDTH: f64 = 0.8859;
@@ -45,7 +48,8 @@ impl HalfPower {
     pub fn of(signal: &Signal, near: Pole, noise_rad: &[f64]) -> Result<Self, String> {
         let duration_s = signal.duration_s();
         let resolution_hz = 1.0 / duration_s;
-        let power = |f_hz: f64| line_power(signal, f_hz);
+        let cells: Vec<Vec<f64>> = signal.links.iter().map(|l| l.cells(signal.step_s)).collect();
+        let power = |f_hz: f64| line_power(signal, &cells, f_hz);
         let near_hz = near.omega_rad_s / std::f64::consts::TAU;
         let reach_hz = resolution_hz.max(2.0 * near.decay_per_s.abs() / std::f64::consts::TAU);
         let peak_hz = maximum(&power, near_hz - reach_hz, near_hz + reach_hz);
@@ -69,11 +73,14 @@ impl HalfPower {
         let noise2: f64 = signal.links.iter().zip(noise_rad).map(|(l, s)| 0.5 * s * s * l.t_s.len() as f64).sum();
         let relative = (noise2 / signal.links.len() as f64 / power(peak_hz)).sqrt();
         let stretch = width_hz / own_hz;
-        let damping = Estimate::new(decay / natural_rad_s, decay / natural_rad_s * 2.5 * relative * stretch, 1e6);
-        let frequency_sd_hz = own_hz * 1.5 * relative * stretch;
+        let (ratio, literal) = (decay / natural_rad_s, std::f64::consts::PI * width_hz / natural_rad_s);
+        let damping = Estimate::new(ratio, ratio * (2.5 * relative * stretch).hypot(ratio), 1e6);
+        let frequency_sd_hz = line_sd_hz(signal, Window::Flat, peak_hz, noise_rad)
+            .unwrap_or(own_hz)
+            .hypot(0.4 * literal * literal * peak_hz);
         Ok(Self {
             width_hz,
-            damping_ratio_literal: std::f64::consts::PI * width_hz / natural_rad_s,
+            damping_ratio_literal: literal,
             damping_ratio: damping,
             frequency_hz: Estimate::new(natural_rad_s / std::f64::consts::TAU, frequency_sd_hz, 1e6),
         })
@@ -81,16 +88,12 @@ impl HalfPower {
 }
 
 /// |X(f)|² over the true time stamps, each sample standing for the time around it, summed over the links.
-fn line_power(signal: &Signal, f_hz: f64) -> f64 {
+fn line_power(signal: &Signal, cells: &[Vec<f64>], f_hz: f64) -> f64 {
     let omega = std::f64::consts::TAU * f_hz;
-    let each = signal.links.iter().map(|link| {
-        let x: Complex<f64> = link
-            .t_s
-            .iter()
-            .zip(&link.theta_rad)
-            .map(|(t, a)| Complex::from_polar(*a, -omega * (t - signal.span_s[0])))
-            .sum();
-        x.norm_sqr()
+    let each = signal.links.iter().zip(cells).map(|(link, cells)| {
+        let samples = link.t_s.iter().zip(&link.theta_rad).zip(cells);
+        let turned = samples.map(|((t, a), cell)| Complex::from_polar(a * cell, -omega * (t - signal.span_s[0])));
+        turned.sum::<Complex<f64>>().norm_sqr()
     });
     each.sum()
 }

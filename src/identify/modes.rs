@@ -2,7 +2,7 @@
 
 use serde::Serialize;
 
-use super::estimate::f_tail;
+use super::estimate::{f_tail, probability};
 use super::pencil::matrix_pencil;
 use super::signal::Signal;
 use super::sinusoids::{Pole, SinusoidFit};
@@ -84,9 +84,13 @@ fn decide(signal: &Signal, spectrum: &Spectrum, one: SinusoidFit, two: SinusoidF
             times
         )
     } else if modes == 2 {
-        format!("two modes: the second lowers the information criterion by {bic_gain:.0} (p = {p_value:.1e})")
+        format!("two modes: the second lowers the information criterion by {bic_gain:.0} ({})", probability(p_value))
     } else {
-        format!("one mode; a second would change the information criterion by {:.0} (p = {p_value:.2})", -bic_gain)
+        format!(
+            "one mode; a second would change the information criterion by {:.0} ({})",
+            -bic_gain,
+            probability(p_value)
+        )
     };
     let count = ModeCount { modes, bic_gain: Some(bic_gain), p_value: Some(p_value), statement };
     (if modes == 2 { sorted(two, signal) } else { one }, count)

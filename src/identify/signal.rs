@@ -2,6 +2,9 @@
 
 use crate::series::AngleSeries;
 
+/// Longest distance between neighbours, in median steps, that is interpolated across.
+pub const BRIDGE_STEPS: f64 = 3.05;
+
 /// What was measured of one link.
 #[derive(Debug, Clone, PartialEq)]
 pub struct LinkSamples {
@@ -15,6 +18,63 @@ impl LinkSamples {
     /// Mean angle.
     pub fn mean_rad(&self) -> f64 {
         self.theta_rad.iter().sum::<f64>() / self.theta_rad.len().max(1) as f64
+    }
+
+    /// The time each sample stands for, half of that to its neighbours, in median steps: the weights that make a sum an integral. At the
+    /// edge of a gap half a step at most is added.
+    pub fn cells(&self, step_s: f64) -> Vec<f64> {
+        let half = |from: Option<&f64>, to: Option<&f64>| match (from, to) {
+            (Some(from), Some(to)) if to - from <= BRIDGE_STEPS * step_s => 0.5 * (to - from) / step_s,
+            _ => 0.5,
+        };
+        let cell = |k: usize| {
+            let before = k.checked_sub(1).and_then(|b| self.t_s.get(b));
+            half(before, self.t_s.get(k)) + half(self.t_s.get(k), self.t_s.get(k + 1))
+        };
+        (0..self.t_s.len()).map(cell).collect()
+    }
+
+    /// The cubic through the four nearest samples, or `None` in a gap.
+    pub fn interpolated(&self, t_s: f64, longest_s: f64) -> Option<f64> {
+        let n = self.t_s.len();
+        let after = self.t_s.partition_point(|t| *t < t_s);
+        if self.t_s.get(after).is_some_and(|t| t - t_s < 1e-6 * longest_s) {
+            return Some(self.theta_rad[after]);
+        }
+        if n == 0 {
+            return None;
+        }
+        if after == 0 || after >= n {
+            // the grid's last point may lie a rounding beyond the last sample
+            let nearest = after.min(n - 1);
+            return ((self.t_s[nearest] - t_s).abs() < 0.2 * longest_s).then(|| self.theta_rad[nearest]);
+        }
+        if self.t_s[after] - self.t_s[after - 1] > longest_s {
+            return None;
+        }
+        let from = after.saturating_sub(2).min(n.saturating_sub(4));
+        let (t, a) = (&self.t_s[from..(from + 4).min(n)], &self.theta_rad[from..(from + 4).min(n)]);
+        let weight = |i: usize| (0..t.len()).filter(|j| *j != i).map(|j| (t_s - t[j]) / (t[i] - t[j])).product::<f64>();
+        Some((0..t.len()).map(|i| a[i] * weight(i)).sum())
+    }
+
+    /// With samples interpolated into gaps of a missing frame or two, so that a sum over the samples does not take gaps for noise.
+    fn bridged(&self, step_s: f64) -> Self {
+        let mut filled = Self { t_s: Vec::new(), theta_rad: Vec::new() };
+        for (k, (t, a)) in self.t_s.iter().zip(&self.theta_rad).enumerate() {
+            filled.t_s.push(*t);
+            filled.theta_rad.push(*a);
+            let Some(next) = self.t_s.get(k + 1) else { break };
+            let steps = ((next - t) / step_s).round();
+            if next - t <= BRIDGE_STEPS * step_s {
+                let between = (1..steps as usize).map(|j| t + (next - t) * j as f64 / steps);
+                for (t, a) in between.filter_map(|t| Some((t, self.interpolated(t, BRIDGE_STEPS * step_s)?))) {
+                    filled.t_s.push(t);
+                    filled.theta_rad.push(a);
+                }
+            }
+        }
+        filled
     }
 }
 
@@ -59,6 +119,13 @@ impl Signal {
             LinkSamples { t_s: link.t_s[from..until].to_vec(), theta_rad: link.theta_rad[from..until].to_vec() }
         };
         Self { links: self.links.iter().map(part).collect(), span_s: [from_s, until_s], step_s: self.step_s }
+    }
+
+    /// With gaps of a missing frame or two filled by interpolation: for sums over the samples, never for least squares.
+    #[must_use]
+    pub fn bridged(&self) -> Self {
+        let links = self.links.iter().map(|l| l.bridged(self.step_s)).collect();
+        Self { links, span_s: self.span_s, step_s: self.step_s }
     }
 
     /// The same time stamps with other values, for example residuals.

@@ -12,16 +12,21 @@ use rustfft::FftPlanner;
 use serde::Serialize;
 
 use super::estimate::Estimate;
-use super::signal::{LinkSamples, Signal};
+use super::signal::{BRIDGE_STEPS, LinkSamples, Signal};
 
 /// Least ratio of the padded length to the record.
 const PADDING: usize = 4;
-/// Longest distance between neighbours, in median steps, that the grid is filled across.
-const BRIDGE_STEPS: f64 = 3.0;
 /// Main lobe of the Hann window from zero to zero, in 1/T.
 const HANN_LOBE: f64 = 4.0;
 /// Width of the Hann window's main lobe at half power, in 1/T.
 const HANN_HALF_POWER: f64 = 1.44;
+
+/// How samples are weighted over the record; an offset is taken away only with the Hann window.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Window {
+    Hann,
+    Flat,
+}
 
 /// A peak of the spectrum.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
@@ -88,6 +93,16 @@ impl Spectrum {
         spectrum
     }
 
+    /// The maximum of a signal's windowed sum near a frequency, with the interval that this noise of each link gives it; `None` where there is
+    /// no maximum.
+    pub fn line(signal: &Signal, near_hz: f64, noise_rad: &[f64]) -> Option<Estimate> {
+        let resolution_hz = 1.0 / signal.duration_s();
+        let (frequency_hz, _) = refine(signal, near_hz, resolution_hz);
+        let inside = (frequency_hz - near_hz).abs() < 0.49 * resolution_hz;
+        let sd_hz = line_sd_hz(signal, Window::Hann, frequency_hz, noise_rad).filter(|_| inside)?;
+        Some(Estimate::new(frequency_hz, sd_hz, 1e6))
+    }
+
     fn find_peaks(&self, signal: &Signal, power: &[f64]) -> Vec<Peak> {
         let lobe = (0.5 * HANN_LOBE * self.resolution_hz / self.step_hz).round() as usize;
         let first = (1.5 * self.resolution_hz / self.step_hz).ceil() as usize;
@@ -100,10 +115,13 @@ impl Spectrum {
         found.sort_by(|a, b| power[*b].total_cmp(&power[*a]));
         found.truncate(8);
         // the median of a sum of n exponentials is its mean times about 1 − 1/3n
-        let noise_power = floor / (1.0 - 1.0 / (3.0 * signal.links.len() as f64));
+        let links = signal.links.len() as f64;
+        let noise_power = floor / (1.0 - 1.0 / (3.0 * links)) / links;
+        let noise_rad: Vec<f64> = signal.links.iter().map(|link| noise_of_power(link, signal, noise_power)).collect();
         let peak = |k: &usize| {
             let refined = refine(signal, *k as f64 * self.step_hz, self.resolution_hz);
-            let sd_hz = line_sd_hz(signal, refined.0, noise_power);
+            // what is not a line is known to half the resolution
+            let sd_hz = line_sd_hz(signal, Window::Hann, refined.0, &noise_rad).unwrap_or(0.25 * self.resolution_hz);
             Peak {
                 frequency_hz: Estimate::new(refined.0, sd_hz, 1e6),
                 amplitude_rad: refined.1,
@@ -122,6 +140,11 @@ impl Spectrum {
     }
 }
 
+/// The Hann window at each sample times the share of time that the sample stands for.
+fn weights(link: &LinkSamples, signal: &Signal) -> Vec<f64> {
+    link.cells(signal.step_s).iter().zip(&link.t_s).map(|(cell, t)| cell * hann(signal, *t)).collect()
+}
+
 /// The Hann window of a signal at an instant.
 fn hann(signal: &Signal, t_s: f64) -> f64 {
     let phase = (t_s - signal.span_s[0]) / signal.duration_s().max(f64::MIN_POSITIVE);
@@ -135,7 +158,7 @@ fn windowed_grid(link: &LinkSamples, signal: &Signal, points: usize) -> (Vec<Com
     let mut grid = Vec::with_capacity(points);
     for k in 0..points {
         let t = signal.span_s[0] + k as f64 * signal.step_s;
-        let value = match interpolate(link, t, BRIDGE_STEPS * signal.step_s) {
+        let value = match link.interpolated(t, BRIDGE_STEPS * signal.step_s) {
             Some(theta) => {
                 let w = hann(signal, t);
                 weight += w;
@@ -152,49 +175,24 @@ fn windowed_grid(link: &LinkSamples, signal: &Signal, points: usize) -> (Vec<Com
 }
 
 fn weighted_mean(link: &LinkSamples, signal: &Signal) -> f64 {
-    let (sum, weight) = link.t_s.iter().zip(&link.theta_rad).fold((0.0, 0.0), |(s, v), (t, a)| {
-        let w = hann(signal, *t);
-        (s + w * a, v + w)
-    });
-    sum / weight.max(f64::MIN_POSITIVE)
-}
-
-/// The cubic through the four nearest samples, or `None` in a gap.
-fn interpolate(link: &LinkSamples, t_s: f64, longest_s: f64) -> Option<f64> {
-    let n = link.t_s.len();
-    let after = link.t_s.partition_point(|t| *t < t_s);
-    if link.t_s.get(after).is_some_and(|t| t - t_s < 1e-6 * longest_s) {
-        return Some(link.theta_rad[after]);
-    }
-    if after == 0 || after >= n {
-        // the grid's last point may lie a rounding beyond the last sample
-        let nearest = after.min(n - 1);
-        return ((link.t_s[nearest] - t_s).abs() < 0.2 * longest_s).then(|| link.theta_rad[nearest]);
-    }
-    if link.t_s[after] - link.t_s[after - 1] > longest_s {
-        return None;
-    }
-    let from = after.saturating_sub(2).min(n.saturating_sub(4));
-    let (t, a) = (&link.t_s[from..(from + 4).min(n)], &link.theta_rad[from..(from + 4).min(n)]);
-    let weight = |i: usize| (0..t.len()).filter(|j| *j != i).map(|j| (t_s - t[j]) / (t[i] - t[j])).product::<f64>();
-    Some((0..t.len()).map(|i| a[i] * weight(i)).sum())
+    let weights = weights(link, signal);
+    let sum: f64 = weights.iter().zip(&link.theta_rad).map(|(w, a)| w * a).sum();
+    sum / weights.iter().sum::<f64>().max(f64::MIN_POSITIVE)
 }
 
 /// The maximum of the windowed sum on the true time stamps near a frequency, with the amplitude there: golden-section search.
 fn refine(signal: &Signal, near_hz: f64, resolution_hz: f64) -> (f64, f64) {
-    let means: Vec<f64> = signal.links.iter().map(|l| weighted_mean(l, signal)).collect();
+    let links: Vec<(&LinkSamples, Vec<f64>, f64)> =
+        signal.links.iter().map(|link| (link, weights(link, signal), weighted_mean(link, signal))).collect();
     let power = |f_hz: f64| {
-        let each = signal.links.iter().zip(&means);
-        each.map(|(link, mean)| {
-            let (mut x, mut weight) = (Complex::new(0.0, 0.0), 0.0);
-            for (t, a) in link.t_s.iter().zip(&link.theta_rad) {
-                let w = hann(signal, *t);
-                x += Complex::from_polar(w * (a - mean), -std::f64::consts::TAU * f_hz * (t - signal.span_s[0]));
-                weight += w;
-            }
-            (2.0 / weight).powi(2) * x.norm_sqr()
-        })
-        .sum::<f64>()
+        let each = links.iter().map(|(link, weights, mean)| {
+            let samples = link.t_s.iter().zip(&link.theta_rad).zip(weights);
+            let turned = samples.map(|((t, a), w)| {
+                Complex::from_polar(w * (a - mean), -std::f64::consts::TAU * f_hz * (t - signal.span_s[0]))
+            });
+            turned.sum::<Complex<f64>>().norm_sqr() * (2.0 / weights.iter().sum::<f64>()).powi(2)
+        });
+        each.sum::<f64>()
     };
     let golden = 0.5 * (5f64.sqrt() - 1.0);
     let (mut low, mut high) = (near_hz - 0.5 * resolution_hz, near_hz + 0.5 * resolution_hz);
@@ -221,30 +219,37 @@ fn refine(signal: &Signal, near_hz: f64, resolution_hz: f64) -> (f64, f64) {
 /// δω = s √(½ Σ w²(t−t̄)²) / (|X| V),   t̄ = Re(X₁/X),  V = Re(X₂/X) − t̄²,   Xₖ = Σ w tᵏ θ e^{−iωt}
 /// ```
 /// V is the spread in time of the windowed oscillation, so that damping is allowed for. With a flat window and no damping it is the Cramér–Rao
-/// bound √24 s/(A√N T). A noise of variance s² has the mean power 4 s² Σw²/(Σw)² on the spectrum's scale.
-fn line_sd_hz(signal: &Signal, f_hz: f64, noise_power: f64) -> f64 {
+/// bound √24 s/(A√N T). `None` where the curvature has the wrong sign: no single line.
+pub(super) fn line_sd_hz(signal: &Signal, window: Window, f_hz: f64, noise_rad: &[f64]) -> Option<f64> {
     let (mut variance, mut curvature) = (0.0, 0.0);
-    for link in &signal.links {
-        let mean = weighted_mean(link, signal);
+    for (link, noise_rad) in signal.links.iter().zip(noise_rad) {
+        let (weights, mean) = match window {
+            Window::Hann => (weights(link, signal), weighted_mean(link, signal)),
+            Window::Flat => (link.cells(signal.step_s), 0.0),
+        };
         let mut moments = [Complex::new(0.0, 0.0); 3];
-        let (mut w1, mut w2) = (0.0, [0.0; 3]);
-        for (t, a) in link.t_s.iter().zip(&link.theta_rad) {
-            let (w, tau) = (hann(signal, *t), t - signal.span_s[0]);
+        let mut squares = [0.0; 3];
+        for ((t, a), w) in link.t_s.iter().zip(&link.theta_rad).zip(weights) {
+            let tau = t - signal.span_s[0];
             let x = Complex::from_polar(w * (a - mean), -std::f64::consts::TAU * f_hz * tau);
-            let powers = [1.0, tau, tau * tau];
-            w1 += w;
-            for k in 0..3 {
-                moments[k] += x * powers[k];
-                w2[k] += w * w * powers[k];
+            for (k, power) in [1.0, tau, tau * tau].into_iter().enumerate() {
+                moments[k] += x * power;
+                squares[k] += w * w * power;
             }
         }
         let centre = (moments[1] / moments[0]).re;
         let spread = (moments[2] / moments[0]).re - centre * centre;
-        let noise2 = noise_power / signal.links.len() as f64 * w1 * w1 / (4.0 * w2[0]);
-        variance += moments[0].norm_sqr() * 0.5 * noise2 * (w2[2] - 2.0 * centre * w2[1] + centre * centre * w2[0]);
+        let lever = squares[2] - 2.0 * centre * squares[1] + centre * centre * squares[0];
+        variance += moments[0].norm_sqr() * 0.5 * noise_rad * noise_rad * lever;
         curvature += moments[0].norm_sqr() * spread;
     }
-    variance.max(0.0).sqrt() / curvature.max(f64::MIN_POSITIVE) / std::f64::consts::TAU
+    (curvature > 0.0).then(|| variance.max(0.0).sqrt() / curvature / std::f64::consts::TAU)
+}
+
+/// s of white noise whose mean power on the spectrum's scale is 4 s² Σw²/(Σw)².
+fn noise_of_power(link: &LinkSamples, signal: &Signal, power: f64) -> f64 {
+    let (sum, squares) = weights(link, signal).iter().fold((0.0, 0.0), |(s, q), w| (s + w, q + w * w));
+    (power * sum * sum / (4.0 * squares.max(f64::MIN_POSITIVE))).sqrt()
 }
 
 fn median(values: &[f64]) -> f64 {

@@ -4,7 +4,7 @@
 
 use nalgebra::Complex;
 
-use super::signal::Signal;
+use super::signal::{LinkSamples, Signal};
 use super::sinusoids::{Pole, SinusoidFit};
 
 /// Cycles of the slowest mode in a window.
@@ -45,13 +45,15 @@ pub struct Windows {
     pub shapes: Vec<Vec<Complex<f64>>>,
     /// Standard deviation of the real and imaginary part of each.
     pub shape_sd: Vec<Vec<f64>>,
+    /// In the order of time; a window without a sound fit is left out.
+    fits: Vec<SinusoidFit>,
 }
 
 impl Windows {
     /// Cuts a signal into windows and fits these modes in each.
     ///
     /// # Errors
-    /// In words, when there are fewer than three windows.
+    /// In words, when there are fewer than three windows, or fewer than three can be fitted.
     pub fn of(signal: &Signal, fit: &SinusoidFit) -> Result<Self, String> {
         let slowest = fit.poles.iter().map(|p| p.omega_rad_s).fold(f64::INFINITY, f64::min);
         let cycles = signal.duration_s() * slowest / std::f64::consts::TAU;
@@ -76,9 +78,23 @@ impl Windows {
                 fits.push(local);
             }
         }
+        if fits.len() < 3 {
+            return Err(format!(
+                "only {} of {count:.0} windows hold enough samples and a clear oscillation",
+                fits.len()
+            ));
+        }
         let noise_rad: Vec<f64> = (0..signal.links.len()).map(|link| pooled_noise(&fits, link)).collect();
+        fits.iter_mut().for_each(|local| share_noise(local, &noise_rad));
         let modes = fit.poles.len();
-        let mut windows = Self { window_s, moments: Vec::new(), noise_rad, shapes: Vec::new(), shape_sd: Vec::new() };
+        let mut windows = Self {
+            window_s,
+            moments: Vec::new(),
+            noise_rad,
+            shapes: Vec::new(),
+            shape_sd: Vec::new(),
+            fits: Vec::new(),
+        };
         for mode in 0..modes {
             let local: Vec<&SinusoidFit> = fits.iter().filter(|f| f.poles.len() > mode).collect();
             let (shape, sd) = shape(&local, fit, mode);
@@ -86,7 +102,32 @@ impl Windows {
             windows.shapes.push(shape);
             windows.shape_sd.push(sd);
         }
+        windows.fits = fits;
         Ok(windows)
+    }
+
+    /// The signal with the offset and every mode but one taken away as each window shows them; samples outside every window are left out.
+    #[must_use]
+    pub fn isolate(&self, signal: &Signal, whole: &SinusoidFit, mode: usize) -> Signal {
+        let empty = LinkSamples { t_s: Vec::new(), theta_rad: Vec::new() };
+        let links = vec![empty; signal.links.len()];
+        let mut alone = Signal { links, span_s: signal.span_s, step_s: signal.step_s };
+        for fit in self.fits.iter().filter(|f| f.poles.len() > mode) {
+            let from_s = fit.origin_s - 0.5 * self.window_s;
+            let last = fit.origin_s + self.window_s > signal.span_s[1];
+            let until_s = from_s + self.window_s + if last { signal.step_s } else { 0.0 };
+            // the offset of a short window is none of its own: the whole record's serves better
+            let mut local = fit.clone();
+            for (link, whole) in local.links.iter_mut().zip(&whole.links) {
+                link.offset_rad = whole.offset_rad;
+            }
+            let part = local.isolate(&signal.between(from_s, until_s), mode);
+            for (link, part) in alone.links.iter_mut().zip(part.links) {
+                link.t_s.extend(part.t_s);
+                link.theta_rad.extend(part.theta_rad);
+            }
+        }
+        alone
     }
 }
 
@@ -107,12 +148,19 @@ fn window_fit(window: &Signal, origin_s: f64, previous: &[Pole], whole: &[Pole])
     (1..=whole.len()).rev().filter_map(best).find(clear)
 }
 
+/// Takes the pooled noise for a window's own where the two differ by no more than chance: the pooled one is better known.
+fn share_noise(fit: &mut SinusoidFit, pooled_rad: &[f64]) {
+    for (link, pooled) in fit.links.iter_mut().zip(pooled_rad) {
+        let ratio = pooled / link.noise_rad;
+        if (0.8..1.4).contains(&ratio) {
+            link.amplitude_sd_rad.iter_mut().for_each(|sd| *sd *= ratio);
+        }
+    }
+}
+
 fn pooled_noise(fits: &[SinusoidFit], link: usize) -> f64 {
     // the median is not drawn up by the first, largest swings, where a sinusoid fits worst
     let mut noises: Vec<f64> = fits.iter().map(|f| f.links[link].noise_rad).collect();
-    if noises.is_empty() {
-        return f64::NAN;
-    }
     let middle = noises.len() / 2;
     *noises.select_nth_unstable_by(middle, f64::total_cmp).1
 }

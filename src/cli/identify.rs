@@ -1,0 +1,93 @@
+//! `freeswing identify`: frequencies and damping without a model.
+
+use std::path::PathBuf;
+
+use crate::error::{Error, Result};
+use crate::experiment::Experiment;
+use crate::identify::identify;
+use crate::output::OutputFile;
+use crate::series::AngleSeries;
+
+/// Find frequencies, damping and mode shapes in a table of angles, every estimator side by side.
+#[derive(Debug, clap::Args)]
+#[command(after_help = "\
+Examples:
+  freeswing identify angles.csv
+  freeswing identify angles.csv --config experiment.toml --json identified.json
+  freeswing identify angles.csv --from 35
+  track swing.mp4 --out - | freeswing identify -
+
+The table needs t_s and theta1_rad, theta2_rad, …; other columns are ignored, an empty field is a missing value. With
+--config come the frequency floor of the specimen and K_eq, C_eq. All intervals are 95 %. Exit code 0: done, also
+when something is not identifiable; 2: bad input, nothing written.")]
+pub struct IdentifyArgs {
+    /// The table of angles; `-` for standard input.
+    angles: PathBuf,
+    /// The experiment: specimen and gravity.
+    #[arg(long, value_name = "TOML")]
+    config: Option<PathBuf>,
+    /// Everything as JSON; `-` for standard output, instead of the table.
+    #[arg(long, value_name = "FILE")]
+    json: Option<PathBuf>,
+    /// Leave out what comes before this time.
+    #[arg(long, value_name = "S", allow_negative_numbers = true)]
+    from: Option<f64>,
+    /// Leave out what comes from this time on.
+    #[arg(long, value_name = "S", allow_negative_numbers = true)]
+    until: Option<f64>,
+    /// Print nothing.
+    #[arg(long)]
+    quiet: bool,
+}
+
+impl IdentifyArgs {
+    /// Runs the command.
+    ///
+    /// # Errors
+    /// One line: what, where, what to do.
+    pub fn run(&self) -> Result<()> {
+        let experiment = self.config.as_deref().map(Experiment::read).transpose()?;
+        self.keep_inputs()?;
+        let json = self.json.as_deref().map(OutputFile::create).transpose()?;
+        let series = self.stretch(AngleSeries::read(&self.angles)?)?;
+        let found = identify(&series, experiment.as_ref())?;
+        if let Some(json) = json {
+            let mut text = serde_json::to_string_pretty(&found)
+                .map_err(|e| Error::Option { option: "--json".to_owned(), message: e.to_string() })?;
+            text.push('\n');
+            json.commit(text.as_bytes())?;
+        }
+        let table_wanted = !self.quiet && self.json.as_ref().is_none_or(|path| path.as_os_str() != "-");
+        if table_wanted {
+            print!("{found}");
+        }
+        Ok(())
+    }
+
+    /// The wanted stretch of time.
+    fn stretch(&self, series: AngleSeries) -> Result<AngleSeries> {
+        if self.from.is_none() && self.until.is_none() {
+            return Ok(series);
+        }
+        let rows = series.rows(self.from.unwrap_or(f64::NEG_INFINITY), self.until.unwrap_or(f64::INFINITY));
+        let [first, last] = [series.t_s[0], series.t_s[series.len() - 1]];
+        series.slice(rows).checked().map_err(|error| match error {
+            Error::Table { message, .. } => Error::Option {
+                option: "--from, --until".to_owned(),
+                message: format!("the stretch {message} (the table runs from {first} s to {last} s)"),
+            },
+            other => other,
+        })
+    }
+
+    /// The output may not take the place of an input.
+    fn keep_inputs(&self) -> Result<()> {
+        let same = |a: &PathBuf, b: &PathBuf| a.canonicalize().is_ok_and(|a| b.canonicalize().is_ok_and(|b| a == b));
+        let Some(json) = &self.json else { return Ok(()) };
+        if [Some(&self.angles), self.config.as_ref()].into_iter().flatten().any(|input| same(input, json)) {
+            let message = format!("{} is an input and would be overwritten; use another name", json.display());
+            return Err(Error::Option { option: "--json".to_owned(), message });
+        }
+        Ok(())
+    }
+}

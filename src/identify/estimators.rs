@@ -1,0 +1,287 @@
+//! Every estimator of one mode side by side, and which one to take.
+
+use nalgebra::Complex;
+use serde::Serialize;
+
+use super::consistency::Consistency;
+use super::decrement::Decrement;
+use super::envelope::{Bounds, Envelope};
+use super::estimate::{Estimate, chi_squared_tail};
+use super::half_power::HalfPower;
+use super::signal::Signal;
+use super::sinusoids::SinusoidFit;
+use super::spectrum::Spectrum;
+use super::windows::Windows;
+
+/// A way to a frequency or a damping ratio.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Method {
+    /// Peak of the amplitude spectrum.
+    Spectrum,
+    /// Bandwidth at half power.
+    HalfPower,
+    /// Logarithmic decrement over all peaks.
+    Decrement,
+    /// Damped sinusoids over the whole record.
+    Sinusoids,
+    /// Amplitudes and phases of windows; frequency and damping at small amplitude.
+    Envelope,
+}
+
+/// What one method says.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Estimator {
+    /// Which.
+    pub method: Method,
+    /// Undamped natural frequency.
+    pub frequency_hz: Option<Estimate>,
+    /// ξ.
+    pub damping_ratio: Option<Estimate>,
+    /// Why a number is absent, or what to know about it.
+    pub note: Option<String>,
+}
+
+/// What all modes share.
+pub(super) struct Whole<'a> {
+    pub signal: &'a Signal,
+    pub spectrum: &'a Spectrum,
+    pub fit: &'a SinusoidFit,
+    pub windows: &'a Result<Windows, String>,
+    pub noise_rad: &'a [f64],
+}
+
+/// What every method says about one mode.
+pub(super) struct Estimators {
+    pub each: Vec<Estimator>,
+    /// Frequency and damping of the damped sinusoids, as noise alone has them.
+    pub raw: [Estimate; 2],
+    /// By how much the residual near the mode exceeds white noise, in power.
+    pub residual_excess: f64,
+}
+
+/// What to take.
+pub(super) struct Choice {
+    pub frequency_hz: Estimate,
+    pub damping_ratio: Estimate,
+    pub basis: String,
+}
+
+impl Estimators {
+    pub fn of(whole: &Whole, mode: usize, envelope: &Result<Envelope, String>) -> Self {
+        let fit = whole.fit;
+        let residual = fit.residuals(whole.signal);
+        let excess: Vec<f64> = fit.poles.iter().map(|p| residual_excess(&residual, p.omega_rad_s)).collect();
+        // where the whole record is no sum of damped sinusoids, the other modes are taken away window by window
+        let alone = match whole.windows {
+            Ok(windows) if excess.iter().any(|e| *e > 1.0) => windows.isolate(whole.signal, fit, mode),
+            _ => fit.isolate(whole.signal, mode),
+        };
+        let filled = alone.bridged();
+        let raw = [fit.frequency_hz(mode), fit.damping_ratio(mode)];
+        let each = vec![
+            spectral(whole, &filled, mode, raw[1].value),
+            half_power(whole, &filled, mode),
+            decrement(whole, &alone, mode),
+            sinusoids(raw, excess[mode], envelope.as_ref().ok()),
+            windowed(envelope),
+        ];
+        Self { each, raw, residual_excess: excess[mode] }
+    }
+
+    /// Whether the methods agree, the damped sinusoids entering with this value.
+    pub fn compare(&self, own: Estimate, quantity: fn(&Estimator) -> Option<Estimate>) -> Option<Consistency> {
+        let others = self.each.iter().filter(|e| e.method != Method::Sinusoids).filter_map(quantity);
+        Consistency::of(&others.chain([own]).collect::<Vec<_>>())
+    }
+
+    /// The laws at small amplitude; the damped sinusoids where the amplitude does not matter or its effect cannot be followed.
+    pub fn choose(&self, envelope: Option<&Envelope>, amplitudes_rad: &[f64], mode: usize) -> Choice {
+        let sinusoids = self.each.iter().find(|e| e.method == Method::Sinusoids);
+        let frequency_hz = sinusoids.and_then(|e| e.frequency_hz).unwrap_or(self.raw[0]);
+        let damping_ratio = sinusoids.and_then(|e| e.damping_ratio).unwrap_or(self.raw[1]);
+        // what amplitude may have changed, by the bounds on κ and λ
+        let [changed_hz, changed_xi] = unfollowed(amplitudes_rad, mode);
+        let (changed_hz, changed_xi) = (changed_hz * frequency_hz.value, changed_xi * damping_ratio.value);
+        let squares: f64 = amplitudes_rad.iter().map(|a| a * a).sum();
+        let omitted = Bounds::of(mode == 0).fourth.map(|bound| bound * squares * squares);
+        let felt = changed_hz > 0.3 * frequency_hz.sd;
+        let law = envelope.and_then(|e| e.frequency.map(|f| (e, f)));
+        match law {
+            Some((envelope, law)) if felt || self.residual_excess > 1.0 => Choice {
+                frequency_hz: relatively_blurred(law.f0_hz, omitted[0]),
+                damping_ratio: relatively_blurred(envelope.small_amplitude_damping(), omitted[1]),
+                basis: "windows: f and ξ at small amplitude".to_owned(),
+            },
+            None if felt || self.residual_excess > 1.0 => Choice {
+                frequency_hz: frequency_hz.blurred(changed_hz),
+                damping_ratio: damping_ratio.blurred(changed_xi),
+                basis: "damped sinusoids over the whole record; widened for what amplitude may have changed".to_owned(),
+            },
+            _ => Choice { frequency_hz, damping_ratio, basis: "damped sinusoids over the whole record".to_owned() },
+        }
+    }
+}
+
+/// Nearness to three times the slowest frequency at which a mode and the harmonic of a large swing mix.
+const HARMONIC_BAND: f64 = 0.06;
+
+/// How much a mode at three times the slowest frequency may be that one's third harmonic, 0 to 1.
+///
+/// sin θ and the turning of the links give a swing of amplitude A a harmonic of up to about A³/20 in a chain, more where the mode resonates with it;
+/// within windows of a few cycles it cannot be told from the mode, whose frequency and damping are then neither's.
+fn harmonic_share(fit: &SinusoidFit, mode: usize) -> f64 {
+    let times = fit.poles[mode].omega_rad_s / fit.poles[0].omega_rad_s;
+    if mode == 0 || (times / 3.0 - 1.0).abs() > HARMONIC_BAND {
+        return 0.0;
+    }
+    (fit.amplitude_rad(0).powi(3) / 20.0 / fit.amplitude_rad(mode).max(f64::MIN_POSITIVE)).min(1.0)
+}
+
+impl Choice {
+    /// With intervals that allow for the third harmonic of the slowest mode.
+    pub fn beside_harmonic(self, fit: &SinusoidFit, mode: usize) -> Self {
+        let share = harmonic_share(fit, mode);
+        if share < 0.01 {
+            return self;
+        }
+        let damping_ratio = self.damping_ratio;
+        Self {
+            frequency_hz: relatively_blurred(self.frequency_hz, HARMONIC_BAND * share.sqrt()),
+            damping_ratio: damping_ratio.blurred(2.0 * share.sqrt() * damping_ratio.value.abs()),
+            basis: format!(
+                "{}; widened: it lies on the third harmonic of mode 1, which only a forward model separates",
+                self.basis
+            ),
+        }
+    }
+}
+
+fn relatively_blurred(estimate: Estimate, relative: f64) -> Estimate {
+    estimate.blurred(relative * estimate.value)
+}
+
+/// Relative standard deviation of frequency and damping of a mode whose dependence on the amplitudes cannot be followed.
+fn unfollowed(amplitudes_rad: &[f64], mode: usize) -> [f64; 2] {
+    let rms = |[mean, sd]: [f64; 2]| mean.hypot(sd);
+    let (mut f2, mut xi2) = (0.0, 0.0);
+    for (other, amplitude_rad) in amplitudes_rad.iter().enumerate() {
+        // least squares sees half of its own A₀², but all of another mode's that outlives it
+        let (bounds, share) = if other == mode { (Bounds::of(mode == 0), 0.5) } else { (Bounds::OTHER, 1.0) };
+        f2 += (share * amplitude_rad.powi(2) * rms(bounds.kappa)).powi(2);
+        xi2 += (share * amplitude_rad.powi(2) * rms(bounds.lambda)).powi(2);
+    }
+    [f2.sqrt(), xi2.sqrt()]
+}
+
+fn spectral(whole: &Whole, alone: &Signal, mode: usize, xi: f64) -> Estimator {
+    let near_hz = whole.fit.poles[mode].omega_rad_s / std::f64::consts::TAU;
+    let natural = 1.0 / (1.0 - xi * xi).max(0.1).sqrt();
+    let line = Spectrum::line(alone, near_hz, whole.noise_rad);
+    Estimator {
+        method: Method::Spectrum,
+        frequency_hz: line.map(|f| f.times(natural)),
+        damping_ratio: None,
+        note: Some(match line {
+            Some(_) => format!("resolution {:.4} Hz", whole.spectrum.resolution_hz),
+            None => format!("no single peak within {:.4} Hz", whole.spectrum.resolution_hz),
+        }),
+    }
+}
+
+fn half_power(whole: &Whole, alone: &Signal, mode: usize) -> Estimator {
+    let found = HalfPower::of(alone, whole.fit.poles[mode], whole.noise_rad);
+    Estimator {
+        method: Method::HalfPower,
+        frequency_hz: found.as_ref().ok().map(|h| h.frequency_hz),
+        damping_ratio: found.as_ref().ok().map(|h| h.damping_ratio),
+        note: Some(match found {
+            Ok(h) => format!("Eq. 28 to the letter: ξ = {:.5}", h.damping_ratio_literal),
+            Err(reason) => reason,
+        }),
+    }
+}
+
+fn decrement(whole: &Whole, alone: &Signal, mode: usize) -> Estimator {
+    let clearness = |link: usize| whole.fit.links[link].amplitudes_rad[mode].norm() / whole.noise_rad[link];
+    let link = (0..alone.links.len()).max_by(|a, b| clearness(*a).total_cmp(&clearness(*b))).unwrap_or(0);
+    let frequency_hz = whole.fit.poles[mode].omega_rad_s / std::f64::consts::TAU;
+    let found = Decrement::of(&alone.links[link], frequency_hz, whole.noise_rad[link]);
+    Estimator {
+        method: Method::Decrement,
+        frequency_hz: found.as_ref().ok().map(|d| d.frequency_hz),
+        damping_ratio: found.as_ref().ok().map(|d| d.damping_ratio),
+        note: Some(match found {
+            Ok(d) => format!("θ{}, {} peaks, δ = {:.5}", link + 1, d.peaks, d.decrement.value),
+            Err(reason) => reason,
+        }),
+    }
+}
+
+/// Widened where the residual near the mode exceeds white noise, and to what the frequency and damping were in the windows.
+fn sinusoids([f, xi]: [Estimate; 2], excess: f64, envelope: Option<&Envelope>) -> Estimator {
+    let widen = |e: Estimate| {
+        let factor = excess.sqrt();
+        Estimate {
+            sd: e.sd * factor,
+            low: e.value + (e.low - e.value) * factor,
+            high: e.value + (e.high - e.value) * factor,
+            ..e
+        }
+    };
+    let (mut f, mut xi) = (widen(f), widen(xi));
+    let misfits = excess > 1.0;
+    if let Some(envelope) = envelope.filter(|_| misfits) {
+        for step in &envelope.steps {
+            f = f.covering(step.frequency_hz.value, step.frequency_hz.value);
+            xi = xi.covering(step.damping_ratio.value, step.damping_ratio.value);
+        }
+    }
+    let note = misfits.then(|| {
+        format!("residual {excess:.1} × white noise near the mode: intervals widened to the range over the record")
+    });
+    Estimator { method: Method::Sinusoids, frequency_hz: Some(f), damping_ratio: Some(xi), note }
+}
+
+fn windowed(envelope: &Result<Envelope, String>) -> Estimator {
+    let law = envelope.as_ref().ok().and_then(|e| e.frequency);
+    let damping = envelope.as_ref().ok().and_then(|e| e.damping);
+    Estimator {
+        method: Method::Envelope,
+        frequency_hz: law.map(|l| l.f0_hz),
+        damping_ratio: damping.map(|d| d.xi0),
+        note: Some(match envelope {
+            Ok(e) => match law {
+                Some(l) => format!(
+                    "{} windows; at small amplitude, κ = {:.4} ± {:.4} /rad²",
+                    e.windows, l.kappa_per_rad2.value, l.kappa_per_rad2.sd
+                ),
+                None => format!("{} windows do not tell f against amplitude", e.windows),
+            },
+            Err(reason) => reason.clone(),
+        }),
+    }
+}
+
+/// Power of the residual in the lines beside a mode (2/T to 9/T away on both sides) over that of white noise of the same variance; 1 unless the
+/// excess would come about by chance less than once in a thousand records. Least squares sees only that part of the residual.
+fn residual_excess(residual: &Signal, omega_rad_s: f64) -> f64 {
+    let line = std::f64::consts::TAU / residual.duration_s();
+    let (mut sum, mut lines) = (0.0, 0.0);
+    for link in &residual.links {
+        let n = link.t_s.len() as f64;
+        let variance = link.theta_rad.iter().map(|r| r * r).sum::<f64>() / n;
+        for k in (2..10).flat_map(|k| [f64::from(k), -f64::from(k)]) {
+            let omega = omega_rad_s + k * line;
+            if omega < 2.0 * line {
+                continue;
+            }
+            let turns = link.t_s.iter().zip(&link.theta_rad).map(|(t, r)| Complex::from_polar(*r, -omega * t));
+            sum += turns.sum::<Complex<f64>>().norm_sqr() / (n * variance.max(f64::MIN_POSITIVE));
+            lines += 1.0;
+        }
+    }
+    // each line's power is half a χ² of two degrees of freedom
+    let p_value = chi_squared_tail(2.0 * sum, 2.0 * lines);
+    if p_value < 1e-3 { (sum / lines).max(1.0) } else { 1.0 }
+}

@@ -1,0 +1,191 @@
+//! `freeswing identify` as a user types it: what it prints, what it writes, what it refuses.
+
+use std::fmt::Write as _;
+use std::process::{Command, Output};
+
+use assert_cmd::cargo::CommandCargoExt;
+use rand::rngs::Xoshiro256PlusPlus;
+use rand::{RngExt, SeedableRng};
+use tempfile::TempDir;
+
+/// A swing of two links, a row every 1/30 s.
+fn table(seconds: f64, angle: impl Fn(f64) -> [String; 2]) -> String {
+    let mut text = "t_s,theta1_rad,theta2_rad\n".to_owned();
+    for row in 0..(30.0 * seconds) as usize {
+        let t = row as f64 / 30.0;
+        let [a, b] = angle(t);
+        let _ = writeln!(text, "{t:.6},{a},{b}");
+    }
+    text
+}
+
+fn swing(t: f64) -> [f64; 2] {
+    let a = 0.3 * (-0.04 * t).exp() * (8.5 * t).cos() + 2e-4 * (1000.0 * t * t).sin();
+    [a, 1.2 * a + 1e-4 * (777.0 * t * t).cos()]
+}
+
+fn good() -> String {
+    table(25.0, |t| swing(t).map(|a| format!("{a:.6}")))
+}
+
+struct Bench {
+    folder: TempDir,
+}
+
+impl Bench {
+    fn with(text: &str) -> Self {
+        let folder = tempfile::tempdir().unwrap();
+        std::fs::write(folder.path().join("a.csv"), text).unwrap();
+        Self { folder }
+    }
+
+    fn run(&self, arguments: &[&str]) -> Output {
+        let mut command = Command::cargo_bin("freeswing").unwrap();
+        command.current_dir(self.folder.path()).arg("identify").args(arguments).output().unwrap()
+    }
+
+    /// One line on standard error, exit code 2, nothing written or printed.
+    fn refuses(&self, arguments: &[&str], says: &str) {
+        let output = self.run(arguments);
+        let error = String::from_utf8(output.stderr).unwrap();
+        assert_eq!(output.status.code(), Some(2), "{arguments:?}: {error}");
+        assert_eq!((error.lines().count(), error.contains(says)), (1, true), "wanted `{says}`, got {error}");
+        assert!(output.stdout.is_empty() && !self.folder.path().join("out.json").exists());
+    }
+}
+
+#[test]
+fn the_table_and_the_json_tell_the_same() {
+    let bench = Bench::with(&good());
+    let config = "[specimen]\nmass_kg = 0.3606e-3\n[rig]\ngravity_m_s2 = 9.80665\n";
+    std::fs::write(bench.folder.path().join("e.toml"), config).unwrap();
+    let output = bench.run(&["a.csv", "--config", "e.toml", "--json", "out.json"]);
+    let text = String::from_utf8(output.stdout).unwrap();
+    assert!(output.status.success() && output.stderr.is_empty(), "{}", String::from_utf8_lossy(&output.stderr));
+    for word in
+        ["Mode 1", "spectrum", "half power", "decrement", "damped sinusoids", "envelope", "Floor", "K_eq", "N·s/m"]
+    {
+        assert!(text.contains(word), "{word} in {text}");
+    }
+    let json = std::fs::read_to_string(bench.folder.path().join("out.json")).unwrap();
+    let json: serde_json::Value = serde_json::from_str(&json).unwrap();
+    assert_eq!(json["schema"], "freeswing.identify/1");
+    let mode = &json["modes"][0];
+    let f = mode["frequency_hz"]["value"].as_f64().unwrap();
+    assert!((f * std::f64::consts::TAU - 8.5f64.hypot(0.04)).abs() < 0.002, "{f}");
+    assert!((mode["damping"]["identified"]["value"].as_f64().unwrap() * 8.5 / 0.04 - 1.0).abs() < 0.02);
+    assert_eq!(mode["estimators"].as_array().unwrap().len(), 5);
+    let k_eq = json["equivalents"]["k_eq_n_per_m"]["value"].as_f64().unwrap();
+    assert!((k_eq / (0.3606e-3 * 8.5 * 8.5) - 1.0).abs() < 1e-3);
+}
+
+#[test]
+fn json_to_standard_output_stands_alone_and_quiet_is_silent() {
+    let bench = Bench::with(&good());
+    let output = bench.run(&["a.csv", "--json", "-"]);
+    let json: serde_json::Value = serde_json::from_slice(&output.stdout).unwrap();
+    assert_eq!(json["record"]["source"], "a.csv");
+    assert!(bench.run(&["a.csv", "--quiet"]).stdout.is_empty());
+}
+
+#[test]
+fn the_table_may_come_from_standard_input() {
+    let bench = Bench::with("");
+    let mut command = assert_cmd::Command::cargo_bin("freeswing").unwrap();
+    let output = command.args(["identify", "-"]).write_stdin(good()).output().unwrap();
+    assert!(String::from_utf8(output.stdout).unwrap().starts_with("standard input: 750 rows"));
+    bench.refuses(&["a.csv"], "a.csv: the file is empty (0 bytes); record or copy it again");
+}
+
+#[test]
+fn a_frequency_below_the_floor_is_named_with_what_mends_it() {
+    let slow = good().lines().enumerate().fold(String::new(), |mut text, (row, line)| {
+        let (t, rest) = line.split_once(',').unwrap();
+        let _ = match t.parse::<f64>() {
+            Ok(t) if row > 0 => writeln!(text, "{:.6},{rest}", 2.64 * t),
+            _ => writeln!(text, "{line}"),
+        };
+        text
+    });
+    let bench = Bench::with(&slow);
+    std::fs::write(bench.folder.path().join("e.toml"), "[specimen]\nlength_m = 0.2\n").unwrap();
+    let text = String::from_utf8(bench.run(&["a.csv", "--config", "e.toml"]).stdout).unwrap();
+    assert!(
+        text.contains("is below the floor of 1.3400 Hz (the limp strip): time base, length or gravity is wrong"),
+        "{text}"
+    );
+    assert!(text.contains("mended by time × 0.38"), "{text}");
+}
+
+#[test]
+fn tables_that_are_no_swing_are_refused() {
+    let degrees = table(25.0, |t| swing(t).map(|a| format!("{:.4}", a.to_degrees())));
+    let still = table(25.0, |t| [format!("{:.6}", swing(t)[0]), "0.25".to_owned()]);
+    let cases = [
+        (good().replace("\n0.100000,", "\n0.100000,NaN"), "a.csv:5: theta1_rad = `NaN0."),
+        (good().replace("\n0.100000,", "\n0.066667,"), "a.csv:5: t_s = 0.066667 stands twice; keep one row an instant"),
+        (good().replace("\n0.100000,", "\n0.05,"), "a.csv:5: t_s = 0.05 follows 0.066667; sort the rows by time"),
+        (good().lines().take(2).collect::<Vec<_>>().join("\n"), "a.csv: holds one row; a swing needs at least 8"),
+        ("t_s,theta1_rad\n".to_owned(), "a.csv: holds no row of numbers; measure the recording again"),
+        (degrees, "looks like degrees; multiply by π/180"),
+        (still, "a.csv: theta2_rad stays at 0.25: nothing swings; check the marks and the column"),
+        (good().replace("theta1_rad", "angle"), "a.csv:1: no column `theta1_rad` among t_s, angle, theta2_rad"),
+        (good().replace(',', ";"), "a.csv:1: fields are separated by semicolons"),
+        (
+            table(1.0, |_| ["nan".to_owned(), String::new()]),
+            "a.csv:2: theta1_rad = nan; leave a missing value's field empty",
+        ),
+        (
+            table(1.0, |_| [String::new(), String::new()]),
+            "a.csv: theta1_rad has 0 values in 30 rows; at least 8 are needed",
+        ),
+    ];
+    for (text, says) in cases {
+        Bench::with(&text).refuses(&["a.csv", "--json", "out.json"], says);
+    }
+}
+
+#[test]
+fn files_and_options_that_cannot_be_used_are_refused() {
+    let bench = Bench::with(&good());
+    let write = |name: &str, text: &str| std::fs::write(bench.folder.path().join(name), text).unwrap();
+    bench.refuses(&["missing.csv"], "missing.csv: cannot be read");
+    bench.refuses(&["."], ".: cannot be read");
+    bench.refuses(&["a.csv", "--json", "nowhere/out.json"], "nowhere/out.json: cannot be written");
+    bench.refuses(&["a.csv", "--json", "a.csv"], "--json: a.csv is an input and would be overwritten");
+    bench.refuses(&["a.csv", "--from", "24.9"], "--from, --until: the stretch holds 3 rows; a swing needs at least 8");
+    bench.refuses(&["a.csv", "--from", "90"], "the table runs from 0 s to 24.966667 s");
+    write("massless.toml", "[specimen]\nmass_kg = 0\n");
+    bench.refuses(&["a.csv", "--config", "massless.toml"], "specimen.mass_kg = 0: must be a positive number");
+    write("unknown.toml", "[specimen]\nmass = 1\n");
+    bench.refuses(&["a.csv", "--config", "unknown.toml"], "unknown key `mass`; the nearest known one is `mass_kg`");
+}
+
+#[test]
+fn short_gappy_and_noisy_tables_are_answered_without_a_panic() {
+    let mut rng = Xoshiro256PlusPlus::seed_from_u64(11);
+    for case in 0..60 {
+        let rows = rng.random_range(8..120);
+        let mut text = "t_s,theta1_rad,theta2_rad\n".to_owned();
+        let mut t = rng.random_range(-5.0..5.0);
+        let (gap, noise) = (rng.random_range(0.0..0.6), rng.random_range(0.0..0.5));
+        for _ in 0..rows {
+            t += 10f64.powf(rng.random_range(-3.0..0.5));
+            let field = |rng: &mut Xoshiro256PlusPlus| {
+                let value = 0.2 * (7.0 * t).sin() + noise * rng.random_range(-1.0..1.0);
+                if rng.random_bool(gap) { String::new() } else { format!("{value:.5}") }
+            };
+            let _ = writeln!(text, "{t:.6},{},{}", field(&mut rng), field(&mut rng));
+        }
+        let output = Bench::with(&text).run(&["a.csv"]);
+        let error = String::from_utf8_lossy(&output.stderr).into_owned();
+        assert!(matches!(output.status.code(), Some(0 | 2)) && !error.contains("panicked"), "{case}: {error}\n{text}");
+    }
+}
+
+#[test]
+fn the_help_shows_examples() {
+    let output = Bench::with("").run(&["--help"]);
+    let text = String::from_utf8(output.stdout).unwrap();
+    assert!(text.contains("freeswing identify angles.csv --config experiment.toml --json identified.json"));
+}
