@@ -24,6 +24,7 @@ pub mod output;
 pub mod overlay;
 pub mod progress;
 pub mod sidecar;
+mod statistics;
 pub mod synth;
 pub mod track;
 pub mod video;

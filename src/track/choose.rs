@@ -3,14 +3,9 @@
 //! Marks are seen most of the time, look alike, and keep their distances: a link is rigid, a strip hardly shortens.
 //! A knob on the stand keeps its distance from nothing that swings.
 
-use super::tracker::{FrameBlobs, MarkSlot, Sighting, median};
-
-/// Sightings of one thing over the window: (frame, blob).
-#[derive(Debug, Clone, PartialEq)]
-pub(super) struct Tracklet {
-    pub hue: u8,
-    pub sightings: Vec<(usize, usize)>,
-}
+use super::tracklet::Tracklet;
+use super::{FrameBlobs, MarkSlot, Sighting};
+use crate::statistics::median;
 
 /// Which tracklet is which mark.
 #[derive(Debug, Clone, Default, PartialEq)]
@@ -80,17 +75,19 @@ fn candidates(tracklets: &[Tracklet], window: &[FrameBlobs], pivot_px: Option<[f
             for at in &t.sightings {
                 path[at.0] = Some(sighting(at).measured.position_px);
             }
-            let order = median(path.iter().flatten().map(|p| match pivot_px {
+            let order = |p: &[f64; 2]| match pivot_px {
                 Some(pivot) => (p[0] - pivot[0]).hypot(p[1] - pivot[1]),
                 None => p[1],
-            }));
+            };
+            let mut orders: Vec<f64> = path.iter().flatten().map(order).collect();
+            let mut ln_areas: Vec<f64> =
+                t.sightings.iter().map(|s| f64::from(sighting(s).measured.area_px2).ln()).collect();
             Candidate {
                 tracklet,
                 hue: t.hue,
                 presence: t.sightings.len() as f64 / window.len() as f64,
-                ln_area: median(t.sightings.iter().map(|s| f64::from(sighting(s).measured.area_px2).ln()))
-                    .unwrap_or(0.0),
-                order: order.unwrap_or(0.0),
+                ln_area: median(&mut ln_areas).unwrap_or(0.0),
+                order: median(&mut orders).unwrap_or(0.0),
                 path,
             }
         })
@@ -140,7 +137,7 @@ fn score(kept: &[Candidate], assignment: &[Option<usize>]) -> f64 {
 
 /// Relative spread of the distance of two candidates over the frames that show both; 1 where there are none.
 fn length_spread(a: &Candidate, b: &Candidate) -> f64 {
-    let lengths: Vec<f64> = a
+    let mut lengths: Vec<f64> = a
         .path
         .iter()
         .zip(&b.path)
@@ -149,7 +146,7 @@ fn length_spread(a: &Candidate, b: &Candidate) -> f64 {
             Some((p[0] - q[0]).hypot(p[1] - q[1]))
         })
         .collect();
-    let Some(usual) = median(lengths.iter().copied()).filter(|l| *l > 0.0) else { return 1.0 };
+    let Some(usual) = median(&mut lengths).filter(|l| *l > 0.0) else { return 1.0 };
     let mean_deviation = lengths.iter().map(|l| (l - usual).abs()).sum::<f64>() / lengths.len() as f64;
     (mean_deviation / usual).min(1.0)
 }

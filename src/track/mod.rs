@@ -2,13 +2,20 @@
 
 mod assign;
 mod choose;
+mod follower;
 mod kalman;
 mod noise;
+mod sighting;
 mod smooth;
 mod tracker;
+mod tracklet;
+mod tracks;
 
 pub use kalman::{Belief, Measurement, Motion};
-pub use tracker::{FrameBlobs, MarkFound, MarkSlot, Scatter, Sighting, Tracker, Tracks};
+pub use noise::Scatter;
+pub use sighting::{FrameBlobs, Sighting};
+pub use tracker::{MarkFound, MarkSlot, Tracker};
+pub use tracks::Tracks;
 
 /// One mark in one frame.
 #[derive(Debug, Clone, Copy, PartialEq)]
