@@ -25,8 +25,10 @@ struct Candidate {
     tracklet: usize,
     hue: u8,
     presence: f64,
+    /// Share of the window that is over when it is first seen.
+    lateness: f64,
     ln_area: f64,
-    /// Distance down the picture, or from the pivot.
+    /// How far down the picture it comes, or how far from the pivot; one frame in twenty apart.
     order: f64,
     /// Position by frame.
     path: Vec<Option<[f64; 2]>>,
@@ -80,14 +82,16 @@ fn candidates(tracklets: &[Tracklet], window: &[FrameBlobs], pivot_px: Option<[f
                 None => p[1],
             };
             let mut orders: Vec<f64> = path.iter().flatten().map(order).collect();
+            orders.sort_unstable_by(f64::total_cmp);
             let mut ln_areas: Vec<f64> =
                 t.sightings.iter().map(|s| f64::from(sighting(s).measured.area_px2).ln()).collect();
             Candidate {
                 tracklet,
                 hue: t.hue,
                 presence: t.sightings.len() as f64 / window.len() as f64,
+                lateness: t.sightings.first().map_or(1.0, |s| s.0 as f64 / window.len() as f64),
                 ln_area: median(&mut ln_areas).unwrap_or(0.0),
-                order: median(&mut orders).unwrap_or(0.0),
+                order: orders.get(orders.len() * 19 / 20).copied().unwrap_or(0.0),
                 path,
             }
         })
@@ -128,7 +132,8 @@ fn search(
 
 fn score(kept: &[Candidate], assignment: &[Option<usize>]) -> f64 {
     let chosen: Vec<&Candidate> = assignment.iter().flatten().map(|i| &kept[*i]).collect();
-    let presence: f64 = chosen.iter().map(|c| c.presence).sum();
+    // of two halves of a track, before a gap and after it, the first: what follows it will be found again
+    let presence: f64 = chosen.iter().map(|c| c.presence - c.lateness).sum();
     let stretch = chosen.windows(2).map(|w| length_spread(w[0], w[1])).fold(0.0, f64::max);
     let mean = chosen.iter().map(|c| c.ln_area).sum::<f64>() / chosen.len().max(1) as f64;
     let unlike = (chosen.iter().map(|c| (c.ln_area - mean).powi(2)).sum::<f64>() / chosen.len().max(1) as f64).sqrt();

@@ -13,6 +13,9 @@ const MOST_LN_AREA: f64 = 1.61;
 /// Most that a change of area adds to the cost of a sighting.
 pub const MOST_AREA_COST: f64 = 8.0;
 
+/// Steps between frames over which a course is straight enough to tell marks apart.
+const LONGEST_COURSE_STEPS: f64 = 3.5;
+
 /// One followed thing, while frames come in.
 #[derive(Debug, Clone)]
 pub struct Follower {
@@ -25,6 +28,9 @@ pub struct Follower {
     pub seen_s: f64,
     /// Frames in which it was seen beside all marks of its hue.
     pub age: u32,
+    /// Frames since it was last seen, the one it waits for included.
+    unseen_frames: u32,
+    step_s: f64,
 }
 
 impl Follower {
@@ -43,6 +49,8 @@ impl Follower {
             t_s,
             seen_s: t_s,
             age: 0,
+            unseen_frames: 0,
+            step_s,
         }
     }
 
@@ -50,6 +58,27 @@ impl Follower {
     pub fn predict(&mut self, t_s: f64) {
         self.belief = self.belief.predict(&self.motion, (t_s - self.t_s).max(0.0));
         self.t_s = t_s;
+        self.unseen_frames += 1;
+    }
+
+    /// How widely what is believed of its place is spread: ln of the determinant of its covariance.
+    pub fn ln_spread(&self) -> f64 {
+        let place = Matrix2::identity() * self.radius_px().powi(2) + self.belief.position_covariance_px2();
+        place.determinant().max(f64::MIN_POSITIVE).ln()
+    }
+
+    /// It was not seen in the frame before the one it waits for.
+    pub fn was_lost(&self) -> bool {
+        self.unseen_frames > 1 || self.is_long_lost()
+    }
+
+    /// It has not been seen for so long that its course says nothing about where it is.
+    pub fn is_long_lost(&self) -> bool {
+        self.t_s - self.seen_s > LONGEST_COURSE_STEPS * self.step_s
+    }
+
+    fn radius_px(&self) -> f64 {
+        0.56 * self.area_px2.sqrt()
     }
 
     /// Cost of a sighting, `None` outside the gate. The gate is never narrower than the mark itself, so that a
@@ -58,8 +87,7 @@ impl Follower {
         if sighting.hue != self.hue {
             return None;
         }
-        let radius = 0.56 * self.area_px2.sqrt();
-        let (d2, _) = self.belief.distance2(&measurement(&sighting.measured, radius))?;
+        let (d2, _) = self.belief.distance2(&measurement(&sighting.measured, self.radius_px()))?;
         let ln_area = (f64::from(sighting.measured.area_px2) / self.area_px2).ln();
         if ln_area.abs() > MOST_LN_AREA {
             return None;
@@ -76,6 +104,7 @@ impl Follower {
         }
         self.area_px2 += 0.05 * (f64::from(sighting.measured.area_px2) - self.area_px2);
         self.seen_s = self.t_s;
+        self.unseen_frames = 0;
     }
 }
 

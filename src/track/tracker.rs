@@ -6,9 +6,10 @@
 //! does not settle on it. When the recording ends, the stated variances are held against the tracks' own scatter
 //! and the Kalman filter runs over the measurements, with the true time steps.
 
-use super::assign::{ambiguous_rows, assign_frame};
+use super::assign::assign_frame;
 use super::choose::{Choice, choose};
 use super::follower::Follower;
+use super::identity::{Identity, Renaming};
 use super::noise::scatters;
 use super::tracklet::{Tracklet, link};
 use super::{Flags, FrameBlobs, Measured, Sighting, Tracks};
@@ -43,12 +44,15 @@ pub struct Tracker {
     points: Vec<Vec<(Option<Measured>, Flags)>>,
     damaged: Vec<usize>,
     step_s: f64,
+    identity: Identity,
 }
 
 impl Tracker {
     /// For marks top to bottom, with the pivot where it is known.
     pub fn new(slots: Vec<MarkSlot>, pivot_px: Option<[f64; 2]>) -> Self {
         let n = slots.len();
+        let hues: Vec<u8> = slots.iter().map(|slot| slot.hue).collect();
+        let identity = Identity::new(&hues, pivot_px);
         Self {
             slots,
             pivot_px,
@@ -60,6 +64,7 @@ impl Tracker {
             points: vec![Vec::new(); n],
             damaged: Vec::new(),
             step_s: 1.0 / 30.0,
+            identity,
         }
     }
 
@@ -85,11 +90,23 @@ impl Tracker {
         if may_wait && choice.chosen.iter().any(Option::is_none) {
             return;
         }
+        self.learn(&choice, &tracklets);
         self.choice = Some(choice);
         for frame in std::mem::take(&mut self.window).iter().enumerate() {
             self.start_due(frame.0, frame.1, &tracklets);
             self.follow(frame.1);
         }
+    }
+
+    /// The tracklets by which the marks were chosen show first what is usual about the marks.
+    fn learn(&mut self, choice: &Choice, tracklets: &[Tracklet]) {
+        let mut seen_px = vec![vec![None; self.slots.len()]; self.window.len()];
+        for (mark, chosen) in choice.chosen.iter().enumerate() {
+            for &(frame, blob) in chosen.iter().flat_map(|c| &tracklets[*c].sightings) {
+                seen_px[frame][mark] = Some(self.window[frame].sightings[blob].measured.position_px);
+            }
+        }
+        seen_px.iter().for_each(|seen_px| self.identity.learn(seen_px));
     }
 
     /// Starts the followers of marks that are first seen in frame `index`.
@@ -117,9 +134,10 @@ impl Tracker {
         rows.extend(self.marks.iter_mut().flatten());
         rows.extend(self.others.iter_mut());
         let assigned = assign_frame(&mut rows, marks.len(), sightings, frame.t_s);
-        let ambiguous = ambiguous_rows(&rows[..marks.len()], sightings, &assigned.before, &assigned.columns);
-        let missed: Vec<u8> =
-            (0..marks.len()).filter(|r| assigned.columns[*r].is_none()).map(|r| rows[r].hue).collect();
+        let ambiguous = assigned.ambiguous(&rows[..marks.len()]);
+        let doubted = assigned.doubted(&rows[..marks.len()]);
+        let unseen = |mark: &usize| marks.iter().position(|m| m == mark).is_none_or(|r| assigned.columns[r].is_none());
+        let missed: Vec<u8> = (0..self.slots.len()).filter(unseen).map(|mark| self.slots[mark].hue).collect();
         let mut taken = vec![false; sightings.len()];
         for (row, column) in assigned.columns.iter().enumerate() {
             if let Some(column) = column {
@@ -141,8 +159,14 @@ impl Tracker {
                     flags.insert(Flags::AMBIGUOUS);
                 }
                 self.points[*mark][index] = (Some(sightings[column].measured), flags);
+                if doubted[row] {
+                    self.identity.doubt(*mark, index);
+                }
             }
         }
+        let seen_px: Vec<Option<[f64; 2]>> = self.points.iter().map(|p| p[index].0.map(|m| m.position_px)).collect();
+        let renamings = self.identity.see(index, &seen_px);
+        self.rename(&renamings);
         self.others.retain(|o| frame.t_s - o.seen_s < FORGET_S);
         for (sighting, _) in sightings.iter().zip(&taken).filter(|(_, taken)| !**taken) {
             if self.others.len() < MOST_OTHERS {
@@ -151,10 +175,34 @@ impl Tracker {
         }
     }
 
+    /// Gives sightings, and what follows them, to the marks they are of.
+    fn rename(&mut self, renamings: &[Renaming]) {
+        let mut moving = Vec::new();
+        for renaming in renamings {
+            let sightings = &mut self.points[renaming.from][renaming.since..];
+            moving.push((sightings.to_vec(), self.marks[renaming.from].take()));
+            sightings.fill((None, Flags::LOST));
+        }
+        let mut displaced = Vec::new();
+        for (renaming, (sightings, follower)) in renamings.iter().zip(moving) {
+            self.points[renaming.to][renaming.since..].copy_from_slice(&sightings);
+            displaced.extend(std::mem::replace(&mut self.marks[renaming.to], follower));
+        }
+        for renaming in renamings {
+            if self.marks[renaming.from].is_none() {
+                self.marks[renaming.from] = displaced.pop();
+            }
+        }
+    }
+
     /// Ends the recording: scatter, flags, filter. The second value counts the marks of each hue that were found.
     pub fn finish(mut self) -> (Tracks, Vec<MarkFound>) {
         if self.choice.is_none() {
             self.begin(false);
+        }
+        for (mark, frames) in self.identity.finish() {
+            let seen = self.points[mark][frames].iter_mut().filter(|(measured, _)| measured.is_some());
+            seen.for_each(|(_, flags)| flags.insert(Flags::AMBIGUOUS));
         }
         let choice = self.choice.take().unwrap_or_default();
         let found = self

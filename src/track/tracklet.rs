@@ -26,9 +26,14 @@ pub fn link(window: &[FrameBlobs], step_s: f64) -> Vec<Tracklet> {
         let mut rows: Vec<&mut Follower> = followers.iter_mut().map(|(_, f)| f).collect();
         let marks = rows.len();
         let assigned = assign_frame(&mut rows, marks, &frame.sightings, frame.t_s);
+        let doubted = assigned.doubted(&rows);
         let mut taken = vec![false; frame.sightings.len()];
         for (row, column) in assigned.columns.iter().enumerate() {
             if let Some(column) = column {
+                if doubted[row] && followers[row].1.was_lost() {
+                    // it may be another thing that came back: what follows is a tracklet of its own
+                    continue;
+                }
                 taken[*column] = true;
                 followers[row].1.update(&frame.sightings[*column]);
                 tracklets[followers[row].0].sightings.push((index, *column));
