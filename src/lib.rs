@@ -31,6 +31,7 @@ pub mod paper;
 pub mod progress;
 pub mod series;
 pub mod sidecar;
+mod statistics;
 pub mod synth;
 pub mod track;
 pub mod video;

@@ -1,10 +1,13 @@
 //! Frame → blobs: the scan for the hue, the binary mask, its connected regions.
 
-use opencv::core::{CV_8U, CV_32S, Mat, MatTraitConst, MatTraitConstManual, Point, Rect};
+use std::ops::Range;
+
+use opencv::core::{CV_32S, Mat, MatTraitConstManual};
 use opencv::imgproc;
 
 use super::centroid::{self, Centroid, Silhouette};
 use super::component::{BLOCK, HueAxis};
+use super::morphology::{dilate, erode};
 use crate::error::{Error, Result};
 use crate::video::Picture;
 
@@ -48,7 +51,7 @@ const MARGIN: usize = 6;
 /// Finds and measures the blobs of one hue.
 pub(super) fn find(picture: &Picture<'_>, target: &Target, blobs: &mut Vec<Blob>) -> Result<()> {
     for region in regions(picture, target.axis, target.threshold) {
-        let mask = Mask::of(picture, target.axis, target.threshold, target.thin, region)?;
+        let mask = Mask::of(picture, target.axis, target.threshold, target.thin, region);
         for silhouette in mask.silhouettes(picture, target.least_samples)? {
             let samples = silhouette.points_px.len() as u32;
             let binary_px = silhouette.centre_px;
@@ -123,7 +126,7 @@ pub(super) struct Mask {
 impl Mask {
     /// Smooths the component over a plus of five samples against camera noise, compares, and mends the outline:
     /// opening takes away lines of up to two samples (burnt-in graphics), closing heals a mark that one crosses.
-    pub(super) fn of(picture: &Picture<'_>, axis: HueAxis, threshold: i16, thin: bool, region: Region) -> Result<Self> {
+    pub(super) fn of(picture: &Picture<'_>, axis: HueAxis, threshold: i16, thin: bool, region: Region) -> Self {
         let (width, height) = (region.right - region.left, region.bottom - region.top);
         let mut component = Vec::with_capacity(width * height);
         for y in region.top..region.bottom {
@@ -140,25 +143,12 @@ impl Mask {
                 out[x] = if 4 * i32::from(here[x]) + sides > 8 * i32::from(threshold) { 255 } else { 0 };
             }
         }
-        let mut mask = Self { region, bytes };
         if !thin {
-            mask.mend().map_err(Error::opencv("mending the binary picture"))?;
+            erode(&mut bytes, width, 1);
+            dilate(&mut bytes, width, 3);
+            erode(&mut bytes, width, 2);
         }
-        Ok(mask)
-    }
-
-    fn mend(&mut self) -> opencv::Result<()> {
-        let anchor = Point::new(-1, -1);
-        let kernel = imgproc::get_structuring_element(imgproc::MORPH_RECT, opencv::core::Size::new(3, 3), anchor)?;
-        let border = imgproc::morphology_default_border_value()?;
-        let (rows, columns) = self.size();
-        let mask = Mat::new_rows_cols_with_data(rows, columns, &self.bytes)?;
-        let (mut opened, mut closed) = (Mat::default(), Mat::default());
-        let constant = opencv::core::BORDER_CONSTANT;
-        imgproc::morphology_ex(&mask, &mut opened, imgproc::MORPH_OPEN, &kernel, anchor, 1, constant, border)?;
-        imgproc::morphology_ex(&opened, &mut closed, imgproc::MORPH_CLOSE, &kernel, anchor, 2, constant, border)?;
-        self.bytes = closed.data_bytes()?.to_vec();
-        Ok(())
+        Self { region, bytes }
     }
 
     fn size(&self) -> (i32, i32) {
@@ -178,42 +168,65 @@ impl Mask {
 
     /// The connected regions (8 neighbours) of at least `least_samples` samples.
     fn silhouettes(&self, picture: &Picture<'_>, least_samples: u32) -> Result<Vec<Silhouette>> {
-        let failed = |e| Error::opencv("labelling the binary picture")(e);
-        let (rows, columns) = self.size();
-        let mask = Mat::new_rows_cols_with_data(rows, columns, &self.bytes).map_err(failed)?;
-        debug_assert_eq!(mask.typ(), CV_8U);
-        let (mut labels, mut stats, mut centroids) = (Mat::default(), Mat::default(), Mat::default());
-        let count = imgproc::connected_components_with_stats(&mask, &mut labels, &mut stats, &mut centroids, 8, CV_32S)
-            .map_err(failed)?;
+        let failed = |error| Error::opencv("labelling the binary picture")(error);
+        let Labelled { labels, parts } = self.labelled().map_err(failed)?;
+        let labels = labels.data_typed::<i32>().map_err(failed)?;
         let layout = picture.layout;
         let half_sample_px =
             [0.5 * f64::from(1u32 << layout.chroma_shift_x), 0.5 * f64::from(1u32 << layout.chroma_shift_y)];
+        let width = self.region.right - self.region.left;
         let mut silhouettes = Vec::new();
-        for label in 1..count {
-            let stat = |column: i32| stats.at_2d::<i32>(label, column).copied().map_err(failed);
-            if (stat(imgproc::CC_STAT_AREA)? as u32) < least_samples {
-                continue;
-            }
-            let frame = Rect::new(
-                stat(imgproc::CC_STAT_LEFT)?,
-                stat(imgproc::CC_STAT_TOP)?,
-                stat(imgproc::CC_STAT_WIDTH)?,
-                stat(imgproc::CC_STAT_HEIGHT)?,
-            );
-            let mut points_px = Vec::new();
-            for y in frame.y..frame.y + frame.height {
-                for x in frame.x..frame.x + frame.width {
-                    if *labels.at_2d::<i32>(y, x).map_err(failed)? == label {
-                        let at = Point::new(x + self.region.left as i32, y + self.region.top as i32);
-                        let (px, py) = layout.chroma_to_luma(f64::from(at.x), f64::from(at.y));
-                        points_px.push([px, py]);
-                    }
+        for part in parts.iter().filter(|part| part.samples >= least_samples as usize) {
+            let mut points_px: Vec<[f64; 2]> = Vec::with_capacity(part.samples);
+            for y in part.rows.clone() {
+                let row = &labels[y * width..][..width];
+                for x in part.columns.clone().filter(|x| row[*x] == part.label) {
+                    let (x, y) = (x + self.region.left, y + self.region.top);
+                    let (x_px, y_px) = layout.chroma_to_luma(x as f64, y as f64);
+                    points_px.push([x_px, y_px]);
                 }
             }
             let n = points_px.len().max(1) as f64;
-            let centre_px = [0, 1].map(|axis| points_px.iter().map(|p: &[f64; 2]| p[axis]).sum::<f64>() / n);
+            let centre_px = [0, 1].map(|axis| points_px.iter().map(|p| p[axis]).sum::<f64>() / n);
             silhouettes.push(Silhouette { centre_px, points_px, half_sample_px });
         }
         Ok(silhouettes)
     }
+
+    /// Labels the connected regions of the mask.
+    fn labelled(&self) -> opencv::Result<Labelled> {
+        let (rows, columns) = self.size();
+        let mask = Mat::new_rows_cols_with_data(rows, columns, &self.bytes)?;
+        let (mut labels, mut stats, mut centroids) = (Mat::default(), Mat::default(), Mat::default());
+        imgproc::connected_components_with_stats(&mask, &mut labels, &mut stats, &mut centroids, 8, CV_32S)?;
+        let of_label = |(label, stats): (usize, &[i32])| {
+            let stat = |column: i32| stats[column as usize] as usize;
+            let (left, top) = (stat(imgproc::CC_STAT_LEFT), stat(imgproc::CC_STAT_TOP));
+            Part {
+                label: label as i32,
+                samples: stat(imgproc::CC_STAT_AREA),
+                columns: left..left + stat(imgproc::CC_STAT_WIDTH),
+                rows: top..top + stat(imgproc::CC_STAT_HEIGHT),
+            }
+        };
+        // label 0 is the background
+        let stats = stats.data_typed::<i32>()?.chunks_exact(imgproc::CC_STAT_MAX as usize);
+        let parts = stats.enumerate().skip(1).map(of_label).collect();
+        Ok(Labelled { labels, parts })
+    }
+}
+
+/// The connected regions of a mask.
+struct Labelled {
+    /// The label of every sample, row by row.
+    labels: Mat,
+    parts: Vec<Part>,
+}
+
+/// One connected region.
+struct Part {
+    label: i32,
+    samples: usize,
+    columns: Range<usize>,
+    rows: Range<usize>,
 }

@@ -192,7 +192,7 @@ impl View<'_> {
         let mut samples = vec![0u8; columns * rows];
         for target in targets {
             for region in blobs::regions(self.picture, target.axis, target.threshold) {
-                let mask = Mask::of(self.picture, target.axis, target.threshold, target.thin, region)?;
+                let mask = Mask::of(self.picture, target.axis, target.threshold, target.thin, region);
                 for (y, row) in mask.rows() {
                     let to = &mut samples[y * columns + mask.left()..][..row.len()];
                     to.iter_mut().zip(row).for_each(|(t, m)| *t |= *m);

@@ -5,6 +5,7 @@ mod blobs;
 mod centroid;
 mod component;
 pub mod debug;
+mod morphology;
 mod threshold;
 
 pub use blobs::Blob;

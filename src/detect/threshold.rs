@@ -5,6 +5,7 @@
 //! saddle and the summit of the weakest of them, so an amber film or a bright background shifts it where it must be.
 
 use super::component::{HueAxis, from_255, to_255};
+use super::morphology::{dilate, erode};
 use crate::video::Picture;
 
 /// Below this, on the scale to 255, nothing is taken for a mark: the chroma noise of cameras and codecs.
@@ -52,31 +53,8 @@ impl Relief {
 
     /// Grey opening over 3×3 samples: ridges of up to two samples, such as burnt-in lines, are worn away.
     pub fn open(&mut self) {
-        self.slide(i16::min);
-        self.slide(i16::max);
-    }
-
-    /// Replaces every height by the extreme of its 3×3 neighbourhood.
-    fn slide(&mut self, extreme: fn(i16, i16) -> i16) {
-        let width = self.width;
-        let across: Vec<i16> = self
-            .heights
-            .chunks(width)
-            .flat_map(|row| {
-                (0..width).map(move |x| {
-                    let sides = (row[x.saturating_sub(1)], row[(x + 1).min(width - 1)]);
-                    extreme(row[x], extreme(sides.0, sides.1))
-                })
-            })
-            .collect();
-        let rows = across.len() / width;
-        for y in 0..rows {
-            let (above, below) = (y.saturating_sub(1) * width, (y + 1).min(rows - 1) * width);
-            for x in 0..width {
-                self.heights[y * width + x] =
-                    extreme(across[y * width + x], extreme(across[above + x], across[below + x]));
-            }
-        }
+        erode(&mut self.heights, self.width, 1);
+        dilate(&mut self.heights, self.width, 1);
     }
 
     /// The summits with at least `least_samples` samples, most persistent first.

@@ -3,14 +3,9 @@
 //! Marks are seen most of the time, look alike, and keep their distances: a link is rigid, a strip hardly shortens.
 //! A knob on the stand keeps its distance from nothing that swings.
 
-use super::tracker::{FrameBlobs, MarkSlot, Sighting, median};
-
-/// Sightings of one thing over the window: (frame, blob).
-#[derive(Debug, Clone, PartialEq)]
-pub(super) struct Tracklet {
-    pub hue: u8,
-    pub sightings: Vec<(usize, usize)>,
-}
+use super::tracklet::Tracklet;
+use super::{FrameBlobs, MarkSlot, Sighting};
+use crate::statistics::median;
 
 /// Which tracklet is which mark.
 #[derive(Debug, Clone, Default, PartialEq)]
@@ -30,8 +25,10 @@ struct Candidate {
     tracklet: usize,
     hue: u8,
     presence: f64,
+    /// Share of the window that is over when it is first seen.
+    lateness: f64,
     ln_area: f64,
-    /// Distance down the picture, or from the pivot.
+    /// How far down the picture it comes, or how far from the pivot; one frame in twenty apart.
     order: f64,
     /// Position by frame.
     path: Vec<Option<[f64; 2]>>,
@@ -80,17 +77,21 @@ fn candidates(tracklets: &[Tracklet], window: &[FrameBlobs], pivot_px: Option<[f
             for at in &t.sightings {
                 path[at.0] = Some(sighting(at).measured.position_px);
             }
-            let order = median(path.iter().flatten().map(|p| match pivot_px {
+            let order = |p: &[f64; 2]| match pivot_px {
                 Some(pivot) => (p[0] - pivot[0]).hypot(p[1] - pivot[1]),
                 None => p[1],
-            }));
+            };
+            let mut orders: Vec<f64> = path.iter().flatten().map(order).collect();
+            orders.sort_unstable_by(f64::total_cmp);
+            let mut ln_areas: Vec<f64> =
+                t.sightings.iter().map(|s| f64::from(sighting(s).measured.area_px2).ln()).collect();
             Candidate {
                 tracklet,
                 hue: t.hue,
                 presence: t.sightings.len() as f64 / window.len() as f64,
-                ln_area: median(t.sightings.iter().map(|s| f64::from(sighting(s).measured.area_px2).ln()))
-                    .unwrap_or(0.0),
-                order: order.unwrap_or(0.0),
+                lateness: t.sightings.first().map_or(1.0, |s| s.0 as f64 / window.len() as f64),
+                ln_area: median(&mut ln_areas).unwrap_or(0.0),
+                order: orders.get(orders.len() * 19 / 20).copied().unwrap_or(0.0),
                 path,
             }
         })
@@ -131,7 +132,8 @@ fn search(
 
 fn score(kept: &[Candidate], assignment: &[Option<usize>]) -> f64 {
     let chosen: Vec<&Candidate> = assignment.iter().flatten().map(|i| &kept[*i]).collect();
-    let presence: f64 = chosen.iter().map(|c| c.presence).sum();
+    // of two halves of a track, before a gap and after it, the first: what follows it will be found again
+    let presence: f64 = chosen.iter().map(|c| c.presence - c.lateness).sum();
     let stretch = chosen.windows(2).map(|w| length_spread(w[0], w[1])).fold(0.0, f64::max);
     let mean = chosen.iter().map(|c| c.ln_area).sum::<f64>() / chosen.len().max(1) as f64;
     let unlike = (chosen.iter().map(|c| (c.ln_area - mean).powi(2)).sum::<f64>() / chosen.len().max(1) as f64).sqrt();
@@ -140,7 +142,7 @@ fn score(kept: &[Candidate], assignment: &[Option<usize>]) -> f64 {
 
 /// Relative spread of the distance of two candidates over the frames that show both; 1 where there are none.
 fn length_spread(a: &Candidate, b: &Candidate) -> f64 {
-    let lengths: Vec<f64> = a
+    let mut lengths: Vec<f64> = a
         .path
         .iter()
         .zip(&b.path)
@@ -149,7 +151,7 @@ fn length_spread(a: &Candidate, b: &Candidate) -> f64 {
             Some((p[0] - q[0]).hypot(p[1] - q[1]))
         })
         .collect();
-    let Some(usual) = median(lengths.iter().copied()).filter(|l| *l > 0.0) else { return 1.0 };
+    let Some(usual) = median(&mut lengths).filter(|l| *l > 0.0) else { return 1.0 };
     let mean_deviation = lengths.iter().map(|l| (l - usual).abs()).sum::<f64>() / lengths.len() as f64;
     (mean_deviation / usual).min(1.0)
 }

@@ -1,14 +1,23 @@
 //! Blobs → one track a mark (paper Section III.II).
 
 mod assign;
+mod chain;
 mod choose;
+mod follower;
+mod identity;
 mod kalman;
 mod noise;
+mod sighting;
 mod smooth;
 mod tracker;
+mod tracklet;
+mod tracks;
 
 pub use kalman::{Belief, Measurement, Motion};
-pub use tracker::{FrameBlobs, MarkFound, MarkSlot, Scatter, Sighting, Tracker, Tracks};
+pub use noise::Scatter;
+pub use sighting::{FrameBlobs, Sighting};
+pub use tracker::{MarkFound, MarkSlot, Tracker};
+pub use tracks::Tracks;
 
 /// One mark in one frame.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -86,7 +95,7 @@ impl Flags {
     pub const MERGED: Self = Self(4);
     /// Reaches over the picture's edge.
     pub const CUT: Self = Self(8);
-    /// Could as well have been the neighbouring mark.
+    /// Could as well have been another mark of the same colour.
     pub const AMBIGUOUS: Self = Self(16);
 
     const NAMES: [(Self, &'static str); 5] = [

@@ -9,7 +9,8 @@
 //! does not show as scatter. The two states therefore have a factor each, and a mark at rest is never believed to
 //! be better than its own noise or than [`REST_SHARE`] of what the moving marks show.
 
-use super::Measured;
+use super::{Flags, Measured};
+use crate::statistics::{median, median_step_s};
 
 /// Orders that are tried; the least result counts, for motion can only add to it.
 const ORDERS: [usize; 4] = [6, 8, 10, 12];
@@ -22,7 +23,39 @@ const MOVING_PX: f64 = 0.5;
 /// What neighbouring errors have in common, which differences do not see, and the choice of the least result.
 const UNSEEN: f64 = 1.30;
 /// Error at rest over error in motion, on rendered recordings.
-pub const REST_SHARE: f64 = 0.42;
+const REST_SHARE: f64 = 0.42;
+
+/// Factors (x, y) on the stated standard deviation of a mark.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Scatter {
+    /// At rest.
+    pub resting: [f64; 2],
+    /// In motion.
+    pub moving: [f64; 2],
+}
+
+/// The factors of all marks; a mark that never moves takes over what the moving ones show.
+pub fn scatters(marks: &[Vec<(Option<Measured>, Flags)>], t_s: &[f64]) -> Vec<Scatter> {
+    let tracks: Vec<Vec<Option<Measured>>> =
+        marks.iter().map(|points| points.iter().map(|(m, _)| *m).collect()).collect();
+    let speeds: Vec<Vec<f64>> = tracks.iter().map(|t| speeds_px(t)).collect();
+    let moving: Vec<[Option<f64>; 2]> =
+        tracks.iter().zip(&speeds).map(|(t, v)| [0, 1].map(|axis| moving_factor(t, v, t_s, axis))).collect();
+    let shown: Vec<f64> = moving.iter().flatten().flatten().copied().collect();
+    let usual = shown.iter().sum::<f64>() / shown.len().max(1) as f64;
+    tracks
+        .iter()
+        .zip(&speeds)
+        .zip(&moving)
+        .map(|((track, speed), moving)| {
+            let rest = |axis| resting_factor(track, speed, t_s, axis).unwrap_or(1.0);
+            Scatter {
+                resting: [0, 1].map(|axis| rest(axis).max(REST_SHARE * moving[axis].unwrap_or(usual)).max(1.0)),
+                moving: moving.map(|k| k.unwrap_or(usual).max(1.0)),
+            }
+        })
+        .collect()
+}
 
 /// Speed of a track, px a frame, from its neighbours in time.
 pub fn speeds_px(points: &[Option<Measured>]) -> Vec<f64> {
@@ -41,7 +74,7 @@ pub fn speeds_px(points: &[Option<Measured>]) -> Vec<f64> {
 }
 
 /// κ in motion along one axis (0: x, 1: y), or `None` where the track moves too little or is too uneven.
-pub fn moving_factor(points: &[Option<Measured>], speeds_px: &[f64], t_s: &[f64], axis: usize) -> Option<f64> {
+fn moving_factor(points: &[Option<Measured>], speeds_px: &[f64], t_s: &[f64], axis: usize) -> Option<f64> {
     let of_order = |order: &usize| {
         let mut scores = scores(points, speeds_px, t_s, axis, *order);
         scores.retain(|s| s.speed_px >= MOVING_PX);
@@ -53,7 +86,7 @@ pub fn moving_factor(points: &[Option<Measured>], speeds_px: &[f64], t_s: &[f64]
 }
 
 /// κ at rest along one axis, or `None` where the track rests too little.
-pub fn resting_factor(points: &[Option<Measured>], speeds_px: &[f64], t_s: &[f64], axis: usize) -> Option<f64> {
+fn resting_factor(points: &[Option<Measured>], speeds_px: &[f64], t_s: &[f64], axis: usize) -> Option<f64> {
     let mut scores = scores(points, speeds_px, t_s, axis, ORDERS[0]);
     scores.retain(|s| s.speed_px < MOVING_PX);
     (scores.len() >= LEAST_WINDOWS).then(|| scale(&scores))
@@ -74,13 +107,11 @@ struct Score {
 /// Normal scale from the median size.
 fn scale(scores: &[Score]) -> f64 {
     let mut sizes: Vec<f64> = scores.iter().map(|s| s.size).collect();
-    let middle = sizes.len() / 2;
-    let (_, median, _) = sizes.select_nth_unstable_by(middle, f64::total_cmp);
-    *median / 0.6745
+    median(&mut sizes).unwrap_or(0.0) / 0.6745
 }
 
 fn scores(points: &[Option<Measured>], speeds_px: &[f64], t_s: &[f64], axis: usize, order: usize) -> Vec<Score> {
-    let Some(step) = median_step(t_s) else { return Vec::new() };
+    let Some(step) = median_step_s(t_s) else { return Vec::new() };
     let weights = binomial(order);
     let mut scores = Vec::new();
     for start in 0..points.len().saturating_sub(order) {
@@ -101,16 +132,6 @@ fn scores(points: &[Option<Measured>], speeds_px: &[f64], t_s: &[f64], axis: usi
         }
     }
     scores
-}
-
-fn median_step(t_s: &[f64]) -> Option<f64> {
-    let mut steps: Vec<f64> = t_s.windows(2).map(|w| w[1] - w[0]).collect();
-    if steps.is_empty() {
-        return None;
-    }
-    let middle = steps.len() / 2;
-    let (_, median, _) = steps.select_nth_unstable_by(middle, f64::total_cmp);
-    (*median > 0.0).then_some(*median)
 }
 
 /// Alternating binomial coefficients.

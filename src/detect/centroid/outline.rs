@@ -50,7 +50,7 @@ impl Outline {
     /// The sector of a direction.
     #[inline]
     pub fn sector(&self, dx: f32, dy: f32) -> usize {
-        ((fast_atan2(dy, dx) / TAU * self.count() as f32) as usize).min(self.count() - 1)
+        ((fast_atan2(dy, dx) / TAU * self.count() as f32) as i32 as usize).min(self.count() - 1)
     }
 
     /// Sine and cosine of the middle of a sector.

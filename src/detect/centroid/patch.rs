@@ -54,17 +54,20 @@ impl Patch {
         let wide = picture.wide();
         let scale = 1.0 / f32::from(1u16 << (picture.layout.bits - 8)) / f32::from(1u16 << picture.layout.low_bits);
         self.samples.reserve(self.width * self.height);
+        // whole rows first, in loops that the compiler can turn into vector instructions
+        let dx: Vec<f32> = (0..self.width).map(|i| ((self.left + i) as f64 - outline.centre_px[0]) as f32).collect();
+        let (mut squares, mut sectors) = (vec![0.0; self.width], vec![0u16; self.width]);
         for j in 0..self.height {
             let dy = ((self.top + j) as f64 - outline.centre_px[1]) as f32;
-            for i in 0..self.width {
-                let dx = ((self.left + i) as f64 - outline.centre_px[0]) as f32;
-                let square = dx * dx + dy * dy;
-                if square <= reach * reach {
-                    let luma = f32::from(picture.luma.code(wide, self.left + i, self.top + j)) * scale;
-                    let levels = [luma, component[j * self.width + i]];
-                    let (distance_px, sector) = (square.sqrt(), outline.sector(dx, dy) as u16);
-                    self.samples.push(Sample { dx_px: dx, dy_px: dy, distance_px, sector, levels });
-                }
+            for ((square, sector), dx) in squares.iter_mut().zip(&mut sectors).zip(&dx) {
+                *square = dx * dx + dy * dy;
+                *sector = outline.sector(*dx, dy) as u16;
+            }
+            for i in (0..self.width).filter(|i| squares[*i] <= reach * reach) {
+                let luma = f32::from(picture.luma.code(wide, self.left + i, self.top + j)) * scale;
+                let levels = [luma, component[j * self.width + i]];
+                let (distance_px, sector) = (squares[i].sqrt(), sectors[i]);
+                self.samples.push(Sample { dx_px: dx[i], dy_px: dy, distance_px, sector, levels });
             }
         }
     }

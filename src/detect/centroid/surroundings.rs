@@ -3,6 +3,7 @@
 use super::outline::Outline;
 use super::patch::{Patch, Sample};
 use super::share::Share;
+use crate::statistics::median;
 
 /// Width of the ring from which the background is read.
 pub const RING_PX: f32 = 3.0;
@@ -49,7 +50,7 @@ impl Surroundings {
             }
         }
         // a mark narrower than its band has no core: its deepest pixel stands for it
-        let mark = if core[0].len() >= 4 { core.map(|mut c| median(&mut c)) } else { deepest.1 };
+        let mark = if core[0].len() >= 4 { core.map(|mut c| median(&mut c).unwrap_or(0.0)) } else { deepest.1 };
         let mut surroundings =
             Self { sectors: vec![Sector::default(); outline.count()], mark, noise: [0.0; 2], slope: [[0.0; 2]; 2] };
         surroundings.read_ring(ring, outline)?;
@@ -67,7 +68,7 @@ impl Surroundings {
             for (k, residual) in residuals.iter_mut().enumerate() {
                 values.clear();
                 values.extend(group.iter().map(|(_, levels)| levels[k]));
-                let level = median(&mut values);
+                let level = median(&mut values).unwrap_or(0.0);
                 sector.background[k] = level;
                 residual.extend(values.iter().map(|v| (v - level).abs()));
             }
@@ -75,7 +76,7 @@ impl Surroundings {
         fill_unknown(&mut self.sectors)?;
         self.drop_lines();
         // 1.4826 × median absolute deviation; the sector medians take up a third of it
-        self.noise = residuals.map(|mut r| (1.4826 * 1.2 * median(&mut r)).max(LEAST_NOISE));
+        self.noise = residuals.map(|mut r| (1.4826 * 1.2 * median(&mut r).unwrap_or(0.0)).max(LEAST_NOISE));
         for (index, sector) in self.sectors.iter_mut().enumerate() {
             let reach = outline.radii_px[index] + outline.band_px + 0.5 * RING_PX;
             let (sin, cos) = outline.direction(index);
@@ -148,7 +149,7 @@ fn background_slope(sectors: &[Sector], channel: usize, noise: f32) -> [f32; 2] 
             .abs() as f32
         };
         let mut sizes: Vec<f32> = sectors.iter().filter(|s| s.known).map(residual).collect();
-        let limit = (3.0 * 1.4826 * median(&mut sizes)).max(2.0 * noise);
+        let limit = (3.0 * 1.4826 * median(&mut sizes).unwrap_or(0.0)).max(2.0 * noise);
         kept = sectors.iter().map(|s| s.known && residual(s) <= limit).collect();
     }
     if 3 * kept.iter().filter(|k| **k).count() < 2 * sectors.len() {
@@ -186,18 +187,4 @@ fn fill_unknown(sectors: &mut [Sector]) -> Option<()> {
         }
     }
     Some(())
-}
-
-fn median(values: &mut [f32]) -> f32 {
-    if values.is_empty() {
-        return 0.0;
-    }
-    let middle = values.len() / 2;
-    let (below, m, _) = values.select_nth_unstable_by(middle, f32::total_cmp);
-    let m = *m;
-    if below.len() == middle && values.len().is_multiple_of(2) {
-        let under = values[..middle].iter().copied().fold(f32::MIN, f32::max);
-        return 0.5 * (m + under);
-    }
-    m
 }

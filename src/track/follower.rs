@@ -1,0 +1,119 @@
+//! One followed thing of a mark's colour, while frames come in.
+
+use super::kalman::{Belief, Measurement, Motion};
+use super::{Measured, Sighting};
+use nalgebra::{Matrix2, Vector2};
+
+/// Gate on the squared Mahalanobis distance: 99.9996 % for two dimensions.
+pub const GATE: f64 = 25.0;
+/// One standard deviation of ln(area) from frame to frame, blur included.
+const LN_AREA_SD: f64 = 0.5;
+/// A sighting more than five times as large or as small is something else.
+const MOST_LN_AREA: f64 = 1.61;
+/// Most that a change of area adds to the cost of a sighting.
+pub const MOST_AREA_COST: f64 = 8.0;
+
+/// Steps between frames over which a course is straight enough to tell marks apart.
+const LONGEST_COURSE_STEPS: f64 = 3.5;
+
+/// One followed thing, while frames come in.
+#[derive(Debug, Clone)]
+pub struct Follower {
+    pub hue: u8,
+    belief: Belief,
+    motion: Motion,
+    area_px2: f64,
+    t_s: f64,
+    /// When it was last seen.
+    pub seen_s: f64,
+    /// Frames in which it was seen beside all marks of its hue.
+    pub age: u32,
+    /// Frames since it was last seen, the one it waits for included.
+    unseen_frames: u32,
+    step_s: f64,
+}
+
+impl Follower {
+    /// At rest at its first sighting.
+    pub fn start(sighting: &Sighting, t_s: f64, step_s: f64) -> Self {
+        let area = f64::from(sighting.measured.area_px2);
+        let diameter = area.sqrt() * 1.13;
+        // a mark moves about its own diameter off a straight course between two frames, until more is known
+        let motion = Motion { acceleration_psd_px2_s3: 3.0 * diameter.powi(2) / step_s.powi(3) };
+        let speed = 2.0 * diameter / step_s;
+        Self {
+            hue: sighting.hue,
+            belief: Belief::from_measurement(&measurement(&sighting.measured, 0.0), speed),
+            motion,
+            area_px2: area,
+            t_s,
+            seen_s: t_s,
+            age: 0,
+            unseen_frames: 0,
+            step_s,
+        }
+    }
+
+    /// Waits for what is seen at `t_s`.
+    pub fn predict(&mut self, t_s: f64) {
+        self.belief = self.belief.predict(&self.motion, (t_s - self.t_s).max(0.0));
+        self.t_s = t_s;
+        self.unseen_frames += 1;
+    }
+
+    /// How widely what is believed of its place is spread: ln of the determinant of its covariance.
+    pub fn ln_spread(&self) -> f64 {
+        let place = Matrix2::identity() * self.radius_px().powi(2) + self.belief.position_covariance_px2();
+        place.determinant().max(f64::MIN_POSITIVE).ln()
+    }
+
+    /// It was not seen in the frame before the one it waits for.
+    pub fn was_lost(&self) -> bool {
+        self.unseen_frames > 1 || self.is_long_lost()
+    }
+
+    /// It has not been seen for so long that its course says nothing about where it is.
+    pub fn is_long_lost(&self) -> bool {
+        self.t_s - self.seen_s > LONGEST_COURSE_STEPS * self.step_s
+    }
+
+    fn radius_px(&self) -> f64 {
+        0.56 * self.area_px2.sqrt()
+    }
+
+    /// Cost of a sighting, `None` outside the gate. The gate is never narrower than the mark itself, so that a
+    /// specimen released after minutes of rest is not lost.
+    pub fn cost(&self, sighting: &Sighting) -> Option<f64> {
+        if sighting.hue != self.hue {
+            return None;
+        }
+        let (d2, _) = self.belief.distance2(&measurement(&sighting.measured, self.radius_px()))?;
+        let ln_area = (f64::from(sighting.measured.area_px2) / self.area_px2).ln();
+        if ln_area.abs() > MOST_LN_AREA {
+            return None;
+        }
+        let cost = d2 + (ln_area / LN_AREA_SD).powi(2).min(MOST_AREA_COST);
+        (d2 <= GATE).then_some(cost)
+    }
+
+    /// Takes the sighting that was assigned to it.
+    pub fn update(&mut self, sighting: &Sighting) {
+        let z = measurement(&sighting.measured, 0.1);
+        if let Some(belief) = self.belief.update(&z) {
+            self.belief = belief;
+        }
+        self.area_px2 += 0.05 * (f64::from(sighting.measured.area_px2) - self.area_px2);
+        self.seen_s = self.t_s;
+        self.unseen_frames = 0;
+    }
+}
+
+/// A centroid as the filter takes it, with some extra uncertainty.
+pub fn measurement(measured: &Measured, extra_sd_px: f64) -> Measurement {
+    let [xx, yy, xy] = measured.covariance_px2;
+    let extra = extra_sd_px * extra_sd_px + 1e-8;
+    Measurement {
+        position_px: Vector2::from(measured.position_px),
+        covariance_px2: Matrix2::new(xx + extra, xy, xy, yy + extra),
+    }
+}

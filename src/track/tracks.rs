@@ -1,0 +1,128 @@
+//! The marks' tracks: measured positions with the variances that their own scatter shows, and the paper's filter over
+//! them, with the true time steps.
+
+use super::follower::measurement;
+use super::kalman::{Belief, Motion};
+use super::noise::{Scatter, speeds_px, variance_factor};
+use super::smooth::smooth;
+use super::{Filtered, Flags, Measured, Point};
+use crate::statistics::median;
+
+/// The marks' tracks over the whole recording.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Tracks {
+    /// Time stamp of every frame.
+    pub t_s: Vec<f64>,
+    /// For each mark, a point a frame.
+    pub marks: Vec<Vec<Point>>,
+    /// The process noise each mark was filtered with.
+    pub motion: Vec<Motion>,
+    /// Factors by which each mark's stated standard deviations were multiplied to match its scatter.
+    pub scatter: Vec<Scatter>,
+    /// Median area of each mark.
+    pub area_px2: Vec<f64>,
+    /// Frames that the decoder reported as damaged.
+    pub damaged_frames: Vec<usize>,
+    /// How many things of a mark's colour were seen beside the marks when they were chosen.
+    pub other_candidates: usize,
+}
+
+impl Tracks {
+    /// Adds a mark's points of every frame.
+    pub(super) fn add_mark(&mut self, points: Vec<(Option<Measured>, Flags)>, scatter: Scatter, step_s: f64) {
+        let (mut measured, mut flags): (Vec<_>, Vec<_>) = points.into_iter().unzip();
+        let mut areas: Vec<f64> = measured.iter().flatten().map(|m| f64::from(m.area_px2)).collect();
+        let area = median(&mut areas).unwrap_or(0.0);
+        let speeds = speeds_px(&measured);
+        for ((m, f), speed) in measured.iter_mut().zip(&mut flags).zip(speeds) {
+            if let Some(m) = m {
+                let [x, y] = [0, 1].map(|axis| variance_factor(speed, scatter.resting[axis], scatter.moving[axis]));
+                m.covariance_px2[0] *= x;
+                m.covariance_px2[1] *= y;
+                m.covariance_px2[2] *= (x * y).sqrt();
+                mind_area(m, f, area);
+            }
+        }
+        let motion = Motion { acceleration_psd_px2_s3: acceleration_psd(&measured, &self.t_s, step_s) };
+        let filtered = filter(&measured, &self.t_s, &motion, area);
+        self.marks.push(
+            measured
+                .into_iter()
+                .zip(filtered)
+                .zip(flags)
+                .map(|((measured, filtered), flags)| Point { measured, filtered, flags })
+                .collect(),
+        );
+        self.motion.push(motion);
+        self.scatter.push(scatter);
+        self.area_px2.push(area);
+    }
+
+    /// The fixed-interval smoothed track of mark `mark`.
+    pub fn smoothed(&self, mark: usize) -> Vec<Option<Measured>> {
+        let filtered: Vec<Option<Filtered>> = self.marks[mark].iter().map(|p| p.filtered).collect();
+        smooth(&filtered, &self.t_s, &self.motion[mark])
+    }
+}
+
+/// A mark that is partly hidden has its centroid off by up to the hidden share of its radius; one that has grown
+/// holds something else as well. Both are flagged and their variance grows accordingly.
+fn mind_area(m: &mut Measured, flags: &mut Flags, usual_px2: f64) {
+    let ratio = f64::from(m.area_px2) / usual_px2.max(1e-9);
+    let deficit = if ratio < 0.85 {
+        flags.insert(Flags::PARTIAL);
+        1.0 - ratio
+    } else if ratio > 1.35 {
+        flags.insert(Flags::MERGED);
+        1.0 - 1.0 / ratio
+    } else if flags.contains(Flags::CUT) {
+        0.1
+    } else {
+        return;
+    };
+    let extra = (deficit * (usual_px2 / std::f64::consts::PI).sqrt()).powi(2);
+    m.covariance_px2[0] += extra;
+    m.covariance_px2[1] += extra;
+}
+
+/// The paper's filter over the measurements of one mark.
+fn filter(measured: &[Option<Measured>], t_s: &[f64], motion: &Motion, area_px2: f64) -> Vec<Option<Filtered>> {
+    let mut belief: Option<Belief> = None;
+    let step = |i: usize| if i == 0 { 0.0 } else { (t_s[i] - t_s[i - 1]).max(0.0) };
+    let speed_sd = (motion.acceleration_psd_px2_s3 * 1.0).sqrt().max(area_px2.sqrt());
+    measured
+        .iter()
+        .enumerate()
+        .map(|(i, m)| {
+            let predicted = belief.map(|b| b.predict(motion, step(i)));
+            belief = match (predicted, m) {
+                (Some(p), Some(m)) => p.update(&measurement(m, 0.0)).or(Some(p)),
+                (Some(p), None) => Some(p),
+                (None, Some(m)) => Some(Belief::from_measurement(&measurement(m, 0.0), speed_sd)),
+                (None, None) => None,
+            };
+            belief.as_ref().map(Filtered::pack)
+        })
+        .collect()
+}
+
+/// q = a²·Δt with a the root mean square second difference of the measured positions.
+fn acceleration_psd(measured: &[Option<Measured>], t_s: &[f64], step_s: f64) -> f64 {
+    let (mut sum, mut count) = (0.0, 0.0f64);
+    for i in 2..measured.len() {
+        if let (Some(a), Some(b), Some(c)) = (&measured[i - 2], &measured[i - 1], &measured[i]) {
+            let (h, k) = (t_s[i - 1] - t_s[i - 2], t_s[i] - t_s[i - 1]);
+            if h <= 0.0 || k <= 0.0 {
+                continue;
+            }
+            for axis in 0..2 {
+                let (p, q, r) = (a.position_px[axis], b.position_px[axis], c.position_px[axis]);
+                sum += (2.0 * ((r - q) / k - (q - p) / h) / (h + k)).powi(2);
+                count += 1.0;
+            }
+        }
+    }
+    // never below a hundredth of a pixel a step, so that the filter does not freeze on a mark at rest
+    let floor = 3.0 * 1e-4 / step_s.powi(3);
+    (sum / count.max(1.0) * step_s).max(floor)
+}
