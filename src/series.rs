@@ -411,7 +411,7 @@ mod tests {
     #[test]
     fn tables_too_short_are_refused() {
         assert_eq!(refusal(""), "a.csv: the file is empty (0 bytes); record or copy it again");
-        assert_eq!(refusal("t_s,theta1_rad\n"), "a.csv: holds a header and no row; measure the recording again");
+        assert_eq!(refusal("t_s,theta1_rad\n"), "a.csv: holds no row of numbers; measure the recording again");
         assert_eq!(refusal(&table(swing, 1)), "a.csv: holds one row; a swing needs at least 8");
         assert_eq!(refusal(&table(swing, 7)), "a.csv: holds 7 rows; a swing needs at least 8");
         let gaps = "t_s,theta1_rad\n0,\n1,\n2,\n3,0.1\n4,\n5,\n6,\n7,\n";

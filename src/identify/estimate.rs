@@ -62,9 +62,17 @@ impl Estimate {
     }
 }
 
+/// Quantile 0.975 of the normal distribution.
+const NORMAL_QUANTILE: f64 = 1.959_963_984_540_054;
+/// From here on Student's quantile differs from the normal one by less than 3·10⁻⁶ of it; the library's inversion does not end for very many.
+const NEARLY_NORMAL: f64 = 5e5;
+
 /// t₀.₉₇₅ of Student's distribution.
 pub fn student_quantile(degrees_of_freedom: f64) -> f64 {
-    StudentsT::new(0.0, 1.0, degrees_of_freedom.max(1.0)).map_or(1.96, |t| t.inverse_cdf(0.975))
+    if degrees_of_freedom >= NEARLY_NORMAL {
+        return NORMAL_QUANTILE;
+    }
+    StudentsT::new(0.0, 1.0, degrees_of_freedom.max(1.0)).map_or(NORMAL_QUANTILE, |t| t.inverse_cdf(0.975))
 }
 
 /// Probability that χ² with so many degrees of freedom exceeds the value.
