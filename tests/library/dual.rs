@@ -1,4 +1,4 @@
-//! Numbers that carry a derivative.
+//! Numbers that carry their derivatives.
 
 use std::ops::{Add, Div, Mul, Neg, Sub};
 
@@ -25,18 +25,37 @@ impl Number for f64 {
     }
 }
 
-/// a + εb with ε² = 0.
+/// Number of derivatives carried.
+pub const CARRIED: usize = 8;
+
+/// a + Σ bᵢεᵢ with εᵢεⱼ = 0.
 #[derive(Debug, Clone, Copy)]
 pub struct Dual {
     pub value: f64,
-    pub slope: f64,
+    pub slopes: [f64; CARRIED],
+}
+
+impl Dual {
+    /// The variable whose own derivative is number `i`.
+    pub fn variable(value: f64, i: usize) -> Self {
+        Self { value, slopes: std::array::from_fn(|k| if k == i { 1.0 } else { 0.0 }) }
+    }
+
+    /// `value`, with the derivatives `own` × its own + `others` × the other's.
+    fn with(self, value: f64, own: f64, other: &Self, others: f64) -> Self {
+        Self { value, slopes: std::array::from_fn(|k| own * self.slopes[k] + others * other.slopes[k]) }
+    }
+
+    fn scaled(self, value: f64, own: f64) -> Self {
+        Self { value, slopes: self.slopes.map(|slope| own * slope) }
+    }
 }
 
 impl Add for Dual {
     type Output = Self;
 
     fn add(self, other: Self) -> Self {
-        Self { value: self.value + other.value, slope: self.slope + other.slope }
+        self.with(self.value + other.value, 1.0, &other, 1.0)
     }
 }
 
@@ -44,7 +63,7 @@ impl Sub for Dual {
     type Output = Self;
 
     fn sub(self, other: Self) -> Self {
-        Self { value: self.value - other.value, slope: self.slope - other.slope }
+        self.with(self.value - other.value, 1.0, &other, -1.0)
     }
 }
 
@@ -52,7 +71,7 @@ impl Mul for Dual {
     type Output = Self;
 
     fn mul(self, other: Self) -> Self {
-        Self { value: self.value * other.value, slope: self.slope * other.value + self.value * other.slope }
+        self.with(self.value * other.value, other.value, &other, self.value)
     }
 }
 
@@ -60,8 +79,9 @@ impl Div for Dual {
     type Output = Self;
 
     fn div(self, other: Self) -> Self {
-        let value = self.value / other.value;
-        Self { value, slope: (self.slope - value * other.slope) / other.value }
+        let inverse = 1.0 / other.value;
+        let value = self.value * inverse;
+        self.with(value, inverse, &other, -value * inverse)
     }
 }
 
@@ -69,18 +89,18 @@ impl Neg for Dual {
     type Output = Self;
 
     fn neg(self) -> Self {
-        Self { value: -self.value, slope: -self.slope }
+        self.scaled(-self.value, -1.0)
     }
 }
 
 impl Number for Dual {
     fn of(value: f64) -> Self {
-        Self { value, slope: 0.0 }
+        Self { value, slopes: [0.0; CARRIED] }
     }
 
     fn sin_cos(self) -> (Self, Self) {
         let (sin, cos) = self.value.sin_cos();
-        (Self { value: sin, slope: cos * self.slope }, Self { value: cos, slope: -sin * self.slope })
+        (self.scaled(sin, cos), self.scaled(cos, -sin))
     }
 
     fn abs(self) -> Self {

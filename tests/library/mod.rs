@@ -1,15 +1,17 @@
 //! Two rods, written out once more and integrated by a library (`diffsol`), with its forward sensitivities.
 //!
-//! State θ₁, θ₂, ω₁, ω₂ and, with hysteresis, z. The derivatives a library wants as products with a vector come from dual numbers: nothing of
-//! the model's own derivatives is used.
+//! State θ₁, θ₂, ω₁, ω₂ and, with hysteresis, z. The derivatives come from dual numbers: nothing of the model's own derivatives is used.
 
 mod dual;
 mod own;
 
+use std::cell::RefCell;
+
 use diffsol::{DiffsolError, NalgebraLU, NalgebraMat, OdeBuilder, SensitivitiesOdeSolverMethod};
-use dual::{Dual, Number};
+use dual::{CARRIED, Dual, Number};
 use freeswing::experiment::{Effects, Experiment, Hysteresis, Model, Specimen};
 
+const _: () = assert!(CARRIED == STATES + COEFFICIENTS);
 type Matrix = NalgebraMat<f64>;
 type Solver = NalgebraLU<f64>;
 
@@ -51,6 +53,10 @@ pub struct Swing {
     pub slopes: Vec<[[f64; 2]; DIRECTIONS]>,
 }
 
+/// θ₁, θ₂, ω₁, ω₂, z.
+const STATES: usize = 5;
+/// K, C, c of the hinge.
+const COEFFICIENTS: usize = 3;
 const LENGTH_M: f64 = 0.1;
 const GRAVITY_M_S2: f64 = 9.80665;
 /// Of each rod.
@@ -117,22 +123,10 @@ impl TwoRods {
         out[3] = (a11 * q2 - a12 * q1) / determinant;
     }
 
-    /// d(dy/dt) along a change of the state and one of the parameters.
-    fn flow_along(&self, y: &[f64], dy: &[f64], p: &[f64], dp: &[f64], out: &mut [f64]) {
-        let dual = |value: &[f64], slope: &[f64]| -> [Dual; DIRECTIONS] {
-            std::array::from_fn(|i| Dual {
-                value: value.get(i).copied().unwrap_or(0.0),
-                slope: slope.get(i).copied().unwrap_or(0.0),
-            })
-        };
-        let mut flow = [Dual::of(0.0); 5];
-        self.flow(&dual(y, dy), &dual(p, dp), &mut flow);
-        out.iter_mut().zip(flow).for_each(|(out, flow)| *out = flow.slope);
-    }
-
     /// Lets the library swing them; `times_s` begin after 0.
     pub fn swing(&self, method: Method, tolerance: Tolerance, times_s: &[f64]) -> Result<Swing, DiffsolError> {
         let states = self.states();
+        let here = RefCell::new(Linear::default());
         let mut builder = OdeBuilder::<Matrix>::new()
             .p(self.values)
             .h0(1e-4)
@@ -140,8 +134,8 @@ impl TwoRods {
             .atol(vec![tolerance.of_state; states])
             .rhs_sens_implicit(
                 |y, p, _, out| self.flow(y, p, out),
-                |y, p, _, dy, out| self.flow_along(y, dy, p, &[], out),
-                |y, p, _, dp, out| self.flow_along(y, &[], p, dp, out),
+                |y, p, _, dy, out| here.borrow_mut().at(self, y, p).along(0, dy, out),
+                |y, p, _, dp, out| here.borrow_mut().at(self, y, p).along(STATES, &dp[..COEFFICIENTS], out),
             )
             .init_sens(
                 |p, _, y| {
@@ -170,6 +164,37 @@ impl TwoRods {
             theta_rad: columns.clone().map(|column| angles(&theta, column)).collect(),
             slopes: columns.map(|column| std::array::from_fn(|i| angles(&slopes[i], column))).collect(),
         })
+    }
+}
+
+/// The linearised equations at one state. A library asks for their products with one vector after another: they are derived once.
+#[derive(Default)]
+struct Linear {
+    y: [f64; STATES],
+    p: [f64; COEFFICIENTS],
+    rows: Option<[Dual; STATES]>,
+}
+
+impl Linear {
+    fn at(&mut self, rods: &TwoRods, y: &[f64], p: &[f64]) -> &Self {
+        let p = &p[..COEFFICIENTS];
+        if self.rows.is_none() || self.y[..y.len()] != *y || self.p != *p {
+            self.y[..y.len()].copy_from_slice(y);
+            self.p.copy_from_slice(p);
+            let state: [Dual; STATES] = std::array::from_fn(|i| Dual::variable(self.y[i], i));
+            let coefficients: [Dual; COEFFICIENTS] = std::array::from_fn(|i| Dual::variable(p[i], STATES + i));
+            let mut rows = [Dual::of(0.0); STATES];
+            rods.flow(&state, &coefficients, &mut rows);
+            self.rows = Some(rows);
+        }
+        self
+    }
+
+    /// The product with a vector of the derivatives from number `first` on.
+    fn along(&self, first: usize, vector: &[f64], out: &mut [f64]) {
+        for (out, row) in out.iter_mut().zip(self.rows.iter().flatten()) {
+            *out = row.slopes[first..].iter().zip(vector).map(|(slope, v)| slope * v).sum();
+        }
     }
 }
 
