@@ -230,8 +230,7 @@ impl Profile<'_, '_> {
         let moved: Vec<f64> = (0..self.outcome.x.len())
             .map(|i| (self.outcome.x[i] + step * self.inverse[(i, self.index)] / own).max(lower[i]))
             .collect();
-        let cost = |blocks: Vec<super::descent::Block>| blocks.iter().map(|b| b.residual.norm_squared()).sum::<f64>();
-        self.problem.blocks(&moved).map_or(f64::INFINITY, |blocks| cost(blocks) - self.outcome.cost)
+        self.problem.cost(&moved) - self.outcome.cost
     }
 }
 

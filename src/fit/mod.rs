@@ -151,7 +151,7 @@ fn without_outliers(problem: &Problem<'_>, x: &[f64]) -> Result<(Vec<Record>, Ve
     let mut kept = problem.records.to_vec();
     let mut outliers = vec![Vec::new(); kept.len()];
     for (index, record) in kept.iter_mut().enumerate() {
-        let prediction = problem.predict(index, x)?;
+        let prediction = problem.predict(index, x, false)?;
         let block = problem.block(index, &prediction, Vec::new());
         for link in 0..record.links() {
             let own: Vec<(usize, f64)> = (prediction.values.iter().zip(block.residual.iter()))
@@ -203,7 +203,7 @@ fn residuals(problem: &Problem<'_>, x: &[f64], noise_rad: &[Vec<f64>]) -> Result
         .map(|index| {
             let record = &problem.records[index];
             let mut values = vec![Vec::new(); record.links()];
-            for value in problem.predict(index, x)?.values {
+            for value in problem.predict(index, x, false)?.values {
                 if let Some(measured_rad) = record.theta_rad[value.link][value.row] {
                     let t_s = record.t_s[value.row];
                     let (predicted_rad, rate_rad_s) = (value.predicted_rad, value.rate_rad_s);

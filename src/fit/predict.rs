@@ -52,6 +52,8 @@ pub struct Request<'a> {
     pub until_s: f64,
     /// Of the integration.
     pub accuracy: &'a Accuracy,
+    /// Whether derivatives are wanted; without them the prediction's matrices have no column.
+    pub slopes: bool,
 }
 
 /// Predicts the angles of some rows.
@@ -78,8 +80,9 @@ pub fn predict(model: &ForwardModel, request: &Request<'_>) -> Result<Prediction
     let ends_s = [0, 1].map(|link| camera.true_time_s(request.until_s, link));
     let latest_s = ends_s[0].max(ends_s[1]) + 1e-9;
     let state = State { theta_rad, omega_rad_s, hidden: Vec::new() };
-    let swing = Trajectory::with(model, &state, (start_s, latest_s), Some(&directions), accuracy)?;
-    let columns = parameters.len() + 2 * marks;
+    let directions = request.slopes.then_some(&directions);
+    let swing = Trajectory::with(model, &state, (start_s, latest_s), directions, accuracy)?;
+    let columns = if request.slopes { parameters.len() + 2 * marks } else { 0 };
     let mut values = Vec::with_capacity(record.values(rows.clone()));
     let mut flat = Vec::with_capacity(values.capacity() * columns);
     let mut row_slopes = vec![0.0; columns];
@@ -91,7 +94,7 @@ pub fn predict(model: &ForwardModel, request: &Request<'_>) -> Result<Prediction
                 .ok_or_else(|| Error::Simulation { detail: "a motion of no length".into() })?;
             let gain = 1.0 + camera.gain;
             row_slopes.iter_mut().for_each(|s| *s *= gain);
-            for (column, parameter) in parameters.iter().enumerate() {
+            for (column, parameter) in parameters.iter().enumerate().take(columns) {
                 row_slopes[column] += camera.slope(*parameter, t_s, link, theta, omega);
             }
             flat.extend_from_slice(&row_slopes);
@@ -140,12 +143,12 @@ fn end_of(
     let instant = swing
         .instant(camera.true_time_s(request.until_s, 0))
         .ok_or_else(|| Error::Simulation { detail: "a motion of no length".into() })?;
-    let (theta, rate) = instant.slopes.unwrap_or_else(|| (DMatrix::zeros(0, 0), DMatrix::zeros(0, 0)));
     let along = chord_slopes(chain, &instant.theta_rad);
     let n = chain.count();
     let omega = nalgebra::DVector::from_column_slice(&instant.rate[..n]);
     let mut values = chord_angles_rad(chain, &instant.theta_rad);
     values.extend((&along * omega).iter());
+    let Some((theta, rate)) = instant.slopes else { return Ok((values, DMatrix::zeros(2 * marks, 0))) };
     let columns = request.parameters.len() + 2 * marks;
     let mut slopes = DMatrix::zeros(2 * marks, columns);
     slopes.rows_mut(0, marks).copy_from(&(&along * theta));

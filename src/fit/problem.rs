@@ -115,11 +115,11 @@ impl<'a> Problem<'a> {
         Ok((model, camera))
     }
 
-    /// Predicts all rows of one recording.
+    /// Predicts all rows of one recording, with or without derivatives.
     ///
     /// # Errors
     /// [`Error::Simulation`].
-    pub fn predict(&self, record: usize, x: &[f64]) -> Result<Prediction> {
+    pub fn predict(&self, record: usize, x: &[f64], slopes: bool) -> Result<Prediction> {
         let (model, camera) = self.model(&x[..self.free.len()])?;
         let start = self.start_of(record);
         let data = &self.records[record];
@@ -131,6 +131,7 @@ impl<'a> Problem<'a> {
             parameters: &self.free,
             until_s: data.t_s[data.len() - 1],
             accuracy: &self.accuracy,
+            slopes,
         };
         predict(&model, &request)
     }
@@ -139,12 +140,21 @@ impl<'a> Problem<'a> {
     pub fn blocks(&self, x: &[f64]) -> Option<Vec<Block>> {
         (0..self.records.len())
             .map(|record| {
-                let prediction = self.predict(record, x).ok()?;
+                let prediction = self.predict(record, x, true).ok()?;
                 let start = self.start_of(record);
                 let columns = (0..self.free.len()).chain(start..start + 2 * self.marks()).collect();
                 Some(self.block(record, &prediction, columns))
             })
             .collect()
+    }
+
+    /// Σr² over all recordings; infinite where the motion cannot be integrated.
+    pub fn cost(&self, x: &[f64]) -> f64 {
+        let of = |record: usize| {
+            let prediction = self.predict(record, x, false).ok()?;
+            Some(self.block(record, &prediction, Vec::new()).residual.norm_squared())
+        };
+        (0..self.records.len()).map(|record| of(record).unwrap_or(f64::INFINITY)).sum()
     }
 
     /// The residuals of a prediction over their noise.

@@ -15,9 +15,9 @@ use crate::error::Result;
 use crate::model::Accuracy;
 
 /// Standard deviations of the seams (in units of the noise), from loose to tight.
-const SEAMS: [f64; 3] = [300.0, 30.0, 3.0];
+const SEAMS: [f64; 2] = [100.0, 5.0];
 /// Steps of the descent for each.
-const STEPS_EACH: usize = 8;
+const STEPS_EACH: usize = 12;
 /// Length of a stretch, in periods of the model's pace.
 const PERIODS: f64 = 1.5;
 /// Fewest values a stretch holds for each number in its start.
@@ -67,7 +67,7 @@ pub fn multiple_shooting(problem: &mut Problem<'_>) -> Result<Vec<f64>> {
             break;
         };
         x = outcome.x;
-        if round < 2 {
+        if round == 0 {
             let residuals: Vec<(usize, usize, f64)> = residuals(problem, &stretches, &x);
             let variables = x.len();
             problem.learn_noise(&residuals, variables);
@@ -128,6 +128,7 @@ fn blocks(problem: &Problem<'_>, stretches: &[Stretch], x: &[f64], seam: f64, pa
             parameters: &problem.free,
             until_s: stretch.until_s,
             accuracy: &problem.accuracy,
+            slopes: true,
         };
         let prediction = predict(&model, &request).ok()?;
         let own: Vec<usize> = (0..free).chain(start..start + 2 * marks).collect();
@@ -169,6 +170,7 @@ fn residuals(problem: &Problem<'_>, stretches: &[Stretch], x: &[f64]) -> Vec<(us
             parameters: &[],
             until_s: stretch.until_s,
             accuracy: &problem.accuracy,
+            slopes: false,
         };
         if let Ok(prediction) = predict(&model, &request) {
             let block = problem.block(stretch.record, &prediction, Vec::new());

@@ -8,6 +8,7 @@
 //! | [`effects`] | every further torque, one law each |
 //! | [`forward`] | the equations of motion, and their derivatives |
 //! | [`collocation`] | the integrator's nodes and weights |
+//! | `elimination` | small dense systems |
 //! | [`step`] | one step of it |
 //! | [`integrate`] | step after step, from reversal to reversal |
 //! | [`trajectory`] | the motion at every instant, with its sensitivities |
@@ -21,6 +22,7 @@ pub mod camera;
 pub mod chain;
 pub mod collocation;
 pub mod effects;
+mod elimination;
 pub mod forward;
 pub mod integrate;
 pub mod modes;

@@ -1,8 +1,9 @@
 //! One step of the collocation: the accelerations at its stages, and their sensitivities.
 
-use nalgebra::{DMatrix, DVector, Dyn, LU};
+use nalgebra::{DMatrix, DVector};
 
 use super::collocation::{RADAU, STAGES, Weights};
+use super::elimination::Elimination;
 use super::{ForwardModel, Hinge, Motion, Parameter, Partials};
 
 /// Newton's iterations before a step is shortened.
@@ -133,8 +134,9 @@ pub struct Stages<'a> {
     partials: Vec<Partials>,
     /// Q of every stage, scaled.
     residual: DVector<f64>,
-    /// ∂Q/∂accelerations of all stages, scaled.
-    matrix: DMatrix<f64>,
+    /// ∂Q/∂accelerations of all stages, scaled, row after row.
+    matrix: Vec<f64>,
+    elimination: Elimination,
     /// 1 / own inertia, by row.
     scale: Vec<f64>,
 }
@@ -160,23 +162,23 @@ impl<'a> Stages<'a> {
             motion: Motion::zero(n, m - n),
             partials: vec![Partials::zero(n, m); STAGES],
             residual: DVector::zeros(STAGES * m),
-            matrix: DMatrix::zeros(STAGES * m, STAGES * m),
+            matrix: vec![0.0; STAGES * m * STAGES * m],
+            elimination: Elimination::default(),
             scale: (0..m).map(|i| if i < n { 1.0 / model.chain().inertia_kg_m2()[(i, i)] } else { 1.0 }).collect(),
         }
     }
 
     /// Solves the balance at all stages for the accelerations `k`, from a first guess. `None` where Newton's method does not converge.
     pub fn solve(&mut self, start: &Start<'_>, length_s: f64, k: &mut DVector<f64>, tolerance_rad: f64) -> Option<()> {
-        let lu = self.linearise(start, length_s, k);
+        if !self.linearise(start, length_s, k) {
+            return None;
+        }
         let mut before = f64::INFINITY;
         for _ in 0..MOST_ITERATIONS {
             self.balance(start, length_s, k);
-            let mut change = -&self.residual;
-            if !lu.solve_mut(&mut change) {
-                return None;
-            }
-            *k += &change;
-            let size_rad = length_s * length_s * change.amax();
+            self.elimination.solve_one(self.residual.as_mut_slice());
+            *k -= &self.residual;
+            let size_rad = length_s * length_s * self.residual.amax();
             if !size_rad.is_finite() {
                 return None;
             }
@@ -227,66 +229,73 @@ impl<'a> Stages<'a> {
         (theta, rate): (&DMatrix<f64>, &DMatrix<f64>),
     ) -> Option<DMatrix<f64>> {
         let (n, m, columns) = (theta.nrows(), rate.nrows(), theta.ncols());
-        let mut right = DMatrix::zeros(STAGES * m, columns);
-        self.clear_matrix();
+        let mut right = vec![0.0; STAGES * m * columns];
         let mut q = vec![0.0; m];
+        let mut moved = vec![0.0; n * columns];
         for stage in 0..STAGES {
             self.go_to(stage, start, length_s, k);
             self.model.partials(&self.motion, &mut self.partials[stage]);
             self.fill_rows(stage, length_s);
             let partials = &self.partials[stage];
+            let own = &mut right[stage * m * columns..(stage + 1) * m * columns];
             for (column, parameter) in parameters.iter().enumerate() {
                 self.model.sensitivity(*parameter, &self.motion, partials, &mut q);
                 for row in 0..m {
-                    right[(stage * m + row, column)] = -q[row] * self.scale[row];
+                    own[row * columns + column] = -q[row] * self.scale[row];
                 }
             }
             let reach_s = length_s * RADAU.nodes[stage];
-            for column in 0..columns {
-                for row in 0..m {
-                    let of_angles: f64 = (0..n)
-                        .map(|j| partials.theta[(row, j)] * (theta[(j, column)] + reach_s * rate[(j, column)]))
-                        .sum();
-                    let of_rates: f64 = (0..m).map(|j| partials.rate[(row, j)] * rate[(j, column)]).sum();
-                    right[(stage * m + row, column)] -= (of_angles + of_rates) * self.scale[row];
+            for link in 0..n {
+                for column in 0..columns {
+                    moved[link * columns + column] = theta[(link, column)] + reach_s * rate[(link, column)];
+                }
+            }
+            for (row, own) in own.chunks_exact_mut(columns).enumerate() {
+                for j in 0..n {
+                    let factor = partials.theta[(row, j)] * self.scale[row];
+                    own.iter_mut().zip(&moved[j * columns..]).for_each(|(r, moved)| *r -= factor * moved);
+                }
+                for j in 0..m {
+                    let factor = partials.rate[(row, j)] * self.scale[row];
+                    own.iter_mut().zip(rate.row(j).iter()).for_each(|(r, rate)| *r -= factor * rate);
                 }
             }
         }
-        let lu = std::mem::replace(&mut self.matrix, DMatrix::zeros(STAGES * m, STAGES * m)).lu();
-        lu.solve_mut(&mut right).then_some(right)
+        if !self.elimination.decompose(STAGES * m, &self.matrix) {
+            return None;
+        }
+        self.elimination.solve(&mut right, columns);
+        Some(DMatrix::from_row_slice(STAGES * m, columns, &right))
     }
 
-    fn linearise(&mut self, start: &Start<'_>, length_s: f64, k: &DVector<f64>) -> LU<f64, Dyn, Dyn> {
-        self.clear_matrix();
+    /// Linearises at the stages of a guess; whether the system has a solution.
+    fn linearise(&mut self, start: &Start<'_>, length_s: f64, k: &DVector<f64>) -> bool {
         for stage in 0..STAGES {
             self.go_to(stage, start, length_s, k);
             self.model.partials(&self.motion, &mut self.partials[stage]);
             self.fill_rows(stage, length_s);
         }
-        self.matrix.clone().lu()
-    }
-
-    fn clear_matrix(&mut self) {
-        self.matrix.fill(0.0);
+        self.elimination.decompose(self.residual.len(), &self.matrix)
     }
 
     /// ∂Qᵢ/∂kⱼ = δᵢⱼ ∂Q/∂acceleration + h wᵢⱼ ∂Q/∂rate + h² uᵢⱼ ∂Q/∂θ.
     fn fill_rows(&mut self, stage: usize, length_s: f64) {
         let partials = &self.partials[stage];
         let (n, m) = (partials.theta.ncols(), partials.rate.ncols());
-        for j in 0..STAGES {
-            let rate = length_s * RADAU.rate[stage][j];
-            let angle = length_s * length_s * RADAU.angle[stage][j];
-            for column in 0..m {
-                for row in 0..m {
-                    let mut value = rate * partials.rate[(row, column)];
+        let rows = &mut self.matrix[stage * m * STAGES * m..(stage + 1) * m * STAGES * m];
+        for (row, values) in rows.chunks_exact_mut(STAGES * m).enumerate() {
+            let scale = self.scale[row];
+            for (j, block) in values.chunks_exact_mut(m).enumerate() {
+                let rate = scale * length_s * RADAU.rate[stage][j];
+                let angle = scale * length_s * length_s * RADAU.angle[stage][j];
+                for (column, value) in block.iter_mut().enumerate() {
+                    *value = rate * partials.rate[(row, column)];
                     if column < n {
-                        value += angle * partials.theta[(row, column)];
+                        *value += angle * partials.theta[(row, column)];
                     }
                     if stage == j {
-                        value += partials.acceleration[(row, column)];
+                        *value += scale * partials.acceleration[(row, column)];
                     }
-                    self.matrix[(stage * m + row, j * m + column)] = value * self.scale[row];
                 }
             }
         }
