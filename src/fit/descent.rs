@@ -26,11 +26,13 @@ pub struct Descent {
     pub most_steps: usize,
     /// It has converged when the next step promises less than this part of the mean square (χ² of about one is then this many variances).
     pub enough: f64,
+    /// A variable that is to stay where it is.
+    pub fixed: Option<usize>,
 }
 
 impl Default for Descent {
     fn default() -> Self {
-        Self { huber: f64::INFINITY, most_steps: 60, enough: 1e-5 }
+        Self { huber: f64::INFINITY, most_steps: 60, enough: 1e-5, fixed: None }
     }
 }
 
@@ -93,7 +95,7 @@ impl Descent {
         let mut steps = 0;
         while steps < self.most_steps {
             steps += 1;
-            let Some(taken) = step_within(&normals, &x, lower, damping) else {
+            let Some(taken) = self.step_within(&normals, &x, lower, damping) else {
                 damping *= 10.0;
                 continue;
             };
@@ -153,20 +155,20 @@ impl Descent {
         }
         normals
     }
-}
 
-/// The damped step that stays within the bounds: variables that would cross theirs stop there, and the others follow.
-fn step_within(normals: &Normals, x: &[f64], lower: &[f64], damping: f64) -> Option<DVector<f64>> {
-    let held = |i: usize| x[i] <= lower[i] && normals.gradient[i] > 0.0;
-    let mut stopped: Vec<Option<f64>> = (0..x.len()).map(|i| held(i).then_some(0.0)).collect();
-    loop {
-        let step = damped_step(normals, &stopped, damping)?;
-        let crossing: Vec<usize> =
-            (0..x.len()).filter(|i| stopped[*i].is_none() && x[*i] + step[*i] < lower[*i]).collect();
-        if crossing.is_empty() {
-            return Some(step);
+    /// The damped step that stays within the bounds: variables that would cross theirs stop there, and the others follow.
+    fn step_within(&self, normals: &Normals, x: &[f64], lower: &[f64], damping: f64) -> Option<DVector<f64>> {
+        let held = |i: usize| self.fixed == Some(i) || (x[i] <= lower[i] && normals.gradient[i] > 0.0);
+        let mut stopped: Vec<Option<f64>> = (0..x.len()).map(|i| held(i).then_some(0.0)).collect();
+        loop {
+            let step = damped_step(normals, &stopped, damping)?;
+            let crossing: Vec<usize> =
+                (0..x.len()).filter(|i| stopped[*i].is_none() && x[*i] + step[*i] < lower[*i]).collect();
+            if crossing.is_empty() {
+                return Some(step);
+            }
+            crossing.into_iter().for_each(|i| stopped[i] = Some(lower[i] - x[i]));
         }
-        crossing.into_iter().for_each(|i| stopped[i] = Some(lower[i] - x[i]));
     }
 }
 

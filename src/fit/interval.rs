@@ -3,7 +3,7 @@
 use nalgebra::{DMatrix, DVector, SymmetricEigen};
 
 use super::Problem;
-use super::descent::Outcome;
+use super::descent::{Descent, Outcome};
 use super::problem::stacked;
 use crate::model::Parameter;
 
@@ -14,6 +14,8 @@ const CHI2_95: f64 = Z95 * Z95;
 /// Lags over which residuals are tested for correlation, and their χ² at 0.1 %.
 const LAGS: usize = 10;
 const CHI2_LAGS: f64 = 29.59;
+/// Points of a profile tried for each end of an interval.
+const PROFILE_POINTS: usize = 8;
 /// A combination of parameters is not determined when its logarithm is less certain than this.
 const UNDETERMINED: f64 = 1.0;
 
@@ -191,46 +193,66 @@ impl Profile<'_, '_> {
         let widening = (self.sd / curved.max(1e-300)).max(1.0);
         let limit = CHI2_95 * self.variance * widening * widening;
         let quadratic = value + side * Z95 * self.sd;
-        if side < 0.0 && quadratic <= self.lower {
-            // the bound cuts it, unless the profile rises before
-            let rise = self.rise(self.lower);
-            return if rise <= limit { self.lower } else { self.search(value, self.lower, limit) };
-        }
-        // along the line of the curvature the rise is at least the profile's
-        let rise = self.rise(quadratic);
-        if (rise / limit - 1.0).abs() < 0.1 {
-            return quadratic;
-        }
-        let outer = if rise > limit { quadratic } else { value + side * 4.0 * Z95 * self.sd };
-        self.search(value, outer.max(self.lower), limit)
-    }
-
-    /// The place between `inside` and `outer` where the rise is the limit; `outer` where it is not reached.
-    fn search(&self, inside: f64, outer: f64, limit: f64) -> f64 {
-        let (mut inside, mut outer) = (inside, outer);
-        if self.rise(outer) < limit {
-            return outer;
-        }
-        for _ in 0..6 {
-            let middle = 0.5 * (inside + outer);
-            if self.rise(middle) < limit {
-                inside = middle;
-            } else {
-                outer = middle;
+        if quadratic > self.lower {
+            // along the line of the curvature the rise is at least the profile's
+            let rise = self.problem.cost(&self.on_line(quadratic)) - self.outcome.cost;
+            if (rise / limit - 1.0).abs() < 0.1 {
+                return quadratic;
             }
         }
-        0.5 * (inside + outer)
+        self.search(side, limit)
     }
 
-    /// Σr² with the parameter at a value and all others at their best on the line of the curvature, less that at the minimum.
-    fn rise(&self, at: f64) -> f64 {
+    /// Follows the profile outwards until its rise is the limit, or to the bound.
+    fn search(&self, side: f64, limit: f64) -> f64 {
+        let value = self.outcome.x[self.index];
+        let place = |root: f64| (value + side * root * Z95 * self.sd).max(self.lower);
+        // the root of the rise over the limit grows in proportion to the distance where the surface is quadratic
+        let (mut inside, mut outside, mut guess) = (0.0, None, 1.0);
+        let mut start = self.outcome.x.clone();
+        for _ in 0..PROFILE_POINTS {
+            let at = place(guess);
+            let (rise, x) = self.rise(at, &start);
+            let root = (rise.max(0.0) / limit).sqrt();
+            if (root - 1.0).abs() < 0.03 || (at <= self.lower && root < 1.0) {
+                return at;
+            }
+            if root < 1.0 {
+                (inside, start) = (guess, x);
+            } else {
+                outside = Some(guess);
+            }
+            let straight = guess / root.max(0.2);
+            guess = match outside {
+                Some(outside) if !(straight > inside && straight < outside) => 0.5 * (inside + outside),
+                Some(_) => straight,
+                None => straight.min(4.0 * guess),
+            };
+        }
+        place(outside.unwrap_or(guess))
+    }
+
+    /// The variables with this one at a value and all others on the line of the curvature.
+    fn on_line(&self, at: f64) -> Vec<f64> {
         let step = at - self.outcome.x[self.index];
         let own = self.inverse[(self.index, self.index)];
         let lower = self.problem.lower();
-        let moved: Vec<f64> = (0..self.outcome.x.len())
-            .map(|i| (self.outcome.x[i] + step * self.inverse[(i, self.index)] / own).max(lower[i]))
-            .collect();
-        self.problem.cost(&moved) - self.outcome.cost
+        let moved = |i: usize| self.outcome.x[i] + step * self.inverse[(i, self.index)] / own;
+        (0..self.outcome.x.len()).map(|i| moved(i).max(lower[i])).collect()
+    }
+
+    /// Σr² with the parameter at a value and all others at their best, less that at the minimum; and these best values.
+    fn rise(&self, at: f64, start: &[f64]) -> (f64, Vec<f64>) {
+        let descent = Descent { most_steps: 12, enough: 0.05, fixed: Some(self.index), ..Descent::default() };
+        let lower = self.problem.lower();
+        let line = self.on_line(at);
+        let mut near = start.to_vec();
+        near[self.index] = at;
+        let begin = if self.problem.cost(&line) < self.problem.cost(&near) { line } else { near };
+        match descent.run(begin, &lower, |x| self.problem.blocks(x)) {
+            Some(outcome) => (outcome.cost - self.outcome.cost, outcome.x),
+            None => (f64::INFINITY, start.to_vec()),
+        }
     }
 }
 

@@ -190,7 +190,7 @@ impl<'a> Problem<'a> {
             }
         }
         let least = self.noise_rad.iter().flatten().copied().fold(f64::INFINITY, f64::min);
-        self.accuracy.step_error_rad = (3e-5 * least).clamp(1e-11, 1e-7);
+        self.accuracy.step_error_rad = (1e-3 * least).clamp(1e-10, 1e-6);
     }
 }
 

@@ -59,9 +59,9 @@ pub fn multiple_shooting(problem: &mut Problem<'_>) -> Result<Vec<f64>> {
     }
     let mut lower = problem.lower();
     lower.resize(x.len(), f64::NEG_INFINITY);
-    problem.accuracy = Accuracy { step_error_rad: 1e-6, ..Accuracy::default() };
+    problem.accuracy = Accuracy { step_error_rad: 3e-6, ..Accuracy::default() };
     for (round, seam) in SEAMS.iter().enumerate() {
-        let descent = Descent { huber: 4.0, most_steps: STEPS_EACH, enough: 0.3 };
+        let descent = Descent { huber: 4.0, most_steps: STEPS_EACH, enough: 0.3, fixed: None };
         let Some(outcome) = descent.run(x.clone(), &lower, |x| blocks(problem, &stretches, x, *seam, pace_rad_s))
         else {
             break;
@@ -71,7 +71,7 @@ pub fn multiple_shooting(problem: &mut Problem<'_>) -> Result<Vec<f64>> {
             let residuals: Vec<(usize, usize, f64)> = residuals(problem, &stretches, &x);
             let variables = x.len();
             problem.learn_noise(&residuals, variables);
-            problem.accuracy.step_error_rad = 1e-6;
+            problem.accuracy.step_error_rad = 3e-6;
         }
     }
     let mut whole = x[..free].to_vec();

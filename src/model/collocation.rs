@@ -4,8 +4,11 @@
 //!
 //! ```text
 //! ω(τ) = ω₀ + h Σⱼ wⱼ(τ) αⱼ               wⱼ(τ) = ∫₀^τ ℓⱼ
-//! θ(τ) = θ₀ + hτ ω₀ + h² Σⱼ uⱼ(τ) αⱼ      uⱼ(τ) = Σₖ wₖ(τ) wⱼ(cₖ)
+//! θ(τ) = θ₀ + hτ ω₀ + h² Σⱼ uⱼ(τ) αⱼ      uⱼ(τ) = ∫₀^τ wⱼ
 //! ```
+//!
+//! At the stages the method's own Σₖ wₖ(cᵢ) wⱼ(cₖ) stands for uⱼ(cᵢ): only so it is L-stable. The two agree at τ = 1, for the quadrature is
+//! exact there.
 //!
 //! (E. Hairer, G. Wanner, Solving Ordinary Differential Equations II, 2nd ed., Sect. IV.5 and IV.8.)
 
@@ -27,7 +30,7 @@ pub struct Collocation {
     pub nodes: Weights,
     /// wⱼ(cᵢ), by rows i.
     pub rate: [Weights; STAGES],
-    /// uⱼ(cᵢ), by rows i.
+    /// Σₖ wₖ(cᵢ) wⱼ(cₖ), by rows i.
     pub angle: [Weights; STAGES],
     /// γ₀, the real eigenvalue of the method's matrix.
     pub gamma: f64,
@@ -55,8 +58,9 @@ impl Collocation {
             monomials,
         };
         method.rate = nodes.map(|c| method.rate_weights(c));
-        method.angle = nodes.map(|c| method.angle_weights(c));
         let matrix = Square::from_fn(|i, j| method.rate[i][j]);
+        let square = matrix * matrix;
+        method.angle = std::array::from_fn(|i| std::array::from_fn(|j| square[(i, j)]));
         let real = matrix.complex_eigenvalues().iter().min_by(|a, b| a.im.abs().total_cmp(&b.im.abs())).map(|l| l.re);
         method.gamma = real.unwrap_or(0.0);
         // Σ dᵢ cᵢ^q = −γ₀ for q = 0, and 0 for q = 1 … 4
@@ -80,8 +84,10 @@ impl Collocation {
 
     /// uⱼ(τ).
     pub fn angle_weights(&self, tau: f64) -> Weights {
-        let outer = self.rate_weights(tau);
-        std::array::from_fn(|j| (0..STAGES).map(|k| outer[k] * self.rate[k][j]).sum())
+        std::array::from_fn(|j| {
+            let term = |k: usize| self.monomials[(k, j)] / ((k + 1) * (k + 2)) as f64;
+            tau * tau * (0..STAGES).rev().fold(0.0, |sum, k| sum * tau + term(k))
+        })
     }
 }
 
@@ -129,6 +135,12 @@ mod tests {
             let sum: f64 = weights.iter().zip(RADAU.nodes).map(|(w, c)| w * c.powi(power)).sum();
             assert!((sum - 1.0 / f64::from(power + 1)).abs() < 1e-13, "{power}: {sum}");
         }
+    }
+
+    #[test]
+    fn the_polynomial_ends_where_the_method_does() {
+        let ends = RADAU.angle_weights(1.0).into_iter().zip(RADAU.angle[STAGES - 1]);
+        assert!(ends.into_iter().all(|(polynomial, method)| (polynomial - method).abs() < 1e-14));
     }
 
     #[test]

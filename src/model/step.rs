@@ -182,8 +182,8 @@ impl<'a> Stages<'a> {
             if !size_rad.is_finite() {
                 return None;
             }
-            // what is left is the next change over (1 − its ratio to this one)
-            let ratio = size_rad / before;
+            // the next change is at most this one times their ratio, which the first one does not tell
+            let ratio = if before.is_finite() { size_rad / before } else { 1.0 };
             if size_rad * ratio.min(1.0) < NEWTON_SHARE * tolerance_rad || size_rad < 4.0 * f64::EPSILON {
                 return Some(());
             }
