@@ -39,10 +39,10 @@ pub struct FitArgs {
     #[arg(long, value_name = "ID")]
     fix: Vec<String>,
     /// Use rows from this stamp on.
-    #[arg(long, value_name = "S", default_value_t = f64::NEG_INFINITY, hide_default_value = true)]
+    #[arg(long, value_name = "S", default_value_t = f64::NEG_INFINITY, hide_default_value = true, allow_negative_numbers = true)]
     from: f64,
     /// Use rows before this stamp.
-    #[arg(long, value_name = "S", default_value_t = f64::INFINITY, hide_default_value = true)]
+    #[arg(long, value_name = "S", default_value_t = f64::INFINITY, hide_default_value = true, allow_negative_numbers = true)]
     until: f64,
     /// Nothing on standard output.
     #[arg(long)]
@@ -205,6 +205,11 @@ impl Report<'_> {
         }
         for (pair, correlation) in self.strong_correlations() {
             text.push_str(&paragraph("  ", &format!("{} and {} are correlated by {correlation:.3}", pair[0], pair[1])));
+        }
+        if self.fitted.fit.ending != fit::Ending::Converged {
+            let line = "The descent has not converged: no motion of this model comes near the recording, and the values mean little. \
+                        Let more parameters free, or use a shorter stretch (--from, --until).";
+            text.push_str(&paragraph("  ", line));
         }
         if self.fitted.fit.coloured {
             text.push_str(&paragraph("  ", "The residuals are correlated in time; the intervals are widened for it."));

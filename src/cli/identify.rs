@@ -51,17 +51,8 @@ impl IdentifyArgs {
         let json = self.json.as_deref().map(OutputFile::create).transpose()?;
         let series = self.stretch(AngleSeries::read(&self.angles)?)?;
         let found = identify(&series, experiment.as_ref())?;
-        if let Some(json) = json {
-            let mut text = serde_json::to_string_pretty(&found)
-                .map_err(|e| Error::Option { option: "--json".to_owned(), message: e.to_string() })?;
-            text.push('\n');
-            json.commit(text.as_bytes())?;
-        }
-        let table_wanted = !self.quiet && self.json.as_ref().is_none_or(|path| path.as_os_str() != "-");
-        if table_wanted {
-            print!("{found}");
-        }
-        Ok(())
+        let text = if self.quiet { String::new() } else { found.to_string() };
+        super::deliver(&text, &found, json)
     }
 
     /// The wanted stretch of time.

@@ -3,7 +3,7 @@
 use nalgebra::{DMatrix, DVector, SymmetricEigen};
 
 use super::Problem;
-use super::descent::{Descent, Outcome};
+use super::descent::{Descent, Ending, Outcome};
 use super::problem::stacked;
 use crate::model::Parameter;
 
@@ -189,6 +189,10 @@ impl Profile<'_, '_> {
     /// The end of the 95 % interval towards one side.
     fn end(&self, side: f64) -> f64 {
         let value = self.outcome.x[self.index];
+        if self.outcome.ending != Ending::Converged {
+            // there is no minimum to follow a profile from
+            return (value + side * Z95 * self.sd).max(self.lower);
+        }
         let curved = (self.inverse[(self.index, self.index)] * self.variance).sqrt();
         let widening = (self.sd / curved.max(1e-300)).max(1.0);
         let limit = CHI2_95 * self.variance * widening * widening;

@@ -1,0 +1,219 @@
+//! `freeswing simulate` and `freeswing fit` as a user types them.
+
+use std::fs;
+use std::path::PathBuf;
+
+use assert_cmd::Command;
+use predicates::prelude::*;
+use predicates::str::contains;
+
+const SWING: &str = "
+[model]
+k_eq_n_m_per_rad = 2.0e-4
+c_eq_n_m_s_per_rad = 2.0e-6
+release_rad = [0.5, 0.62]
+[model.effects]
+hinge_viscous = 1.0e-7
+";
+
+struct Folder(tempfile::TempDir);
+
+impl Folder {
+    fn new() -> Self {
+        Self(tempfile::tempdir().unwrap())
+    }
+
+    fn path(&self, name: &str) -> PathBuf {
+        self.0.path().join(name)
+    }
+
+    fn write(&self, name: &str, text: &str) -> PathBuf {
+        fs::write(self.path(name), text).unwrap();
+        self.path(name)
+    }
+
+    /// A simulated table of 10 s.
+    fn angles(&self, config: &str) -> PathBuf {
+        let config = self.write("simulated.toml", config);
+        let out = self.path("angles.csv");
+        freeswing("simulate")
+            .args(["--duration", "10", "--rate", "30", "--noise-rad", "1e-3"])
+            .arg("--config")
+            .arg(config)
+            .arg("--out")
+            .arg(&out)
+            .assert()
+            .success();
+        out
+    }
+}
+
+fn freeswing(command: &str) -> Command {
+    let mut freeswing = Command::cargo_bin("freeswing").unwrap();
+    freeswing.arg(command);
+    freeswing
+}
+
+#[test]
+fn what_simulate_writes_fit_reads() {
+    let folder = Folder::new();
+    let angles = folder.angles(SWING);
+    let config = folder.write("start.toml", &SWING.replace("1.0e-7", "3.0e-7"));
+    let json = folder.path("fit.json");
+    freeswing("fit")
+        .arg(&angles)
+        .arg("--config")
+        .arg(config)
+        .arg("--json")
+        .arg(&json)
+        .assert()
+        .success()
+        .stdout(contains("k_eq_n_m_per_rad").and(contains("Fitted: reproduced")))
+        .stdout(contains("With the file's values: not reproduced"));
+    let report: serde_json::Value = serde_json::from_str(&fs::read_to_string(json).unwrap()).unwrap();
+    assert_eq!(report["schema"], "freeswing.fit/1");
+    let stiffness = &report["parameters"]["k_eq_n_m_per_rad"];
+    let (low, high) = (stiffness["low95"].as_f64().unwrap(), stiffness["high95"].as_f64().unwrap());
+    assert!(low < 2.02e-4 && high > 1.98e-4 && high - low < 2e-5, "{stiffness}");
+    assert_eq!(report["recordings"][0]["fitted"]["reproduced"], true);
+}
+
+#[test]
+fn one_link_is_read_and_fitted() {
+    let folder = Folder::new();
+    let one = "
+[specimen]
+[[specimen.links]]
+length_m = 0.66
+mass_kg = 0.1
+com_m = 0.66
+inertia_kg_m2 = 1e-5
+[model]
+release_rad = [0.6]
+[model.effects]
+hinge_viscous = 1e-3
+";
+    let angles = folder.angles(one);
+    let config = folder.write("one.toml", one);
+    freeswing("fit").arg(angles).arg("--config").arg(config).assert().success().stdout(contains("hinge_viscous"));
+}
+
+#[test]
+fn json_on_standard_output_is_all_there_is() {
+    let folder = Folder::new();
+    let angles = folder.angles(SWING);
+    let config = folder.path("simulated.toml");
+    let output = freeswing("fit").arg(angles).arg("--config").arg(config).args(["--json", "-"]).output().unwrap();
+    serde_json::from_slice::<serde_json::Value>(&output.stdout).unwrap();
+}
+
+#[test]
+fn bad_input_is_one_line_and_exit_code_2() {
+    let folder = Folder::new();
+    let angles = folder.angles(SWING);
+    let config = folder.write("good.toml", SWING);
+    let nan = folder.write("nan.csv", "t_s,theta1_rad,theta2_rad\n0,0.1,NaN\n");
+    let one = folder.write("one.csv", &fs::read_to_string(&angles).unwrap().replace("theta2_rad", "other"));
+    let massless = folder.write("massless.toml", "[specimen]\nmass_kg = 0.0\n");
+    let cases = [
+        (vec![nan.clone()], config.clone(), vec![], "nan.csv:2: "),
+        (vec![one], config.clone(), vec![], "has 1 angle, and the specimen 2 links"),
+        (vec![folder.path("absent.csv")], config.clone(), vec![], "absent.csv: cannot be read"),
+        (vec![angles.clone()], massless, vec![], "specimen.mass_kg = 0: must be a positive number"),
+        (vec![angles.clone()], folder.path("absent.toml"), vec![], "absent.toml: cannot be read"),
+        (
+            vec![angles.clone()],
+            config.clone(),
+            vec!["--free", "hinge_colomb"],
+            "the nearest known one is `hinge_coulomb`",
+        ),
+        (vec![angles.clone()], config.clone(), vec!["--from", "9.9"], "rows between --from and --until; widen them"),
+        (vec![angles.clone()], config.clone(), vec!["--json", "/nowhere/fit.json"], "cannot be written"),
+    ];
+    for (tables, config, options, message) in cases {
+        freeswing("fit")
+            .args(tables)
+            .arg("--config")
+            .arg(config)
+            .args(options)
+            .assert()
+            .code(2)
+            .stdout("")
+            .stderr(contains(message).and(predicate::function(|text: &str| text.trim_end().lines().count() == 1)));
+    }
+    for (options, message) in [
+        ("--duration=-1", "--duration: -1: must be a positive number"),
+        ("--rate=0", "--rate: 0: must be a positive number"),
+        ("--noise-rad=-1", "--noise-rad: -1 is no standard deviation"),
+        ("--duration=1e12", "give a shorter --duration"),
+    ] {
+        let out = folder.path("never.csv");
+        freeswing("simulate")
+            .arg("--config")
+            .arg(&config)
+            .arg("--out")
+            .arg(&out)
+            .arg(options)
+            .assert()
+            .code(2)
+            .stderr(contains(message));
+        assert!(!out.exists());
+    }
+}
+
+#[test]
+fn a_joint_parameter_of_one_link_is_refused() {
+    let folder = Folder::new();
+    let one = "[specimen]\nlink_lengths_m = [0.2]\n[model]\nrelease_rad = [0.4]\n";
+    let angles = folder.angles(one);
+    let config = folder.path("simulated.toml");
+    freeswing("fit")
+        .arg(angles)
+        .arg("--config")
+        .arg(config)
+        .args(["--free", "joint_cubic_stiffness"])
+        .assert()
+        .code(2)
+        .stderr(contains("this specimen has one link and no joint"));
+}
+
+#[test]
+fn the_published_model_of_a_real_pendulum_is_told_where_it_fails() {
+    let table = PathBuf::from("../shared/data/multiarm_double.csv");
+    if !table.exists() {
+        println!("skipped: {} is not there", table.display());
+        return;
+    }
+    let folder = Folder::new();
+    let config = folder.write(
+        "published.toml",
+        "
+[[specimen.links]]
+length_m = 0.1727
+mass_kg = 0.0938
+com_m = 0.1086
+inertia_kg_m2 = 4.375e-4
+[[specimen.links]]
+length_m = 0.23
+mass_kg = 0.1376
+com_m = 0.1168
+inertia_kg_m2 = 1.269e-3
+[rig]
+gravity_m_s2 = 9.809
+[model]
+k_eq_n_m_per_rad = 0.0
+c_eq_n_m_s_per_rad = 1e-5
+release_rad = [-0.5, 0.4]
+[model.effects]
+hinge_viscous = 2.371e-4
+",
+    );
+    freeswing("fit")
+        .arg(table)
+        .arg("--config")
+        .arg(config)
+        .args(["--from", "60"])
+        .assert()
+        .success()
+        .stdout(contains("With the file's values: not reproduced: from"));
+}
