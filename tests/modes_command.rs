@@ -100,6 +100,6 @@ fn bad_configurations_are_one_line_and_exit_code_2() {
         "a link swings without inertia",
     );
     refused(config("[model.effects]\nrest_curl = 40.0\n[specimen]\n").path(), "no stable rest position");
-    refused(config("[model.effects]\nhinge_stiffness = nan\n").path(), "no stable rest position");
-    refused(config("[model.effects]\nadded_mass = -1.0\n").path(), "cannot be");
+    refused(config("[model.effects]\nhinge_stiffness = nan\n").path(), "must be zero or a positive number");
+    refused(config("[model.effects]\nadded_mass = -1.0\n").path(), "must be zero or a positive number");
 }

@@ -83,6 +83,11 @@ fn positive(key: &str, value: f64) -> std::result::Result<(), String> {
     if value.is_finite() && value > 0.0 { Ok(()) } else { Err(format!("{key} = {value}: must be a positive number")) }
 }
 
+/// `value` must be finite.
+fn finite(key: &str, value: f64) -> std::result::Result<(), String> {
+    if value.is_finite() { Ok(()) } else { Err(format!("{key} = {value}: must be a finite number")) }
+}
+
 /// `value` must be finite and not negative.
 fn not_negative(key: &str, value: f64) -> std::result::Result<(), String> {
     if value.is_finite() && value >= 0.0 {
@@ -133,6 +138,18 @@ hinge_coulomb = 1.0e-7
         assert_eq!(e.specimen.link_lengths_m, vec![0.1, 0.1]);
         assert_eq!(e.rig.pivot_px, Some([497.0, 508.0]));
         assert_eq!(e.model.effects.hinge_coulomb, Some(1.0e-7));
+    }
+
+    #[test]
+    fn a_friction_that_feeds_the_motion_is_refused() {
+        let of = |line: &str| {
+            let text = format!("[model.effects]\n{line}\n");
+            Experiment::parse(&text, Path::new("e.toml")).unwrap_err().to_string()
+        };
+        let error = of("hinge_coulomb = -1e-7");
+        assert_eq!(error, "e.toml: model.effects.hinge_coulomb = -0.0000001: must be zero or a positive number");
+        assert!(of("rest_curl = nan").contains("model.effects.rest_curl = NaN: must be a finite number"));
+        assert!(of("distributed_flexibility = 0.0").contains("must be a positive number"));
     }
 
     #[test]

@@ -2,7 +2,7 @@
 
 use serde::Deserialize;
 
-use super::not_negative;
+use super::{finite, not_negative, positive};
 
 /// Bouc–Wen hysteresis of the joint.
 #[derive(Debug, Clone, Copy, PartialEq, Deserialize)]
@@ -98,6 +98,47 @@ impl Model {
         not_negative("model.c_eq_n_m_s_per_rad", self.c_eq_n_m_s_per_rad)?;
         if self.release_rad.is_empty() || self.release_rad.iter().any(|a| !a.is_finite()) {
             return Err("model.release_rad: needs one finite angle a link".to_owned());
+        }
+        self.effects.validate()
+    }
+}
+
+impl Effects {
+    /// Losses and inertia from zero upwards, everything else finite.
+    fn validate(&self) -> Result<(), String> {
+        let checked = |id: &str, value: Option<f64>, check: fn(&str, f64) -> Result<(), String>| {
+            value.map_or(Ok(()), |value| check(&format!("model.effects.{id}"), value))
+        };
+        for (id, value) in [
+            ("hinge_viscous", self.hinge_viscous),
+            ("hinge_coulomb", self.hinge_coulomb),
+            ("hinge_stiffness", self.hinge_stiffness),
+            ("air_linear", self.air_linear),
+            ("air_quadratic", self.air_quadratic),
+            ("added_mass", self.added_mass),
+            ("joint_hysteretic.torque_n_m", self.joint_hysteretic.map(|h| h.torque_n_m)),
+        ] {
+            checked(id, value, not_negative)?;
+        }
+        for (id, value) in [
+            ("joint_hysteretic.yield_rad", self.joint_hysteretic.map(|h| h.yield_rad)),
+            ("support_motion.frequency_hz", self.support_motion.map(|s| s.frequency_hz)),
+            ("distributed_flexibility", self.distributed_flexibility),
+        ] {
+            checked(id, value, positive)?;
+        }
+        for (id, value) in [
+            ("joint_cubic_stiffness", self.joint_cubic_stiffness),
+            ("rest_curl", self.rest_curl),
+            ("side_force", self.side_force),
+            ("support_motion.amplitude_m", self.support_motion.map(|s| s.amplitude_m)),
+            ("time_base", self.time_base),
+            ("dropped_frames", self.dropped_frames),
+            ("camera_tilt", self.camera_tilt),
+            ("angle_gain", self.angle_gain),
+            ("differential_lag", self.differential_lag),
+        ] {
+            checked(id, value, finite)?;
         }
         Ok(())
     }
