@@ -7,6 +7,7 @@ use std::ops::Range;
 use std::path::{Path, PathBuf};
 
 use crate::error::{Error, Result};
+use crate::statistics::median_step_s;
 
 /// Fewest rows, and fewest values of each angle, from which anything can be said.
 pub const FEWEST_ROWS: usize = 8;
@@ -159,12 +160,7 @@ impl AngleSeries {
 
     /// Median step between rows.
     pub fn step_s(&self) -> f64 {
-        let mut steps: Vec<f64> = self.t_s.windows(2).map(|pair| pair[1] - pair[0]).collect();
-        if steps.is_empty() {
-            return 0.0;
-        }
-        let middle = steps.len() / 2;
-        *steps.select_nth_unstable_by(middle, f64::total_cmp).1
+        median_step_s(&self.t_s).unwrap_or(0.0)
     }
 
     /// Half the rate of the median step: a motion beyond it cannot be told from a slower one.

@@ -24,6 +24,7 @@ pub mod verdict;
 use crate::error::{Error, Result};
 use crate::experiment::Experiment;
 use crate::model::Parameter;
+use crate::statistics::median;
 
 pub use descent::{Descent, Ending};
 pub use interval::Estimate;
@@ -171,7 +172,7 @@ fn without_outliers(problem: &Problem<'_>, x: &[f64]) -> Result<(Vec<Record>, Ve
 fn standing_out(mut own: Vec<(usize, f64)>) -> Vec<usize> {
     let most = own.len() / 50;
     let sizes: Vec<f64> = (0..own.len()).map(|i| apart(&own, i).abs()).collect();
-    let scale = |sizes: &[f64]| 1.4826 * median(sizes.to_vec());
+    let scale = |sizes: &[f64]| 1.4826 * median(&mut sizes.to_vec()).unwrap_or(0.0);
     let everywhere = scale(&sizes);
     let here: Vec<f64> =
         (0..own.len()).map(|i| scale(&sizes[i.saturating_sub(30)..(i + 31).min(sizes.len())])).collect();
@@ -217,12 +218,4 @@ fn residuals(problem: &Problem<'_>, x: &[f64], noise_rad: &[Vec<f64>]) -> Result
             Ok(Residuals { rmse_rad, values, noise_rad: noise_rad[index].clone() })
         })
         .collect()
-}
-
-fn median(mut values: Vec<f64>) -> f64 {
-    if values.is_empty() {
-        return 0.0;
-    }
-    let middle = values.len() / 2;
-    *values.select_nth_unstable_by(middle, f64::total_cmp).1
 }

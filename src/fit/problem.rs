@@ -8,6 +8,7 @@ use super::{Prediction, Record};
 use crate::error::{Error, Result};
 use crate::experiment::{Experiment, Hysteresis, SupportMotion};
 use crate::model::{Accuracy, Camera, ForwardModel, Parameter};
+use crate::statistics::median;
 
 /// A model with free parameters, and recordings of one specimen.
 ///
@@ -181,8 +182,7 @@ impl<'a> Problem<'a> {
                 if sizes.len() < 4 {
                     continue;
                 }
-                let middle = sizes.len() / 2;
-                let median = *sizes.select_nth_unstable_by(middle, f64::total_cmp).1;
+                let Some(median) = median(&mut sizes) else { continue };
                 let freedom = residuals.len().saturating_sub(variables).max(1) as f64 / residuals.len() as f64;
                 let factor = 1.4826 * median / freedom.sqrt();
                 // an exact table still has the digits it was written with

@@ -5,6 +5,7 @@ use std::path::PathBuf;
 
 use crate::error::{Error, Result};
 use crate::series::AngleSeries;
+use crate::statistics::median;
 
 /// One recording of a specimen.
 #[derive(Debug, Clone, PartialEq)]
@@ -108,11 +109,7 @@ fn local_cubic(points: &[(f64, f64)]) -> Option<[f64; 3]> {
 /// Standard deviations over their median; a value without one counts like the median.
 fn relative(sd_rad: &[Option<f64>]) -> Vec<f64> {
     let mut stated: Vec<f64> = sd_rad.iter().flatten().copied().filter(|sd| *sd > 0.0).collect();
-    if stated.is_empty() {
-        return vec![1.0; sd_rad.len()];
-    }
-    let middle = stated.len() / 2;
-    let median = *stated.select_nth_unstable_by(middle, f64::total_cmp).1;
+    let Some(median) = median(&mut stated) else { return vec![1.0; sd_rad.len()] };
     // a stated error of next to nothing must not outweigh everything else
     sd_rad.iter().map(|sd| sd.map_or(1.0, |sd| (sd / median).clamp(0.3, 30.0))).collect()
 }

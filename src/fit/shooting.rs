@@ -12,7 +12,8 @@ use super::descent::{Block, Descent};
 use super::predict::{Request, predict};
 use super::{Problem, Record};
 use crate::error::Result;
-use crate::model::Accuracy;
+use crate::model::{Accuracy, Camera};
+use crate::statistics::median;
 
 /// Standard deviations of the seams (in units of the noise), from loose to tight.
 const SEAMS: [f64; 2] = [100.0, 5.0];
@@ -30,6 +31,27 @@ struct Stretch {
     /// Where the next one begins; the last row of the recording for the last.
     until_s: f64,
     last: bool,
+}
+
+impl Stretch {
+    fn request<'a>(
+        &'a self,
+        problem: &'a Problem<'_>,
+        camera: &'a Camera,
+        start: &'a [f64],
+        slopes: bool,
+    ) -> Request<'a> {
+        Request {
+            record: &problem.records[self.record],
+            rows: &self.rows,
+            start,
+            camera,
+            parameters: &problem.free,
+            until_s: self.until_s,
+            accuracy: &problem.accuracy,
+            slopes,
+        }
+    }
 }
 
 /// Start values for a fit of whole recordings: the parameters, then each recording's start; and the noise of every angle on the way.
@@ -54,8 +76,7 @@ pub fn multiple_shooting(problem: &mut Problem<'_>) -> Result<Vec<f64>> {
         near.iter().enumerate().for_each(|(link, n)| left[stretch.record][link].push(n[2]));
     }
     for (noise, left) in problem.noise_rad.iter_mut().flatten().zip(left.iter_mut().flatten()) {
-        let middle = left.len() / 2;
-        *noise = left.select_nth_unstable_by(middle, f64::total_cmp).1.clamp(1e-6, 0.05);
+        *noise = median(left).unwrap_or(1e-3).clamp(1e-6, 0.05);
     }
     let mut lower = problem.lower();
     lower.resize(x.len(), f64::NEG_INFINITY);
@@ -120,16 +141,7 @@ fn blocks(problem: &Problem<'_>, stretches: &[Stretch], x: &[f64], seam: f64, pa
     let mut blocks = Vec::with_capacity(2 * stretches.len());
     for (index, stretch) in stretches.iter().enumerate() {
         let start = free + index * 2 * marks;
-        let request = Request {
-            record: &problem.records[stretch.record],
-            rows: &stretch.rows,
-            start: &x[start..start + 2 * marks],
-            camera: &camera,
-            parameters: &problem.free,
-            until_s: stretch.until_s,
-            accuracy: &problem.accuracy,
-            slopes: true,
-        };
+        let request = stretch.request(problem, &camera, &x[start..start + 2 * marks], true);
         let prediction = predict(&model, &request).ok()?;
         let own: Vec<usize> = (0..free).chain(start..start + 2 * marks).collect();
         blocks.push(problem.block(stretch.record, &prediction, own.clone()));
@@ -162,16 +174,7 @@ fn residuals(problem: &Problem<'_>, stretches: &[Stretch], x: &[f64]) -> Vec<(us
     let mut all = Vec::new();
     for (index, stretch) in stretches.iter().enumerate() {
         let start = free + index * 2 * marks;
-        let request = Request {
-            record: &problem.records[stretch.record],
-            rows: &stretch.rows,
-            start: &x[start..start + 2 * marks],
-            camera: &camera,
-            parameters: &[],
-            until_s: stretch.until_s,
-            accuracy: &problem.accuracy,
-            slopes: false,
-        };
+        let request = stretch.request(problem, &camera, &x[start..start + 2 * marks], false);
         if let Ok(prediction) = predict(&model, &request) {
             let block = problem.block(stretch.record, &prediction, Vec::new());
             let pairs = prediction.values.iter().zip(block.residual.iter());

@@ -13,6 +13,7 @@ use serde::Serialize;
 
 use super::estimate::Estimate;
 use super::signal::{BRIDGE_STEPS, LinkSamples, Signal};
+use crate::statistics::median;
 
 /// Least ratio of the padded length to the record.
 const PADDING: usize = 4;
@@ -106,7 +107,7 @@ impl Spectrum {
     fn find_peaks(&self, signal: &Signal, power: &[f64]) -> Vec<Peak> {
         let lobe = (0.5 * HANN_LOBE * self.resolution_hz / self.step_hz).round() as usize;
         let first = (1.5 * self.resolution_hz / self.step_hz).ceil() as usize;
-        let floor = median(power).max(f64::MIN_POSITIVE);
+        let floor = median(&mut power.to_vec()).unwrap_or(0.0).max(f64::MIN_POSITIVE);
         let is_peak = |k: usize| {
             let around = k.saturating_sub(lobe).max(1)..(k + lobe + 1).min(power.len());
             around.clone().all(|j| power[j] <= power[k])
@@ -250,10 +251,4 @@ pub(super) fn line_sd_hz(signal: &Signal, window: Window, f_hz: f64, noise_rad: 
 fn noise_of_power(link: &LinkSamples, signal: &Signal, power: f64) -> f64 {
     let (sum, squares) = weights(link, signal).iter().fold((0.0, 0.0), |(s, q), w| (s + w, q + w * w));
     (power * sum * sum / (4.0 * squares.max(f64::MIN_POSITIVE))).sqrt()
-}
-
-fn median(values: &[f64]) -> f64 {
-    let mut sorted = values.to_vec();
-    let middle = sorted.len() / 2;
-    *sorted.select_nth_unstable_by(middle, f64::total_cmp).1
 }

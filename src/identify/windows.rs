@@ -6,6 +6,7 @@ use nalgebra::Complex;
 
 use super::signal::{LinkSamples, Signal};
 use super::sinusoids::{Pole, SinusoidFit};
+use crate::statistics::median;
 
 /// Cycles of the slowest mode in a window.
 const WINDOW_CYCLES: f64 = 4.0;
@@ -161,8 +162,7 @@ fn share_noise(fit: &mut SinusoidFit, pooled_rad: &[f64]) {
 fn pooled_noise(fits: &[SinusoidFit], link: usize) -> f64 {
     // the median is not drawn up by the first, largest swings, where a sinusoid fits worst
     let mut noises: Vec<f64> = fits.iter().map(|f| f.links[link].noise_rad).collect();
-    let middle = noises.len() / 2;
-    *noises.select_nth_unstable_by(middle, f64::total_cmp).1
+    median(&mut noises).unwrap_or(0.0)
 }
 
 /// θᵢ/θ₁ over all windows, each weighted by its own certainty; of the whole record's fit where no window shows the mode.

@@ -13,6 +13,11 @@ const MOST_LN_AREA: f64 = 1.61;
 /// Most that a change of area adds to the cost of a sighting.
 pub const MOST_AREA_COST: f64 = 8.0;
 
+/// Seconds after which something that is no mark is forgotten.
+pub const FORGET_S: f64 = 2.0;
+/// Most things followed that are no marks.
+pub const MOST_OTHERS: usize = 24;
+
 /// Steps between frames over which a course is straight enough to tell marks apart.
 const LONGEST_COURSE_STEPS: f64 = 3.5;
 

@@ -8,7 +8,7 @@
 
 use super::assign::assign_frame;
 use super::choose::{Choice, choose};
-use super::follower::Follower;
+use super::follower::{FORGET_S, Follower, MOST_OTHERS};
 use super::identity::{Identity, Renaming};
 use super::noise::scatters;
 use super::tracklet::{Tracklet, link};
@@ -26,10 +26,6 @@ pub struct MarkSlot {
 const WINDOW: usize = 256;
 /// Frames after which the choice is made even where some mark has hardly been seen.
 const LONGEST_WINDOW: usize = 4096;
-/// Seconds after which something that is no mark is forgotten.
-pub const FORGET_S: f64 = 2.0;
-/// Most things followed that are no marks.
-pub const MOST_OTHERS: usize = 24;
 
 /// Turns frames of blobs into tracks, as they come.
 #[derive(Debug)]

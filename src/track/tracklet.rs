@@ -2,8 +2,7 @@
 
 use super::FrameBlobs;
 use super::assign::assign_frame;
-use super::follower::Follower;
-use super::tracker::{FORGET_S, MOST_OTHERS};
+use super::follower::{FORGET_S, Follower, MOST_OTHERS};
 
 /// Sightings of one thing over the window: (frame, blob).
 #[derive(Debug, Clone, PartialEq)]
