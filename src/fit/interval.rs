@@ -60,15 +60,13 @@ pub(super) struct Uncertainty {
 /// ```
 pub(super) fn uncertainty(problem: &Problem<'_>, outcome: &Outcome) -> Uncertainty {
     let free = problem.free.len();
-    let (residual, slopes) = stacked(&outcome.blocks, outcome.x.len());
     let lower = problem.lower();
-    let held: Vec<bool> = (0..outcome.x.len()).map(|i| i < free && outcome.x[i] <= lower[i]).collect();
-    let freedom = residual.len().saturating_sub(outcome.x.len()).max(1) as f64;
-    let variance = residual.norm_squared() / freedom;
-    let inverse = inverse_of(&slopes.tr_mul(&slopes));
+    let freedom = outcome.residuals().saturating_sub(outcome.x.len()).max(1) as f64;
+    let variance = outcome.cost / freedom;
+    let inverse = inverse_of(&outcome.normal);
     let coloured = is_coloured(problem, outcome);
     let white = &inverse * variance;
-    let covariance = if coloured { widened(problem, outcome, &slopes, &residual, &inverse, &white) } else { white };
+    let covariance = if coloured { widened(problem, outcome, &inverse, &white) } else { white };
     let sd: Vec<f64> = (0..outcome.x.len()).map(|i| covariance[(i, i)].max(0.0).sqrt()).collect();
     let correlation = DMatrix::from_fn(free, free, |i, j| covariance[(i, j)] / (sd[i] * sd[j]).max(1e-300));
     let estimates = (0..free)
@@ -81,7 +79,7 @@ pub(super) fn uncertainty(problem: &Problem<'_>, outcome: &Outcome) -> Uncertain
                 sd: sd[i],
                 low: profile.end(-1.0),
                 high: profile.end(1.0),
-                at_bound: held[i],
+                at_bound: outcome.x[i] <= lower[i],
             }
         })
         .collect();
@@ -130,15 +128,9 @@ fn links_of(problem: &Problem<'_>, record: usize) -> Vec<std::ops::Range<usize>>
         .collect()
 }
 
-fn widened(
-    problem: &Problem<'_>,
-    outcome: &Outcome,
-    slopes: &DMatrix<f64>,
-    residual: &DVector<f64>,
-    inverse: &DMatrix<f64>,
-    white: &DMatrix<f64>,
-) -> DMatrix<f64> {
+fn widened(problem: &Problem<'_>, outcome: &Outcome, inverse: &DMatrix<f64>, white: &DMatrix<f64>) -> DMatrix<f64> {
     let variables = outcome.x.len();
+    let (residual, slopes) = stacked(&outcome.blocks, variables);
     let mut middle = DMatrix::zeros(variables, variables);
     let mut first = 0;
     for (record, block) in outcome.blocks.iter().enumerate() {

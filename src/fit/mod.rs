@@ -117,7 +117,7 @@ pub fn fit(records: &[Record], experiment: &Experiment, free: &[Parameter]) -> R
     let mut problem = Problem::new(records, experiment, free)?;
     let start = shooting::multiple_shooting(&mut problem)?;
     let noise_rad = problem.noise_rad.clone();
-    problem.learn_noise(&[], 0);
+    problem.integrate_below_the_noise();
     let refused = || Error::Simulation {
         detail: "no motion near the start values follows the recording; check [specimen] and [model]".into(),
     };

@@ -66,11 +66,6 @@ pub fn predict(model: &ForwardModel, request: &Request<'_>) -> Result<Prediction
     let chain = model.chain();
     let (theta_rad, spread) = links_from_chords(chain, &start[..marks]);
     let (omega_rad_s, _) = links_from_chords(chain, &start[marks..]);
-    let (n, m) = (chain.count(), model.rates());
-    let mut seeds = (DMatrix::zeros(n, 2 * marks), DMatrix::zeros(m, 2 * marks));
-    seeds.0.view_mut((0, 0), (n, marks)).copy_from(&spread);
-    seeds.1.view_mut((0, marks), (n, marks)).copy_from(&spread);
-    let directions = Directions { parameters: parameters.to_vec(), theta: seeds.0, rate: seeds.1 };
     let start_s = record.t_s[rows.start];
     let mut camera = Camera { origin_s: start_s, ..*request.camera };
     if start_s >= camera.dropped_at_s {
@@ -80,8 +75,8 @@ pub fn predict(model: &ForwardModel, request: &Request<'_>) -> Result<Prediction
     let ends_s = [0, 1].map(|link| camera.true_time_s(request.until_s, link));
     let latest_s = ends_s[0].max(ends_s[1]) + 1e-9;
     let state = State { theta_rad, omega_rad_s, hidden: Vec::new() };
-    let directions = request.slopes.then_some(&directions);
-    let swing = Trajectory::with(model, &state, (start_s, latest_s), directions, accuracy)?;
+    let directions = request.slopes.then(|| directions(model, parameters, &spread));
+    let swing = Trajectory::with(model, &state, (start_s, latest_s), directions.as_ref(), accuracy)?;
     let columns = if request.slopes { parameters.len() + 2 * marks } else { 0 };
     let mut values = Vec::with_capacity(record.values(rows.clone()));
     let mut flat = Vec::with_capacity(values.capacity() * columns);
@@ -103,6 +98,15 @@ pub fn predict(model: &ForwardModel, request: &Request<'_>) -> Result<Prediction
     }
     let slopes = DMatrix::from_row_slice(values.len(), columns, &flat);
     Ok(Prediction { values, slopes, end: end_of(model, &swing, request, &camera)? })
+}
+
+/// The parameters, then the angles between marks at the start and their rates, which `spread` hands on to the links.
+fn directions(model: &ForwardModel, parameters: &[Parameter], spread: &DMatrix<f64>) -> Directions {
+    let (n, m, marks) = (spread.nrows(), model.rates(), spread.ncols());
+    let (mut theta, mut rate) = (DMatrix::zeros(n, 2 * marks), DMatrix::zeros(m, 2 * marks));
+    theta.columns_mut(0, marks).copy_from(spread);
+    rate.view_mut((0, marks), (n, marks)).copy_from(spread);
+    Directions { parameters: parameters.to_vec(), theta, rate }
 }
 
 /// Angle between marks and its rate at a true time; its derivatives are added to `slopes`.

@@ -173,7 +173,13 @@ impl<'a> Problem<'a> {
         Block { columns, residual, slopes, robust: true }
     }
 
-    /// Sets the noise to what some residuals (in units of the present noise) say, robustly, and the accuracy of the integration with it.
+    /// Sets the accuracy of the integration to a thousandth of the least noise.
+    pub fn integrate_below_the_noise(&mut self) {
+        let least = self.noise_rad.iter().flatten().copied().fold(f64::INFINITY, f64::min);
+        self.accuracy.step_error_rad = (1e-3 * least).clamp(1e-10, 1e-6);
+    }
+
+    /// Sets the noise to what some residuals (in units of the present noise) say, robustly.
     pub fn learn_noise(&mut self, residuals: &[(usize, usize, f64)], variables: usize) {
         for record in 0..self.records.len() {
             for link in 0..self.marks() {
@@ -189,8 +195,6 @@ impl<'a> Problem<'a> {
                 self.noise_rad[record][link] = (self.noise_rad[record][link] * factor).max(1e-9);
             }
         }
-        let least = self.noise_rad.iter().flatten().copied().fold(f64::INFINITY, f64::min);
-        self.accuracy.step_error_rad = (1e-3 * least).clamp(1e-10, 1e-6);
     }
 }
 

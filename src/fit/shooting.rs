@@ -92,7 +92,6 @@ pub fn multiple_shooting(problem: &mut Problem<'_>) -> Result<Vec<f64>> {
             let residuals: Vec<(usize, usize, f64)> = residuals(problem, &stretches, &x);
             let variables = x.len();
             problem.learn_noise(&residuals, variables);
-            problem.accuracy.step_error_rad = 3e-6;
         }
     }
     let mut whole = x[..free].to_vec();
