@@ -35,6 +35,7 @@ pub mod series;
 pub mod model;
 pub mod identify;
 pub mod fit;
+pub mod diagnose;
 pub mod paper;
 pub mod synth;
 #[doc(hidden)]

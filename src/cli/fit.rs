@@ -85,7 +85,7 @@ impl FitArgs {
     }
 }
 
-/// The parameters a fit leaves free.
+/// The parameters a fit leaves free: those of the base model, with the user's changes.
 fn free_parameters(experiment: &Experiment, marks: usize, more: &[String], fix: &[String]) -> Result<Vec<Parameter>> {
     let parse = |id: &String| {
         let nearest = || {
@@ -101,39 +101,7 @@ fn free_parameters(experiment: &Experiment, marks: usize, more: &[String], fix: 
         })
     };
     let fix = fix.iter().map(parse).collect::<Result<Vec<_>>>()?;
-    let effects = &experiment.model.effects;
-    let mut free = Vec::new();
-    if marks > 1 {
-        if effects.distributed_flexibility.is_some() {
-            free.push(Parameter::BendingStiffness);
-        } else if experiment.model.k_eq_n_m_per_rad > 0.0 {
-            free.push(Parameter::JointStiffness);
-        }
-        free.push(Parameter::JointDamping);
-    } else {
-        free.push(Parameter::HingeViscous);
-    }
-    let named = [
-        (effects.rest_curl, Parameter::RestCurl),
-        (effects.joint_cubic_stiffness, Parameter::JointCubicStiffness),
-        (effects.joint_hysteretic.map(|h| h.torque_n_m), Parameter::HysteresisTorque),
-        (effects.joint_hysteretic.map(|h| h.yield_rad), Parameter::HysteresisYield),
-        (effects.hinge_viscous, Parameter::HingeViscous),
-        (effects.hinge_coulomb, Parameter::HingeCoulomb),
-        (effects.hinge_stiffness, Parameter::HingeStiffness),
-        (effects.air_linear, Parameter::AirLinear),
-        (effects.air_quadratic, Parameter::AirQuadratic),
-        (effects.added_mass, Parameter::AddedMass),
-        (effects.side_force, Parameter::SideForce),
-        (effects.support_motion.map(|s| s.amplitude_m), Parameter::SupportSine),
-        (effects.support_motion.map(|s| s.amplitude_m), Parameter::SupportCosine),
-        (effects.support_motion.map(|s| s.frequency_hz), Parameter::SupportFrequency),
-        (effects.time_base, Parameter::TimeBase),
-        (effects.camera_tilt, Parameter::CameraTilt),
-        (effects.angle_gain, Parameter::AngleGain),
-        (effects.differential_lag, Parameter::DifferentialLag),
-    ];
-    free.extend(named.into_iter().filter_map(|(value, parameter)| value.map(|_| parameter)));
+    let mut free = fit::base_parameters(experiment, marks);
     for id in more {
         free.push(parse(id)?);
     }

@@ -1,6 +1,7 @@
 //! The command line: parse → options → stage → write → exit code. One file a command.
 
 mod bar;
+mod diagnose;
 mod fit;
 mod identify;
 mod modes;
@@ -32,6 +33,7 @@ enum Command {
     Track(track::TrackArgs),
     Identify(identify::IdentifyArgs),
     Fit(fit::FitArgs),
+    Diagnose(diagnose::DiagnoseArgs),
     Simulate(simulate::SimulateArgs),
     Modes(modes::ModesArgs),
     Render(render::RenderArgs),
@@ -52,6 +54,7 @@ impl Cli {
         exit(match Self::parse().command {
             Command::Track(args) => args.run(),
             Command::Fit(args) => args.run(),
+            Command::Diagnose(args) => args.run(),
             Command::Simulate(args) => args.run(),
             Command::Identify(args) => args.run(),
             Command::Render(args) => args.run(),

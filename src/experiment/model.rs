@@ -77,6 +77,8 @@ pub struct Model {
     pub c_eq_n_m_s_per_rad: f64,
     /// Angles at release, at rest.
     pub release_rad: Vec<f64>,
+    /// Rods between two marks, where the strip bends everywhere (`distributed_flexibility`).
+    pub pieces: usize,
     /// Physics beyond the base model.
     pub effects: Effects,
 }
@@ -87,6 +89,7 @@ impl Default for Model {
             k_eq_n_m_per_rad: 2.0e-4,
             c_eq_n_m_s_per_rad: 2.0e-6,
             release_rad: vec![0.5, 0.6],
+            pieces: 6,
             effects: Effects::default(),
         }
     }
@@ -98,6 +101,9 @@ impl Model {
         not_negative("model.c_eq_n_m_s_per_rad", self.c_eq_n_m_s_per_rad)?;
         if self.release_rad.is_empty() || self.release_rad.iter().any(|a| !a.is_finite()) {
             return Err("model.release_rad: needs one finite angle a link".to_owned());
+        }
+        if !(1..=20).contains(&self.pieces) {
+            return Err(format!("model.pieces = {}: must be from 1 to 20", self.pieces));
         }
         self.effects.validate()
     }

@@ -2,6 +2,7 @@
 //!
 //! | file | holds |
 //! |---|---|
+//! | [`base`] | what is free unless told otherwise |
 //! | [`record`] | the angles of a recording |
 //! | [`predict`] | what the model says the camera sees |
 //! | [`problem`] | what is fitted to what |
@@ -13,6 +14,7 @@
 //! Output error: the motion from the first row on is the model's own, and the residual is what the recording shows beyond it. Each recording's
 //! initial angles and rates are free.
 
+pub mod base;
 pub mod descent;
 pub mod interval;
 pub mod predict;
@@ -26,10 +28,11 @@ use crate::experiment::Experiment;
 use crate::model::Parameter;
 use crate::statistics::median;
 
+pub use base::base_parameters;
 pub use descent::{Descent, Ending};
 pub use interval::Estimate;
 pub use predict::Prediction;
-pub use problem::Problem;
+pub use problem::{Belief, Problem};
 pub use record::Record;
 pub use verdict::Verdict;
 
@@ -115,7 +118,7 @@ impl Fit {
 /// [`Error::Option`], [`Error::Simulation`]: see [`Problem::new`]; and where no motion near the start values can be integrated.
 pub fn fit(records: &[Record], experiment: &Experiment, free: &[Parameter]) -> Result<Fit> {
     let mut problem = Problem::new(records, experiment, free)?;
-    let start = shooting::multiple_shooting(&mut problem)?;
+    let start = shooting::multiple_shooting(&mut problem)?.x;
     let noise_rad = problem.noise_rad.clone();
     problem.integrate_below_the_noise();
     let refused = || Error::Simulation {
@@ -148,7 +151,7 @@ pub fn fit(records: &[Record], experiment: &Experiment, free: &[Parameter]) -> R
 /// The recordings without values that stand out from their neighbours: whose residual is further from the median of three on each side
 /// than six robust standard deviations of that distance, here and in the recording as a whole. A misfit of the model is smooth in time and
 /// moves neighbours together. Where more than one value in fifty stands out, the noise is not normal, and none is left out.
-fn without_outliers(problem: &Problem<'_>, x: &[f64]) -> Result<(Vec<Record>, Vec<Vec<Outlier>>)> {
+pub(crate) fn without_outliers(problem: &Problem<'_>, x: &[f64]) -> Result<(Vec<Record>, Vec<Vec<Outlier>>)> {
     let mut kept = problem.records.to_vec();
     let mut outliers = vec![Vec::new(); kept.len()];
     for (index, record) in kept.iter_mut().enumerate() {

@@ -3,17 +3,17 @@
 use nalgebra::{DMatrix, DVector};
 
 use super::descent::Block;
-use super::predict::{Request, predict};
+use super::predict::{Request, Value, predict};
 use super::{Prediction, Record};
 use crate::error::{Error, Result};
 use crate::experiment::{Experiment, Hysteresis, SupportMotion};
 use crate::model::{Accuracy, Camera, ForwardModel, Parameter};
-use crate::statistics::median;
+use crate::statistics::{median, median_step_s};
 
 /// A model with free parameters, and recordings of one specimen.
 ///
 /// The variables of a fit are the free parameters, then for each recording the angles between marks at its first row and their rates.
-#[derive(Debug)]
+#[derive(Debug, Clone)]
 pub struct Problem<'a> {
     /// The recordings.
     pub records: &'a [Record],
@@ -25,8 +25,23 @@ pub struct Problem<'a> {
     pub noise_rad: Vec<Vec<f64>>,
     /// Of the integration.
     pub accuracy: Accuracy,
-    /// From this stamp on frames may be missing, where that is asked.
-    pub dropped_at_s: f64,
+    /// From this stamp on frames may be missing, of each recording.
+    pub dropped_at_s: Vec<f64>,
+    /// Correlation of the noise from one row to the next (AR(1)) of each angle of each recording, `[record][link]`.
+    pub colour: Vec<Vec<f64>>,
+    /// What is known of free parameters beforehand.
+    pub beliefs: Vec<Belief>,
+}
+
+/// A free parameter that is known beforehand, as a measured length or mass is.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Belief {
+    /// Which.
+    pub parameter: Parameter,
+    /// Its value.
+    pub value: f64,
+    /// Its standard deviation.
+    pub sd: f64,
 }
 
 impl<'a> Problem<'a> {
@@ -60,7 +75,9 @@ impl<'a> Problem<'a> {
             experiment,
             noise_rad: records.iter().map(|r| vec![1e-3; r.links()]).collect(),
             accuracy: Accuracy::default(),
-            dropped_at_s: f64::INFINITY,
+            dropped_at_s: vec![f64::INFINITY; records.len()],
+            colour: records.iter().map(|r| vec![0.0; r.links()]).collect(),
+            beliefs: Vec::new(),
         })
     }
 
@@ -81,7 +98,7 @@ impl<'a> Problem<'a> {
 
     /// The start values of the free parameters.
     pub fn start_values(&self) -> Result<Vec<f64>> {
-        let (model, camera) = self.model(&[])?;
+        let (model, camera) = self.model(0, &[])?;
         let value = |p: &Parameter| camera.value(*p).or_else(|| model.value(*p)).unwrap_or(0.0);
         Ok(self.free.iter().map(value).collect())
     }
@@ -102,13 +119,13 @@ impl<'a> Problem<'a> {
         lower
     }
 
-    /// The model and the camera with values for the first of the free parameters.
+    /// The model and the camera of a recording with values for the first of the free parameters.
     ///
     /// # Errors
     /// [`Error::Simulation`].
-    pub fn model(&self, values: &[f64]) -> Result<(ForwardModel, Camera)> {
+    pub fn model(&self, record: usize, values: &[f64]) -> Result<(ForwardModel, Camera)> {
         let mut model = ForwardModel::of(&self.experiment)?;
-        let mut camera = Camera::of(&self.experiment.model.effects, 0.0, self.dropped_at_s);
+        let mut camera = Camera::of(&self.experiment.model.effects, 0.0, self.dropped_at_s[record]);
         for (parameter, value) in self.free.iter().zip(values) {
             model.set(*parameter, *value);
             camera.set(*parameter, *value);
@@ -121,7 +138,7 @@ impl<'a> Problem<'a> {
     /// # Errors
     /// [`Error::Simulation`].
     pub fn predict(&self, record: usize, x: &[f64], slopes: bool) -> Result<Prediction> {
-        let (model, camera) = self.model(&x[..self.free.len()])?;
+        let (model, camera) = self.model(record, &x[..self.free.len()])?;
         let start = self.start_of(record);
         let data = &self.records[record];
         let request = Request {
@@ -137,16 +154,27 @@ impl<'a> Problem<'a> {
         predict(&model, &request)
     }
 
-    /// The residuals of all recordings, each as one motion from its first row; `None` where it cannot be integrated.
+    /// The residuals of all recordings, each as one motion from its first row, then of the beliefs; `None` where it cannot be integrated.
     pub fn blocks(&self, x: &[f64]) -> Option<Vec<Block>> {
-        (0..self.records.len())
-            .map(|record| {
-                let prediction = self.predict(record, x, true).ok()?;
-                let start = self.start_of(record);
-                let columns = (0..self.free.len()).chain(start..start + 2 * self.marks()).collect();
-                Some(self.block(record, &prediction, columns))
-            })
-            .collect()
+        let of = |record: usize| {
+            let prediction = self.predict(record, x, true).ok()?;
+            let start = self.start_of(record);
+            let columns = (0..self.free.len()).chain(start..start + 2 * self.marks()).collect();
+            Some(self.block(record, &prediction, columns))
+        };
+        (0..self.records.len()).map(of).chain(self.belief_block(x).map(Some)).collect()
+    }
+
+    /// How far the parameters are from what is known of them, over its standard deviation.
+    pub fn belief_block(&self, x: &[f64]) -> Option<Block> {
+        let place = |belief: &Belief| self.free.iter().position(|p| *p == belief.parameter);
+        let known: Vec<(usize, &Belief)> = self.beliefs.iter().filter_map(|b| Some((place(b)?, b))).collect();
+        (!known.is_empty()).then(|| Block {
+            columns: known.iter().map(|(column, _)| *column).collect(),
+            residual: DVector::from_iterator(known.len(), known.iter().map(|(i, b)| (x[*i] - b.value) / b.sd)),
+            slopes: DMatrix::from_diagonal(&DVector::from_iterator(known.len(), known.iter().map(|(_, b)| 1.0 / b.sd))),
+            robust: false,
+        })
     }
 
     /// Σr² over all recordings; infinite where the motion cannot be integrated.
@@ -155,10 +183,11 @@ impl<'a> Problem<'a> {
             let prediction = self.predict(record, x, false).ok()?;
             Some(self.block(record, &prediction, Vec::new()).residual.norm_squared())
         };
-        (0..self.records.len()).map(|record| of(record).unwrap_or(f64::INFINITY)).sum()
+        let beliefs = self.belief_block(x).map_or(0.0, |block| block.residual.norm_squared());
+        beliefs + (0..self.records.len()).map(|record| of(record).unwrap_or(f64::INFINITY)).sum::<f64>()
     }
 
-    /// The residuals of a prediction over their noise.
+    /// The residuals of a prediction over their noise; of correlated noise what the value before does not foretell.
     pub fn block(&self, record: usize, prediction: &Prediction, columns: Vec<usize>) -> Block {
         let data = &self.records[record];
         let weight = |link: usize, row: usize| 1.0 / (self.noise_rad[record][link] * data.relative_sd[link][row]);
@@ -170,7 +199,26 @@ impl<'a> Problem<'a> {
             residual[i] = weight * (value.predicted_rad - measured_rad);
             slopes.row_mut(i).scale_mut(weight);
         }
+        self.whiten(record, &prediction.values, &mut residual, &mut slopes);
         Block { columns, residual, slopes, robust: true }
+    }
+
+    /// rᵢ ← (rᵢ − ρᵢ rᵢ₋₁)/√(1 − ρᵢ²) with ρᵢ = ρ^(steps between the two rows), and the same of the derivatives.
+    pub fn whiten(&self, record: usize, values: &[Value], residual: &mut DVector<f64>, slopes: &mut DMatrix<f64>) {
+        if self.colour[record].iter().all(|rho| *rho == 0.0) {
+            return;
+        }
+        let t_s = &self.records[record].t_s;
+        let step_s = median_step_s(t_s).unwrap_or(1.0);
+        for i in (1..values.len()).rev().filter(|i| values[*i].link == values[*i - 1].link) {
+            let steps = (t_s[values[i].row] - t_s[values[i - 1].row]) / step_s;
+            let rho = self.colour[record][values[i].link].powf(steps);
+            let scale = 1.0 / (1.0 - rho * rho).sqrt();
+            residual[i] = scale * (residual[i] - rho * residual[i - 1]);
+            for mut column in slopes.column_iter_mut() {
+                column[i] = scale * (column[i] - rho * column[i - 1]);
+            }
+        }
     }
 
     /// Sets the accuracy of the integration to a thousandth of the least noise.

@@ -44,6 +44,17 @@ impl Record {
         })
     }
 
+    /// The rows before one.
+    #[must_use]
+    pub fn until(&self, row: usize) -> Self {
+        Self {
+            path: self.path.clone(),
+            t_s: self.t_s[..row].to_vec(),
+            theta_rad: self.theta_rad.iter().map(|column| column[..row].to_vec()).collect(),
+            relative_sd: self.relative_sd.iter().map(|column| column[..row].to_vec()).collect(),
+        }
+    }
+
     /// Number of angles.
     pub fn links(&self) -> usize {
         self.theta_rad.len()

@@ -54,12 +54,21 @@ impl Stretch {
     }
 }
 
-/// Start values for a fit of whole recordings: the parameters, then each recording's start; and the noise of every angle on the way.
+/// Where multiple shooting ends.
+#[derive(Debug, Clone)]
+pub struct Shot {
+    /// The parameters, then each recording's start.
+    pub x: Vec<f64>,
+    /// What stretches with starts of their own leave, over the noise: (recording, link, residual) in order of time.
+    pub residuals: Vec<(usize, usize, f64)>,
+}
+
+/// Start values for a fit of whole recordings; and the noise of every angle on the way.
 ///
 /// # Errors
 /// [`crate::Error::Simulation`] where the specimen cannot swing.
-pub fn multiple_shooting(problem: &mut Problem<'_>) -> Result<Vec<f64>> {
-    let (model, _) = problem.model(&[])?;
+pub fn multiple_shooting(problem: &mut Problem<'_>) -> Result<Shot> {
+    let (model, _) = problem.model(0, &[])?;
     let pace_rad_s = model.pace_rad_s();
     let length_s = PERIODS * std::f64::consts::TAU / pace_rad_s;
     let stretches = stretches(problem, length_s);
@@ -81,6 +90,7 @@ pub fn multiple_shooting(problem: &mut Problem<'_>) -> Result<Vec<f64>> {
     let mut lower = problem.lower();
     lower.resize(x.len(), f64::NEG_INFINITY);
     problem.accuracy = Accuracy { step_error_rad: 3e-6, ..Accuracy::default() };
+    let mut left_by_stretches = Vec::new();
     for (round, seam) in SEAMS.iter().enumerate() {
         let descent = Descent { huber: 4.0, most_steps: STEPS_EACH, enough: 0.3, fixed: None };
         let Some(outcome) = descent.run(x.clone(), &lower, |x| blocks(problem, &stretches, x, *seam, pace_rad_s))
@@ -89,9 +99,9 @@ pub fn multiple_shooting(problem: &mut Problem<'_>) -> Result<Vec<f64>> {
         };
         x = outcome.x;
         if round == 0 {
-            let residuals: Vec<(usize, usize, f64)> = residuals(problem, &stretches, &x);
+            left_by_stretches = residuals(problem, &stretches, &x);
             let variables = x.len();
-            problem.learn_noise(&residuals, variables);
+            problem.learn_noise(&left_by_stretches, variables);
         }
     }
     let mut whole = x[..free].to_vec();
@@ -101,7 +111,7 @@ pub fn multiple_shooting(problem: &mut Problem<'_>) -> Result<Vec<f64>> {
             whole.extend_from_slice(&x[start..start + 2 * marks]);
         }
     }
-    Ok(whole)
+    Ok(Shot { x: whole, residuals: left_by_stretches })
 }
 
 fn stretches(problem: &Problem<'_>, length_s: f64) -> Vec<Stretch> {
@@ -136,9 +146,10 @@ fn cut(index: usize, record: &Record, length_s: f64, wanted: usize) -> Vec<Stret
 
 fn blocks(problem: &Problem<'_>, stretches: &[Stretch], x: &[f64], seam: f64, pace_rad_s: f64) -> Option<Vec<Block>> {
     let (free, marks) = (problem.free.len(), problem.marks());
-    let (model, camera) = problem.model(&x[..free]).ok()?;
-    let mut blocks = Vec::with_capacity(2 * stretches.len());
+    let mut blocks = Vec::with_capacity(2 * stretches.len() + 1);
+    blocks.extend(problem.belief_block(x));
     for (index, stretch) in stretches.iter().enumerate() {
+        let (model, camera) = problem.model(stretch.record, &x[..free]).ok()?;
         let start = free + index * 2 * marks;
         let request = stretch.request(problem, &camera, &x[start..start + 2 * marks], true);
         let prediction = predict(&model, &request).ok()?;
@@ -169,9 +180,9 @@ fn blocks(problem: &Problem<'_>, stretches: &[Stretch], x: &[f64], seam: f64, pa
 /// The data's residuals in units of the noise, with recording and link.
 fn residuals(problem: &Problem<'_>, stretches: &[Stretch], x: &[f64]) -> Vec<(usize, usize, f64)> {
     let (free, marks) = (problem.free.len(), problem.marks());
-    let Ok((model, camera)) = problem.model(&x[..free]) else { return Vec::new() };
     let mut all = Vec::new();
     for (index, stretch) in stretches.iter().enumerate() {
+        let Ok((model, camera)) = problem.model(stretch.record, &x[..free]) else { continue };
         let start = free + index * 2 * marks;
         let request = stretch.request(problem, &camera, &x[start..start + 2 * marks], false);
         if let Ok(prediction) = predict(&model, &request) {

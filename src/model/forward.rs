@@ -8,9 +8,6 @@ use super::{Chain, Hinge, Motion, Parameter, Partials};
 use crate::error::{Error, Result};
 use crate::experiment::Experiment;
 
-/// Rods for each length between marks, where the strip bends everywhere.
-const PIECES: usize = 6;
-
 /// A chain under gravity, with its effects, as a balance of torques (d'Alembert):
 ///
 /// ```text
@@ -29,14 +26,14 @@ pub struct ForwardModel {
 }
 
 impl ForwardModel {
-    /// The model an experiment describes. `distributed_flexibility` makes the strip a chain of six rods between marks.
+    /// The model an experiment describes. `distributed_flexibility` makes the strip a chain of `pieces` rods between marks.
     ///
     /// # Errors
     /// [`Error::Simulation`] when the specimen cannot swing.
     pub fn of(experiment: &Experiment) -> Result<Self> {
         let (specimen, model) = (&experiment.specimen, &experiment.model);
         let chain = match model.effects.distributed_flexibility {
-            Some(_) => Chain::continuous(specimen, PIECES)?,
+            Some(_) => Chain::continuous(specimen, model.pieces)?,
             None => Chain::of(specimen)?,
         };
         let lengths_m = specimen.lengths_m();

@@ -42,6 +42,8 @@ pub(super) struct Place {
     pub rate: Vec<f64>,
 }
 
+/// No link turns this far: a softening spring without end has let go.
+const RUNAWAY_RAD: f64 = 1e4;
 /// Points of a step where a reversal is looked for.
 const LOOKS: usize = 12;
 
@@ -168,6 +170,9 @@ impl<'a> Run<'a> {
             theta_rad: step.theta_rad(1.0),
             rate: step.rate(1.0),
         };
+        if self.place.theta_rad.iter().any(|theta| theta.abs() > RUNAWAY_RAD) {
+            return Err(self.stuck("the motion runs away"));
+        }
         self.slopes = step.slopes(1.0);
         self.first = step.last_acceleration().to_vec();
         let jump = turn.is_some() || self.place.t_s == target_s;

@@ -1,0 +1,309 @@
+//! `freeswing diagnose`: where simulation and recording differ, and what physics was left out.
+
+use std::fmt::Write;
+use std::path::PathBuf;
+
+use serde_json::{Map, Value, json};
+
+use super::Bar;
+use super::table::{Table, number, paragraph};
+use crate::diagnose::{self, Cause, Diagnosis, Place, Refit, Status, Weighed, locate};
+use crate::error::{Error, Result};
+use crate::experiment::Experiment;
+use crate::fit::Record;
+use crate::model::{ForwardModel, Parameter};
+use crate::output::OutputFile;
+use crate::series::AngleSeries;
+
+/// Candidates listed on the page.
+const LISTED: usize = 6;
+/// Candidates written to the file.
+const WRITTEN: usize = 25;
+
+/// Say where the model differs from recordings, name the physics left out, and prove it.
+#[derive(Debug, clap::Args)]
+#[command(after_help = "\
+Examples:
+  freeswing diagnose angles.csv --config videos/kapton.toml
+  freeswing diagnose small.csv large.csv --config experiment.toml --json diagnosis.json
+
+The base model is that of `fit`: the joint's spring and damper, every effect named in [model.effects], and each recording's start; of one link
+the hinge's viscous damper. All other effects are candidates, those of the camera first.")]
+pub struct DiagnoseArgs {
+    /// Tables of angles of one specimen; `-` is standard input.
+    #[arg(required = true, value_name = "ANGLES")]
+    angles: Vec<PathBuf>,
+    /// The experiment file: specimen, rig and base model.
+    #[arg(long, value_name = "FILE")]
+    config: PathBuf,
+    /// Write all of it as JSON; `-` for standard output.
+    #[arg(long, value_name = "FILE")]
+    json: Option<PathBuf>,
+    /// Use rows from this stamp on.
+    #[arg(long, value_name = "S", default_value_t = f64::NEG_INFINITY, hide_default_value = true, allow_negative_numbers = true)]
+    from: f64,
+    /// Use rows before this stamp.
+    #[arg(long, value_name = "S", default_value_t = f64::INFINITY, hide_default_value = true, allow_negative_numbers = true)]
+    until: f64,
+    /// Nothing on standard output, no progress.
+    #[arg(long)]
+    quiet: bool,
+}
+
+impl DiagnoseArgs {
+    /// Diagnoses and prints.
+    ///
+    /// # Errors
+    /// One line: what, where, what to do.
+    pub fn run(&self) -> Result<()> {
+        let experiment = Experiment::read(&self.config)?;
+        let marks = ForwardModel::of(&experiment)?.chain().groups().len();
+        let records = (self.angles.iter())
+            .map(|path| {
+                let series = AngleSeries::read(path)?;
+                let kept = series.slice(series.rows(self.from, self.until));
+                if kept.len() < crate::series::FEWEST_ROWS {
+                    let message = format!("{} rows between --from and --until; widen them", kept.len());
+                    return Err(Error::Table { path: path.clone(), line: None, message });
+                }
+                Record::of(&kept, marks)
+            })
+            .collect::<Result<Vec<Record>>>()?;
+        let json = self.json.as_deref().map(OutputFile::create).transpose()?;
+        let bar = Bar::new(self.quiet);
+        let prepared = diagnose::prepare(&records, &experiment)?;
+        let diagnosis = diagnose::diagnose(&prepared, &experiment, &bar)?;
+        drop(bar);
+        let report = Report { diagnosis: &diagnosis, specimen: &experiment.specimen.name };
+        let text = if self.quiet { String::new() } else { report.text() };
+        super::deliver(&text, &report.json(), json)
+    }
+}
+
+struct Report<'a> {
+    diagnosis: &'a Diagnosis<'a>,
+    specimen: &'a str,
+}
+
+impl Report<'_> {
+    fn text(&self) -> String {
+        let mut text = format!("{}\n\n", self.specimen);
+        text.push_str(&paragraph("", &self.statement()));
+        text.push_str(&paragraph("", &self.where_statement()));
+        if let Some(advice) = &self.diagnosis.verdict.to_decide {
+            text.push_str(&paragraph("", &format!("To decide: {advice}.")));
+        }
+        text.push('\n');
+        let mut table = Table::new(["the base model and", "probability", "left mrad", "coefficient", "sd", "unit"]);
+        for weighed in self.diagnosis.weighed.iter().take(LISTED) {
+            let left = rmse_rad(&weighed.fit).iter().map(|r| number(1e3 * r, 3)).collect::<Vec<_>>().join(" ");
+            let mut first = [names(&weighed.fit.hypothesis.causes, "nothing else"), number(weighed.probability, 3), left];
+            for (parameter, value, sd) in coefficients(&weighed.fit) {
+                let [name, probability, left] = std::mem::take(&mut first);
+                table.row([name, probability, left, number(value, 4), number(sd, 2), parameter.unit().to_owned()]);
+            }
+            if !first[0].is_empty() {
+                let [name, probability, left] = first;
+                table.row([name, probability, left]);
+            }
+        }
+        table.row(["something not in the table".to_owned(), number(self.diagnosis.verdict.unknown, 3)]);
+        text.push_str(&table.text());
+        self.proof(&mut text);
+        self.limits(&mut text);
+        text
+    }
+
+    fn proof(&self, text: &mut String) {
+        let Some(held_out) = &self.diagnosis.held_out else { return };
+        let noise_rad = &self.diagnosis.noise_rad[held_out.record];
+        let _ = writeln!(text, "\nFitted before {:.2} s, predicted from there on:", held_out.from_s);
+        let mut table = Table::new(["", "noise mrad", "base model leaves", "with the effects named"]);
+        for link in 0..noise_rad.len() {
+            let milli = |rad: f64| number(1e3 * rad, 3);
+            table.row([
+                format!("θ{}", link + 1),
+                milli(noise_rad[link]),
+                milli(held_out.baseline_rad[link]),
+                milli(held_out.augmented_rad[link]),
+            ]);
+        }
+        text.push_str(&table.text());
+    }
+
+    fn limits(&self, text: &mut String) {
+        if self.diagnosis.verdict.status != Status::Adequate || self.diagnosis.detectable.is_empty() {
+            return;
+        }
+        text.push_str("\nThis recording would have shown\n");
+        let mut table = Table::new(["effect", "from", "unit", "not told from"]);
+        for limit in &self.diagnosis.detectable {
+            table.row([
+                limit.cause.id().to_owned(),
+                if limit.smallest.is_finite() { number(limit.smallest, 2) } else { "never".to_owned() },
+                limit.parameter.unit().to_owned(),
+                names(&limit.confused_with, ""),
+            ]);
+        }
+        text.push_str(&table.text());
+    }
+
+    fn statement(&self) -> String {
+        let verdict = &self.diagnosis.verdict;
+        let percent = 1e2 * verdict.probability;
+        match verdict.status {
+            Status::Adequate => format!("Nothing is missing that this recording could show: the base model leaves only noise ({percent:.0} %)."),
+            Status::Unknown => format!("Something is missing that is not in the table of effects ({percent:.0} %): no named law, nor two of them, leaves only noise."),
+            Status::Identified => format!("Missing: {} ({percent:.0} %).", words(&verdict.effects)),
+            Status::Ambiguous => format!(
+                "Missing: most likely {} ({percent:.0} %), but the recording does not tell it from others: {}.",
+                words(&verdict.effects),
+                names(&verdict.class, ""),
+            ),
+        }
+    }
+
+    fn place(&self) -> Option<Place> {
+        match self.diagnosis.verdict.status {
+            Status::Adequate => None,
+            Status::Unknown => self.diagnosis.unknowns.first().map(|u| u.place),
+            _ => self.diagnosis.main_effect().map(Cause::place),
+        }
+    }
+
+    fn phase(&self) -> Option<locate::Phase> {
+        match self.diagnosis.verdict.status {
+            Status::Adequate => None,
+            Status::Unknown => self.diagnosis.departure.goes_with,
+            _ => self.diagnosis.main_effect().and_then(locate::Phase::of),
+        }
+    }
+
+    fn where_statement(&self) -> String {
+        let departure = &self.diagnosis.departure;
+        let Some(place) = self.place() else { return String::new() };
+        let mut statement = match place {
+            Place::Hinge => "It acts at the hinge",
+            Place::Joint => "It acts in the joint",
+            Place::Air => "It acts from outside along the strip",
+            Place::Camera => "It is an error of the camera, not of the model",
+        }
+        .to_owned();
+        if let Some(phase) = self.phase().filter(|_| place != Place::Camera) {
+            let _ = write!(statement, ", in phase with the {}", phase.id());
+        }
+        if let (Some([from_s, until_s]), Some([least, most])) = (departure.time_s, departure.amplitude_rad) {
+            let _ = write!(
+                statement,
+                "; the base model departs from {from_s:.2} s to {until_s:.2} s, at amplitudes of {least:.3} to {most:.3} rad"
+            );
+        }
+        let shares = self.diagnosis.energy_shares;
+        if shares.iter().sum::<f64>() > 0.0 {
+            let _ = write!(
+                statement,
+                ". Of the energy lost {:.0} % go at the hinge, {:.0} % in the joint, {:.0} % to the air",
+                1e2 * shares[0],
+                1e2 * shares[1],
+                1e2 * shares[2]
+            );
+        }
+        statement.push('.');
+        statement
+    }
+
+    fn json(&self) -> Value {
+        let diagnosis = self.diagnosis;
+        let null = diagnosis.null();
+        let verdict = &diagnosis.verdict;
+        let departure = &diagnosis.departure;
+        let shares: Map<String, Value> =
+            Place::OF_LOSSES.iter().zip(diagnosis.energy_shares).map(|(p, s)| (p.id().to_owned(), json!(s))).collect();
+        json!({
+            "schema": "freeswing.diagnosis/1",
+            "specimen": self.specimen,
+            "baseline": {
+                "parameters": parameters_json(null, &null.problem.free),
+                "rmse_rad": rmse_rad(null),
+                "noise_rad": diagnosis.noise_rad[0],
+                "noise_correlation": diagnosis.colour[0],
+                "adequate": verdict.status == Status::Adequate,
+                "p_value": diagnosis.p_value,
+            },
+            "where": {
+                "place": self.place().map(Place::id),
+                "energy_share": shares,
+                "time_s": departure.time_s,
+                "amplitude_rad": departure.amplitude_rad,
+                "phase": self.phase().map(locate::Phase::id),
+                "frequency_hz": departure.frequency_hz,
+                "statement": self.where_statement(),
+                "unknown": diagnosis.unknowns.iter().map(|u| json!({"place": u.place.id(), "size": u.size, "log_likelihood_gain": u.gain})).collect::<Vec<_>>(),
+            },
+            "candidates": diagnosis.weighed.iter().take(WRITTEN).map(candidate_json).collect::<Vec<_>>(),
+            "verdict": {
+                "status": verdict.status.id(),
+                "effects": verdict.effects.iter().map(|c| c.id()).collect::<Vec<_>>(),
+                "class": verdict.class.iter().map(|c| c.id()).collect::<Vec<_>>(),
+                "probability": verdict.probability,
+                "unknown_probability": verdict.unknown,
+                "statement": self.statement(),
+                "to_decide": verdict.to_decide,
+            },
+            "heldout": diagnosis.held_out.as_ref().map(|h| {
+                let recording = &null.problem.records[h.record].path;
+                json!({
+                    "from_s": h.from_s, "recording": recording,
+                    "baseline_rmse_rad": h.baseline_rad, "augmented_rmse_rad": h.augmented_rad,
+                })
+            }),
+            "detectable": diagnosis.detectable.iter().map(|d| (d.cause.id().to_owned(), json!({
+                "smallest": d.smallest.is_finite().then_some(d.smallest), "unit": d.parameter.unit(),
+                "confused_with": d.confused_with.iter().map(|c| c.id()).collect::<Vec<_>>(),
+            }))).collect::<Map<_, _>>(),
+        })
+    }
+}
+
+fn names(causes: &[Cause], none: &str) -> String {
+    if causes.is_empty() { none.to_owned() } else { causes.iter().map(|c| c.id()).collect::<Vec<_>>().join(", ") }
+}
+
+fn words(causes: &[Cause]) -> String {
+    causes.iter().map(|c| format!("{} ({})", c.words(), c.id())).collect::<Vec<_>>().join(" and ")
+}
+
+fn rmse_rad(fit: &Refit<'_>) -> Vec<f64> {
+    locate::residuals(fit, 0).map(|r| r.rmse_rad).unwrap_or_default()
+}
+
+/// Coefficients of the added effects with their standard deviations.
+fn coefficients(fit: &Refit<'_>) -> Vec<(Parameter, f64, f64)> {
+    let added = fit.added();
+    let covariance = fit.covariance(&added);
+    let of = |(i, p): (usize, &Parameter)| (*p, fit.value(*p).unwrap_or(0.0), covariance[(i, i)].sqrt());
+    added.iter().enumerate().map(of).collect()
+}
+
+fn parameters_json(fit: &Refit<'_>, of: &[Parameter]) -> Value {
+    let covariance = fit.covariance(of);
+    let one = |(i, p): (usize, &Parameter)| {
+        let value = json!({"value": fit.value(*p), "sd": covariance[(i, i)].sqrt(), "unit": p.unit()});
+        (p.id().to_owned(), value)
+    };
+    Value::Object(of.iter().enumerate().map(one).collect())
+}
+
+fn candidate_json(weighed: &Weighed<'_>) -> Value {
+    let fit = &weighed.fit;
+    let values: usize = fit.problem.records.iter().map(|r| r.values(0..r.len())).sum();
+    json!({
+        "effects": fit.hypothesis.causes.iter().map(|c| c.id()).collect::<Vec<_>>(),
+        "probability": weighed.probability,
+        "parameters": parameters_json(fit, &fit.added()),
+        "dropped_at_s": fit.hypothesis.dropped.map(|d| d.1),
+        "rmse_rad": rmse_rad(fit),
+        "chi2": fit.chi2,
+        "bic": fit.chi2 + fit.x.len() as f64 * (values as f64).ln(),
+    })
+}

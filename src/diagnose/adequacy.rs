@@ -1,0 +1,125 @@
+//! Is the base model enough? Its residuals against what chance alone would leave, and what could have been seen.
+//!
+//! The residuals of a fit to data that its model made are (1 − QQᵀ)ε, ε being the noise: replicates of them cost no integration. Each statistic
+//! (the best score of any effect, the worst window, the strongest frequency) is ranked among its replicates, and the smallest rank among the smallest
+//! ranks of the replicates, so that looking in many places is paid for.
+
+use nalgebra::DVector;
+use rand::SeedableRng;
+use rand::rngs::StdRng;
+use rand_distr::{Distribution, StandardNormal};
+use rayon::prelude::*;
+
+use super::Cause;
+use super::refit::{Ground, Refit};
+use super::screen::{Score, Screen};
+use crate::model::Parameter;
+
+/// Replicates of the residuals.
+const REPLICATES: usize = 500;
+/// Values of a window.
+const WINDOW: usize = 40;
+/// An effect is detected at this many standard deviations.
+const DETECTED: f64 = 4.0;
+/// Two effects whose columns go together by more than this cannot be named apart at twice the size at which they are detected.
+const CONFUSED: f64 = 0.93;
+
+/// The smallest amount of an effect that a recording can show.
+#[derive(Debug, Clone)]
+pub struct Detectable {
+    /// The effect.
+    pub cause: Cause,
+    /// Its first coefficient.
+    pub parameter: Parameter,
+    /// The amount; infinite where no amount can be told from the base model.
+    pub smallest: f64,
+    /// Effects that would do nearly the same.
+    pub confused_with: Vec<Cause>,
+}
+
+/// What [`adequacy`] says.
+#[derive(Debug, Clone)]
+pub struct Adequacy {
+    /// How often chance alone leaves residuals as conspicuous as these.
+    pub p_value: f64,
+    /// What could have been seen.
+    pub detectable: Vec<Detectable>,
+}
+
+/// Judges the base model's fit.
+pub fn adequacy(ground: &Ground<'_>, null: &Refit<'_>, causes: &[Cause]) -> Adequacy {
+    let nothing = Adequacy { p_value: 0.0, detectable: Vec::new() };
+    let Some(screen) = Screen::at(ground, null) else { return nothing };
+    let scores = screen.scores(causes);
+    let basis = &screen.projection.basis;
+    let statistics = |residual: &DVector<f64>| {
+        let score = scores
+            .iter()
+            .map(|s| {
+                let pull = s.columns.tr_mul(residual);
+                pull.dot(&(s.columns.tr_mul(&s.columns).try_inverse().map_or(pull.clone() * 0.0, |i| i * &pull)))
+            })
+            .fold(0.0, f64::max);
+        let window = (0..residual.len() / WINDOW)
+            .map(|k| residual.rows(k * WINDOW, WINDOW).norm_squared())
+            .fold(0.0, f64::max);
+        let neighbours: f64 = (1..residual.len()).map(|i| residual[i] * residual[i - 1]).sum();
+        [score, window, (neighbours / residual.norm_squared().max(1e-300)).abs(), residual.norm_squared()]
+    };
+    let freedom = (residual_count(&screen) - basis.ncols()).max(1) as f64;
+    let replicates: Vec<[f64; 4]> = (0..REPLICATES as u64)
+        .into_par_iter()
+        .map(|seed| {
+            let mut random = StdRng::seed_from_u64(seed);
+            let noise = DVector::from_fn(basis.nrows(), |_, _| StandardNormal.sample(&mut random));
+            statistics(&(&noise - basis * basis.tr_mul(&noise)))
+        })
+        .collect();
+    let own = statistics(&screen.projection.residual);
+    let _ = freedom;
+    Adequacy { p_value: ranked(&own, &replicates), detectable: detectable(&scores, causes) }
+}
+
+fn residual_count(screen: &Screen<'_, '_>) -> usize {
+    screen.projection.residual.len()
+}
+
+/// The share of replicates whose least rank is as small as the recording's.
+fn ranked(own: &[f64; 4], replicates: &[[f64; 4]]) -> f64 {
+    let count = replicates.len() as f64;
+    let rank = |of: &[f64; 4]| {
+        (0..own.len())
+            .map(|s| (1.0 + replicates.iter().filter(|r| r[s] >= of[s]).count() as f64) / (count + 1.0))
+            .fold(1.0, f64::min)
+    };
+    let mine = rank(own);
+    let ranks: Vec<f64> = replicates.par_iter().map(rank).collect();
+    (1.0 + ranks.iter().filter(|r| **r <= mine).count() as f64) / (count + 1.0)
+}
+
+/// The smallest detectable amount of each effect, and what it would be confused with.
+pub fn detectable(scores: &[Score], causes: &[Cause]) -> Vec<Detectable> {
+    let of = |cause: &Cause| {
+        let parameter = cause.parameters()[0];
+        let Some(score) = scores.iter().find(|s| s.cause == *cause) else {
+            return Detectable { cause: *cause, parameter, smallest: f64::INFINITY, confused_with: Vec::new() };
+        };
+        let confused = |other: &&Score| other.cause != *cause && together(score, other) > CONFUSED;
+        Detectable {
+            cause: *cause,
+            parameter,
+            smallest: DETECTED * score.sd,
+            confused_with: scores.iter().filter(confused).map(|s| s.cause).collect(),
+        }
+    };
+    causes.iter().map(of).collect()
+}
+
+/// How much of one effect's column others of another can make: the cosine between them.
+fn together(one: &Score, other: &Score) -> f64 {
+    let column = one.columns.column(0);
+    let gram = other.columns.tr_mul(&other.columns);
+    let along = other.columns.tr_mul(&column);
+    let Some(inverse) = gram.try_inverse() else { return 0.0 };
+    (along.dot(&(inverse * &along)) / column.norm_squared().max(1e-300)).sqrt()
+}

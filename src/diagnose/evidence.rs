@@ -1,0 +1,95 @@
+//! How probable each hypothesis is: its likelihood, weighed by how much of what it could have been it had to be.
+//!
+//! Laplace's approximation of the evidence, with the coefficients' sizes log-uniform over ln R (no size is likelier than another):
+//!
+//! ```text
+//! ln Z = −½χ²/s² + ½ ln det 2πΣ − Σ ln(|β| ln R)      Σ: covariance of the coefficients, everything else being free
+//! ```
+//!
+//! s² = max(1, χ²/N of the best hypothesis) allows for noise that was estimated too low. A support's frequency, a joint's yield angle and the instant
+//! of missing frames count as any value within their range.
+
+use super::Cause;
+use super::refit::{Hypothesis, Refit};
+use crate::model::Parameter;
+
+/// ln R: sizes over four decades.
+const SIZES: f64 = 9.2;
+/// Yield angles over a factor of thirty.
+const YIELDS: f64 = 3.4;
+/// Coefficients of less than this many standard deviations are not told from zero.
+const TOLD_FROM_ZERO: f64 = 1.5;
+
+/// Prior probabilities before anything is measured.
+const PRIOR_NULL: f64 = 0.25;
+const PRIOR_ONE: f64 = 0.40;
+const PRIOR_TWO: f64 = 0.25;
+/// Of physics outside the table.
+pub const PRIOR_UNKNOWN: f64 = 0.10;
+
+/// ln of the prior probability of a hypothesis, of `candidates` effects.
+pub fn ln_prior(hypothesis: &Hypothesis, candidates: usize) -> f64 {
+    let count = candidates.max(1) as f64;
+    match hypothesis.causes.len() {
+        0 => PRIOR_NULL.ln(),
+        1 => (PRIOR_ONE / count).ln(),
+        _ => (PRIOR_TWO / (0.5 * count * (count - 1.0)).max(1.0)).ln(),
+    }
+}
+
+/// ln Z of a fitted hypothesis; −∞ where a coefficient is not told from zero.
+pub fn ln_evidence(fit: &Refit<'_>, variance: f64) -> f64 {
+    let likelihood = -0.5 * fit.chi2 / variance;
+    let added: Vec<Parameter> = fit.added().into_iter().filter(|p| *p != Parameter::BendingStiffness).collect();
+    if added.is_empty() {
+        return likelihood;
+    }
+    let covariance = fit.covariance(&added) * variance;
+    let mut ln_volume = 0.5 * (covariance.clone() * std::f64::consts::TAU).determinant().max(1e-300).ln();
+    let of = |parameter: Parameter| {
+        let i = added.iter().position(|p| *p == parameter).unwrap_or(0);
+        (fit.value(parameter).unwrap_or(0.0), covariance[(i, i)].sqrt())
+    };
+    for cause in &fit.hypothesis.causes {
+        let (value, sd) = match cause {
+            Cause::DistributedFlexibility => continue,
+            Cause::SupportMotion => {
+                let ((sine, sd), (cosine, _)) = (of(Parameter::SupportSine), of(Parameter::SupportCosine));
+                (sine.hypot(cosine), sd)
+            }
+            one => of(one.parameters()[0]),
+        };
+        if !(value.abs() > TOLD_FROM_ZERO * sd) {
+            return f64::NEG_INFINITY;
+        }
+        ln_volume -= (value.abs() * SIZES).ln();
+        match cause {
+            Cause::SupportMotion => {
+                // direction of the phase, and any frequency up to a multiple of the swing's
+                ln_volume -= (std::f64::consts::TAU * value.abs()).ln();
+                let highest_hz = 10.0;
+                ln_volume -= f64::ln(highest_hz);
+            }
+            Cause::JointHysteretic => {
+                let (yield_rad, sd) = of(Parameter::HysteresisYield);
+                // a yield angle that the recording does not tell can be any
+                ln_volume -= (yield_rad * YIELDS).ln().max(sd.ln());
+            }
+            Cause::DroppedFrames => {
+                let rows: usize = fit.problem.records.iter().map(crate::fit::Record::len).sum();
+                ln_volume -= (rows as f64).ln();
+            }
+            // either sign
+            one if !one.parameters()[0].is_not_negative() => ln_volume -= std::f64::consts::LN_2,
+            _ => {}
+        }
+    }
+    likelihood + ln_volume
+}
+
+/// Probabilities from logarithms, which need not be normalised.
+pub fn normalised(ln: &[f64]) -> Vec<f64> {
+    let most = ln.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+    let sum: f64 = ln.iter().map(|l| (l - most).exp()).sum();
+    ln.iter().map(|l| (l - most).exp() / sum).collect()
+}

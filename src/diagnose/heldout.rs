@@ -1,0 +1,85 @@
+//! The proof: fit on one part, predict the other with every coefficient frozen.
+
+use super::refit::{Ground, Hypothesis, Refit};
+use crate::fit::{Belief, Record};
+
+/// Part of a recording that is fitted; the rest is predicted.
+const FITTED: f64 = 2.0 / 3.0;
+/// A frozen coefficient may move by this part of itself.
+const FROZEN: f64 = 1e-9;
+
+/// Root mean square errors of what was not fitted.
+#[derive(Debug, Clone, PartialEq)]
+pub struct HeldOut {
+    /// The recording that was predicted.
+    pub record: usize,
+    /// From which stamp on it was not fitted.
+    pub from_s: f64,
+    /// By the base model, each angle.
+    pub baseline_rad: Vec<f64>,
+    /// By the model with the effects named.
+    pub augmented_rad: Vec<f64>,
+}
+
+/// Predicts the last third of a single recording from the first two; of several, the last recording from the others, of which only the
+/// start is then fitted. `from_s` moves the border of a single one.
+pub fn held_out(ground: &Ground<'_>, null: &Refit<'_>, best: &Refit<'_>, from_s: Option<f64>) -> Option<HeldOut> {
+    if ground.records.len() > 1 { across(ground, null, best) } else { along(ground, null, best, from_s) }
+}
+
+fn along(ground: &Ground<'_>, null: &Refit<'_>, best: &Refit<'_>, from_s: Option<f64>) -> Option<HeldOut> {
+    let record = &ground.records[0];
+    let (first_s, last_s) = (record.t_s[0], record.t_s[record.len() - 1]);
+    let border_s = from_s.unwrap_or(first_s + FITTED * (last_s - first_s));
+    let rows = record.t_s.partition_point(|t| *t < border_s);
+    if rows < crate::series::FEWEST_ROWS || rows + crate::series::FEWEST_ROWS > record.len() {
+        return None;
+    }
+    let early = [record.until(rows)];
+    let part = ground.on(&early);
+    let predicted = |fit: &Refit<'_>| {
+        let refitted = part.refit(&fit.hypothesis, fit, &[])?;
+        let whole = ground.problem(&fit.hypothesis).ok()?;
+        errors(&whole.predict(0, &refitted.x, false).ok()?.values, record, rows)
+    };
+    Some(HeldOut { record: 0, from_s: border_s, baseline_rad: predicted(null)?, augmented_rad: predicted(best)? })
+}
+
+fn across(ground: &Ground<'_>, null: &Refit<'_>, best: &Refit<'_>) -> Option<HeldOut> {
+    let last = ground.records.len() - 1;
+    let others = ground.on(&ground.records[..last]);
+    let alone = ground.on(&ground.records[last..]);
+    let starts = 2 * null.problem.marks();
+    let predicted = |fit: &Refit<'_>| {
+        let hypothesis = Hypothesis { dropped: fit.hypothesis.dropped.filter(|d| d.0 < last), ..fit.hypothesis.clone() };
+        let mut near = fit.clone();
+        near.x.truncate(fit.x.len() - starts);
+        let fitted = others.refit(&hypothesis, &near, &[])?;
+        // on the last one only the start is free
+        let frozen: Vec<Belief> = (fitted.problem.free.iter().zip(&fitted.x))
+            .map(|(p, value)| Belief { parameter: *p, value: *value, sd: FROZEN * value.abs().max(1e-12) })
+            .collect();
+        let alone = Ground { beliefs: frozen, ..alone.clone() };
+        let mut start = fitted.clone();
+        start.x.truncate(fitted.problem.free.len());
+        start.x.extend_from_slice(&fit.x[fit.x.len() - starts..]);
+        let hypothesis = Hypothesis { dropped: None, ..hypothesis };
+        let seen = alone.refit(&hypothesis, &start, &[])?;
+        errors(&seen.problem.predict(0, &seen.x, false).ok()?.values, &ground.records[last], 0)
+    };
+    let from_s = ground.records[last].t_s[0];
+    Some(HeldOut { record: last, from_s, baseline_rad: predicted(null)?, augmented_rad: predicted(best)? })
+}
+
+/// Root mean square error of each angle from a row on.
+fn errors(values: &[crate::fit::predict::Value], record: &Record, from_row: usize) -> Option<Vec<f64>> {
+    (0..record.links())
+        .map(|link| {
+            let left = values.iter().filter(|v| v.link == link && v.row >= from_row);
+            let squares: Vec<f64> = left
+                .filter_map(|v| Some((record.theta_rad[link][v.row]? - v.predicted_rad).powi(2)))
+                .collect();
+            (!squares.is_empty()).then(|| (squares.iter().sum::<f64>() / squares.len() as f64).sqrt())
+        })
+        .collect()
+}

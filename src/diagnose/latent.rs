@@ -1,0 +1,131 @@
+//! The unknown torque: a smooth random process at one place, estimated around a fitted motion by a Kalman filter and smoother.
+//!
+//! ```text
+//! state   z = (δθ, δrate, u, δp)      u' = −u/T + w,   sd of u: σ
+//! seen    left = ∂(angle)/∂θ δθ (+ u) + noise
+//! ```
+//!
+//! The initial state and the base parameters are free as in the fit itself (their prior is wide), so that u holds only what they cannot absorb.
+//! `ln L(σ) − ln L(0)` says how much the recording asks for it.
+
+use nalgebra::{DMatrix, DVector};
+
+use super::Place;
+use super::refit::Refit;
+use super::surroundings::Surroundings;
+
+/// Standard deviations of the fitted state and parameters at which their prior stands.
+const WIDE: f64 = 300.0;
+/// Sizes tried, a factor each.
+const SIZES: usize = 9;
+const SIZE_FACTOR: f64 = 3.0;
+
+/// An unknown torque (or offset) at a place.
+#[derive(Debug, Clone)]
+pub struct Latent {
+    /// Where.
+    pub place: Place,
+    /// Its standard deviation: N·m, or rad of the camera.
+    pub size: f64,
+    /// How much likelier it makes the recordings, in natural logarithm.
+    pub gain: f64,
+    /// (size, gain) of every size tried, in order of size.
+    pub tried: Vec<(f64, f64)>,
+}
+
+/// The filter for one recording and place.
+pub struct Filter<'a> {
+    around: &'a Surroundings,
+    /// Of the noise, over what was thought.
+    variance: f64,
+    place: Place,
+    transitions: Vec<DMatrix<f64>>,
+    memory_s: f64,
+    /// Standard deviations of the state at the first row, and of the parameters.
+    wide: Vec<f64>,
+}
+
+impl<'a> Filter<'a> {
+    /// For a recording of a fit.
+    pub fn new(fit: &Refit<'_>, record: usize, (around, variance): (&'a Surroundings, f64), place: Place) -> Option<Self> {
+        let problem = &fit.problem;
+        let (model, _) = problem.model(record, &fit.x[..problem.free.len()]).ok()?;
+        let memory_s = 1.0 / model.pace_rad_s();
+        let pattern = |k: usize| Some(around.pattern(model.chain(), place, k));
+        let transitions = around.transitions(memory_s, pattern);
+        let sd = |i: usize| 1.0 / fit.normal[(i, i)].max(1e-300).sqrt();
+        let (start, marks) = (problem.start_of(record), problem.marks());
+        let angle = (0..marks).map(|i| sd(start + i)).fold(0.0, f64::max);
+        let rate = (0..marks).map(|i| sd(start + marks + i)).fold(0.0, f64::max);
+        let mut wide = vec![WIDE * angle; around.links];
+        wide.extend(vec![WIDE * rate; around.links]);
+        wide.extend(vec![0.0; around.rates - around.links]);
+        wide.push(0.0);
+        wide.extend((0..problem.free.len()).map(|i| WIDE * sd(i)));
+        Some(Self { around, variance, place, transitions, memory_s, wide })
+    }
+
+    /// ln L up to a constant, for a standard deviation of the unknown.
+    pub fn log_likelihood(&self, size: f64) -> f64 {
+        let mut log_likelihood = 0.0;
+        self.run(size, &mut |_, innovation, variance| {
+            log_likelihood -= 0.5 * (innovation * innovation / variance + variance.ln());
+        });
+        log_likelihood
+    }
+
+    /// Runs the filter; `hear` gets every row's state after it, and each innovation with its variance.
+    fn run(&self, size: f64, hear: &mut dyn FnMut(usize, f64, f64)) {
+        let (n, total) = (self.around.links, self.wide.len());
+        let input = self.around.state();
+        let offsets = usize::from(self.place == Place::Camera);
+        let mut z = DVector::<f64>::zeros(total);
+        let mut p = DMatrix::from_fn(total, total, |i, j| if i == j { self.wide[i] * self.wide[i] } else { 0.0 });
+        p[(input, input)] = size * size;
+        let mut moved = DMatrix::zeros(total, total);
+        let mut gain = DVector::zeros(total);
+        for k in 0..self.around.rows.len() {
+            if k > 0 {
+                let transition = &self.transitions[k - 1];
+                z = transition * &z;
+                transition.mul_to(&p, &mut moved);
+                moved.mul_to(&transition.transpose(), &mut p);
+                let fade = (self.around.t_s[k] - self.around.t_s[k - 1]) / self.memory_s;
+                p[(input, input)] += size * size * (1.0 - (-2.0 * fade).exp());
+            }
+            let row = &self.around.rows[k];
+            for (mark, left) in row.left_rad.iter().enumerate() {
+                let Some(left) = left else { continue };
+                let mut expected = offsets as f64 * z[input];
+                for i in 0..n {
+                    expected += row.observed[(mark, i)] * z[i];
+                }
+                for a in 0..total {
+                    gain[a] = offsets as f64 * p[(a, input)];
+                    for i in 0..n {
+                        gain[a] += row.observed[(mark, i)] * p[(a, i)];
+                    }
+                }
+                let mut variance = self.variance * row.sd_rad[mark].powi(2) + offsets as f64 * gain[input];
+                for i in 0..n {
+                    variance += row.observed[(mark, i)] * gain[i];
+                }
+                let innovation = left - expected;
+                hear(k, innovation, variance);
+                z.axpy(innovation / variance, &gain, 1.0);
+                p.ger(-1.0 / variance, &gain, &gain, 1.0);
+            }
+        }
+    }
+}
+
+/// The unknown at a place, of the size that makes the recordings likeliest. `typical` is a large size: gravity's torque, or the noise.
+pub fn likeliest(filters: &[Filter<'_>], place: Place, typical: f64) -> Latent {
+    let nothing: f64 = filters.iter().map(|f| f.log_likelihood(0.0)).sum();
+    let gain = |size: f64| -> f64 { filters.iter().map(|f| f.log_likelihood(size)).sum::<f64>() - nothing };
+    let mut tried: Vec<(f64, f64)> = vec![(0.0, 0.0)];
+    let least = typical * SIZE_FACTOR.powi(-(SIZES as i32));
+    tried.extend((1..=SIZES).map(|k| least * SIZE_FACTOR.powi(k as i32)).map(|size| (size, gain(size))));
+    let (size, gain) = tried.iter().copied().max_by(|a, b| a.1.total_cmp(&b.1)).unwrap_or((0.0, 0.0));
+    Latent { place, size, gain, tried }
+}

@@ -1,0 +1,229 @@
+//! Where a model differs from a recording: place, time, amplitude, phase, frequency, and the share of each place in the dissipated energy.
+
+use rayon::prelude::*;
+
+use super::latent::{Filter, Latent, likeliest};
+use super::refit::Refit;
+use super::surroundings::{Surroundings, motion_at};
+use super::{Cause, Place};
+use crate::fit::{Residual, Residuals, Verdict};
+use crate::model::{Parameter, Partials};
+
+/// Places of an unknown.
+const PLACES: [Place; 4] = [Place::Hinge, Place::Joint, Place::Air, Place::Camera];
+
+/// The unknown at each place around a fit, likeliest first; `variance` scales that of the noise.
+pub fn unknowns(fit: &Refit<'_>, variance: f64) -> Vec<Latent> {
+    let records = 0..fit.problem.records.len();
+    let around: Option<Vec<Surroundings>> = records.map(|record| Surroundings::of(fit, record)).collect();
+    let Some(around) = around else { return Vec::new() };
+    let places = PLACES.into_iter().filter(|p| *p != Place::Joint || fit.problem.marks() > 1);
+    let mut unknowns: Vec<Latent> = places
+        .collect::<Vec<_>>()
+        .into_par_iter()
+        .filter_map(|place| {
+            let filters: Option<Vec<Filter<'_>>> =
+                around.iter().enumerate().map(|(record, a)| Filter::new(fit, record, (a, variance), place)).collect();
+            Some(likeliest(&filters?, place, typical(fit, place)))
+        })
+        .collect();
+    unknowns.sort_by(|a, b| b.gain.total_cmp(&a.gain));
+    unknowns
+}
+
+/// A large size of an unknown: gravity's torque at the largest angle, or a hundred times the noise.
+fn typical(fit: &Refit<'_>, place: Place) -> f64 {
+    if place == Place::Camera {
+        return 10.0 * fit.problem.noise_rad.iter().flatten().copied().fold(0.0, f64::max);
+    }
+    let Ok((model, _)) = fit.problem.model(0, &fit.x[..fit.problem.free.len()]) else { return 1.0 };
+    let angles = fit.problem.records.iter().flat_map(|r| r.theta_rad.iter().flatten().flatten());
+    let largest_rad = angles.fold(0.0f64, |a, b| a.max(b.abs()));
+    0.3 * model.gravity_m_s2() * model.chain().static_moment_kg_m(0) * largest_rad
+}
+
+/// Root mean square of the torque that the added effects exert, on all links together (N·m).
+pub fn added_torque_n_m(fit: &Refit<'_>) -> f64 {
+    let mut square = 0.0;
+    let mut count = 0usize;
+    for record in 0..fit.problem.records.len() {
+        let added: Vec<Parameter> = fit.added();
+        let values: Vec<f64> = added.iter().map(|p| fit.value(*p).unwrap_or(0.0)).collect();
+        along(fit, record, &added, |_, torques, _| {
+            let n = torques.first().map_or(0, |t| t.len());
+            let total: f64 = (0..n)
+                .map(|i| torques.iter().zip(&values).map(|(t, v)| t[i] * v).sum::<f64>().powi(2))
+                .sum();
+            square += total;
+            count += 1;
+        });
+    }
+    (square / count.max(1) as f64).sqrt()
+}
+
+/// Share of each place of losses in the energy that a fitted model dissipates (hinge, joint, air).
+pub fn energy_shares(fit: &Refit<'_>) -> [f64; 3] {
+    let losses = [
+        (Parameter::HingeViscous, Place::Hinge),
+        (Parameter::HingeCoulomb, Place::Hinge),
+        (Parameter::JointDamping, Place::Joint),
+        (Parameter::HysteresisTorque, Place::Joint),
+        (Parameter::AirLinear, Place::Air),
+        (Parameter::AirQuadratic, Place::Air),
+    ];
+    let mut work_j = [0.0; 3];
+    let values: Option<Vec<f64>> = fit.problem.model(0, &fit.x[..fit.problem.free.len()]).ok().map(|(model, _)| {
+        losses.iter().map(|(p, _)| model.value(*p).unwrap_or(0.0)).collect()
+    });
+    let Some(values) = values else { return work_j };
+    let parameters: Vec<Parameter> = losses.iter().map(|l| l.0).collect();
+    for record in 0..fit.problem.records.len() {
+        along(fit, record, &parameters, |step_s, torques, rate| {
+            for (k, (_, place)) in losses.iter().enumerate() {
+                let power: f64 = torques[k].iter().zip(rate).map(|(q, omega)| q * omega).sum::<f64>() * values[k];
+                work_j[Place::OF_LOSSES.iter().position(|p| p == place).unwrap_or(0)] -= power * step_s;
+            }
+        });
+    }
+    let total: f64 = work_j.iter().map(|w| w.max(0.0)).sum();
+    if total > 0.0 { work_j.map(|w| w.max(0.0) / total) } else { [0.0; 3] }
+}
+
+/// Walks along a fitted motion: length of the interval, torques for one unit of each parameter, and the rates.
+fn along(fit: &Refit<'_>, record: usize, parameters: &[Parameter], mut visit: impl FnMut(f64, &[Vec<f64>], &[f64])) {
+    let Some((model, swing, times_s)) = fit.motion(record) else { return };
+    let (n, m) = (model.chain().count(), model.rates());
+    let mut partials = Partials::zero(n, m);
+    let mut torques = vec![vec![0.0; m]; parameters.len()];
+    for pair in times_s.windows(2) {
+        let Some(motion) = motion_at(&model, &swing, 0.5 * (pair[0] + pair[1])) else { continue };
+        model.partials(&motion, &mut partials);
+        for (torque, parameter) in torques.iter_mut().zip(parameters) {
+            model.sensitivity(*parameter, &motion, &partials, torque);
+        }
+        let of_links: Vec<Vec<f64>> = torques.iter().map(|t| t[..n].to_vec()).collect();
+        visit(pair[1] - pair[0], &of_links, &motion.rate[..n]);
+    }
+}
+
+/// What a fit leaves of a recording.
+pub fn residuals(fit: &Refit<'_>, record: usize) -> Option<Residuals> {
+    let problem = &fit.problem;
+    let data = &problem.records[record];
+    let mut values = vec![Vec::new(); data.links()];
+    for value in problem.predict(record, &fit.x, false).ok()?.values {
+        if let Some(measured_rad) = data.theta_rad[value.link][value.row] {
+            let (predicted_rad, rate_rad_s) = (value.predicted_rad, value.rate_rad_s);
+            values[value.link].push(Residual { t_s: data.t_s[value.row], measured_rad, predicted_rad, rate_rad_s });
+        }
+    }
+    let rms = |of: &Vec<Residual>| (of.iter().map(|r| r.left_rad().powi(2)).sum::<f64>() / of.len().max(1) as f64).sqrt();
+    Some(Residuals { rmse_rad: values.iter().map(rms).collect(), noise_rad: problem.noise_rad[record].clone(), values })
+}
+
+/// Whether a torque acts with the position or with the velocity.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Phase {
+    /// It stores energy.
+    Position,
+    /// It takes energy away.
+    Velocity,
+}
+
+impl Phase {
+    /// The name in files.
+    pub fn id(self) -> &'static str {
+        match self {
+            Self::Position => "position",
+            Self::Velocity => "velocity",
+        }
+    }
+
+    /// Of an effect.
+    pub fn of(cause: Cause) -> Option<Self> {
+        match cause {
+            Cause::HingeViscous
+            | Cause::HingeCoulomb
+            | Cause::JointHysteretic
+            | Cause::AirLinear
+            | Cause::AirQuadratic
+            | Cause::TimeBase
+            | Cause::DroppedFrames
+            | Cause::DifferentialLag => Some(Self::Velocity),
+            Cause::HingeStiffness
+            | Cause::JointCubicStiffness
+            | Cause::RestCurl
+            | Cause::AddedMass
+            | Cause::DistributedFlexibility
+            | Cause::AngleGain => Some(Self::Position),
+            Cause::SideForce | Cause::SupportMotion | Cause::CameraTilt => None,
+        }
+    }
+}
+
+/// Where, when and how the base model departs from the first recording that it does not reproduce.
+#[derive(Debug, Clone, Default)]
+pub struct Departure {
+    /// From and until when.
+    pub time_s: Option<[f64; 2]>,
+    /// Amplitudes there.
+    pub amplitude_rad: Option<[f64; 2]>,
+    /// Strongest frequency of what is left.
+    pub frequency_hz: Option<f64>,
+    /// Phase with which the residual goes: with the velocity (a delay) or with the position (a gain).
+    pub goes_with: Option<Phase>,
+}
+
+/// The departure of the base model.
+pub fn departure(null: &Refit<'_>) -> Departure {
+    for record in 0..null.problem.records.len() {
+        let Some(residuals) = residuals(null, record) else { continue };
+        let Ok((model, _)) = null.problem.model(record, &null.x[..null.problem.free.len()]) else { continue };
+        let window_s = std::f64::consts::TAU / model.pace_rad_s();
+        let verdict = Verdict::of(&residuals, window_s);
+        let wrong: Vec<_> = verdict.windows.iter().filter(|w| w.links.iter().any(|l| l.misfit)).collect();
+        let (Some(first), Some(last)) = (wrong.first(), wrong.last()) else { continue };
+        let amplitudes = wrong.iter().flat_map(|w| w.links.iter().map(|l| l.amplitude_rad));
+        let (least, most) = amplitudes.fold((f64::INFINITY, 0.0f64), |(a, b), v| (a.min(v), b.max(v)));
+        return Departure {
+            time_s: Some([first.from_s, last.until_s]),
+            amplitude_rad: Some([least, most]),
+            frequency_hz: strongest_hz(&residuals, model.pace_rad_s()),
+            goes_with: goes_with(&residuals),
+        };
+    }
+    Departure::default()
+}
+
+/// Which explains more of what is left: a delay or a gain, window by window taken together.
+fn goes_with(residuals: &Residuals) -> Option<Phase> {
+    let (mut delay, mut gain, mut rates, mut angles) = (0.0, 0.0, 0.0, 0.0);
+    for r in residuals.values.iter().flatten() {
+        delay += r.left_rad() * r.rate_rad_s;
+        gain += r.left_rad() * r.predicted_rad;
+        rates += r.rate_rad_s * r.rate_rad_s;
+        angles += r.predicted_rad * r.predicted_rad;
+    }
+    (rates > 0.0 && angles > 0.0).then(|| {
+        // a torque in phase with the velocity changes the amplitude, one with the position the phase
+        if delay * delay / rates > gain * gain / angles { Phase::Position } else { Phase::Velocity }
+    })
+}
+
+/// The frequency at which what is left is strongest.
+fn strongest_hz(residuals: &Residuals, pace_rad_s: f64) -> Option<f64> {
+    let values = residuals.values.iter().max_by_key(|v| v.len())?;
+    let span_s = values.last()?.t_s - values.first()?.t_s;
+    let swing_hz = pace_rad_s / std::f64::consts::TAU;
+    let count = (8.0 * swing_hz * span_s) as usize;
+    let power = |k: usize| {
+        let rate = std::f64::consts::TAU * k as f64 / span_s;
+        let sum = values.iter().fold([0.0; 2], |s, r| {
+            let (sin, cos) = (rate * r.t_s).sin_cos();
+            [s[0] + r.left_rad() * sin, s[1] + r.left_rad() * cos]
+        });
+        sum[0] * sum[0] + sum[1] * sum[1]
+    };
+    let best = (1..count).map(|k| (k, power(k))).max_by(|a, b| a.1.total_cmp(&b.1))?;
+    Some(best.0 as f64 / span_s)
+}

@@ -1,0 +1,202 @@
+//! What the model lacks: where simulation and recording differ, the physics left out, and the proof that it was that.
+//!
+//! | file | holds |
+//! |---|---|
+//! | [`cause`] | the table of effects |
+//! | [`refit`] | the base model with some of them, fitted |
+//! | [`screen`] | which would lower the residuals |
+//! | [`selection`] | which are fitted in full |
+//! | [`evidence`] | how probable each is |
+//! | [`surroundings`] | what a small torque would have done |
+//! | [`latent`] | the unknown torque |
+
+pub mod adequacy;
+pub mod cause;
+pub mod evidence;
+pub mod heldout;
+pub mod latent;
+pub mod locate;
+pub mod refit;
+pub mod screen;
+pub mod selection;
+pub mod surroundings;
+pub mod verdict;
+
+use crate::error::{Error, Result};
+use crate::experiment::Experiment;
+use crate::fit::shooting::multiple_shooting;
+use crate::fit::{Belief, Problem, Record, base_parameters};
+use crate::model::{ForwardModel, Parameter};
+use crate::progress::Progress;
+
+pub use cause::{Cause, Place};
+pub use adequacy::Detectable;
+pub use heldout::HeldOut;
+pub use latent::Latent;
+pub use locate::Departure;
+pub use refit::{Ground, Hypothesis, Refit};
+pub use verdict::{Status, Verdict, Weighed};
+
+/// A length or an inertia of a rig is known to this share.
+const GEOMETRY_SHARE: f64 = 0.1;
+/// Correlation of the noise from row to row that counts as colour.
+const COLOURED: f64 = 0.12;
+
+/// Everything a diagnosis says.
+#[derive(Debug)]
+pub struct Diagnosis<'a> {
+    /// The hypotheses, likeliest first.
+    pub weighed: Vec<Weighed<'a>>,
+    /// The unknown around the likeliest one, at each place, likeliest first.
+    pub unknowns: Vec<Latent>,
+    /// The verdict.
+    pub verdict: Verdict,
+    /// Where and when the base model departs.
+    pub departure: Departure,
+    /// Share of hinge, joint and air in the energy lost, by the likeliest model.
+    pub energy_shares: [f64; 3],
+    /// The prediction of what was not fitted.
+    pub held_out: Option<HeldOut>,
+    /// What could have been seen.
+    pub detectable: Vec<Detectable>,
+    /// p of the base model.
+    pub p_value: f64,
+    /// Noise of each angle, `[record][link]`.
+    pub noise_rad: Vec<Vec<f64>>,
+    /// Its correlation from row to row.
+    pub colour: Vec<Vec<f64>>,
+}
+
+impl<'a> Diagnosis<'a> {
+    /// The base model.
+    pub fn null(&self) -> &Refit<'a> {
+        // every selection holds it
+        self.weighed.iter().find(|w| w.fit.hypothesis.causes.is_empty()).map_or(&self.weighed[0].fit, |w| &w.fit)
+    }
+
+    /// Of the effects named, the one that explains most: without which the fit would be worst.
+    pub fn main_effect(&self) -> Option<Cause> {
+        let left_without = |cause: &Cause| {
+            let others: Vec<Cause> = self.verdict.effects.iter().copied().filter(|c| c != cause).collect();
+            self.weighed.iter().find(|w| w.fit.hypothesis.causes == others).map_or(f64::INFINITY, |w| w.fit.chi2)
+        };
+        self.verdict.effects.iter().copied().max_by(|a, b| left_without(a).total_cmp(&left_without(b)))
+    }
+
+    /// The fit that the verdict names, or the base model.
+    pub fn named(&self) -> &Refit<'a> {
+        let named = |w: &&Weighed<'a>| w.fit.hypothesis.causes == self.verdict.effects;
+        self.weighed.iter().find(named).map_or(self.null(), |w| &w.fit)
+    }
+}
+
+/// What the recordings, cleaned of outliers, are held against.
+pub struct Prepared {
+    /// Cleaned.
+    pub records: Vec<Record>,
+    pub noise_rad: Vec<Vec<f64>>,
+    pub colour: Vec<Vec<f64>>,
+    step_error_rad: f64,
+    x: Vec<f64>,
+}
+
+/// The base model's parameters and what is known of them: of a specimen of general links also its inertias and centres of mass, measured to
+/// about a tenth.
+fn base_of(experiment: &Experiment, marks: usize) -> Result<(Vec<Parameter>, Vec<Belief>)> {
+    let mut base = base_parameters(experiment, marks);
+    let mut beliefs = Vec::new();
+    if !experiment.specimen.links.is_empty() {
+        let model = ForwardModel::of(experiment)?;
+        let geometry: &[Parameter] = match marks {
+            1 => &[Parameter::FirstInertia],
+            _ => &[Parameter::FirstInertia, Parameter::FirstCom, Parameter::SecondInertia, Parameter::SecondCom],
+        };
+        for parameter in geometry {
+            let value = model.value(*parameter).unwrap_or(0.0);
+            base.push(*parameter);
+            beliefs.push(Belief { parameter: *parameter, value, sd: GEOMETRY_SHARE * value.abs().max(1e-12) });
+        }
+    }
+    Ok((base, beliefs))
+}
+
+/// Learns the noise, leaves outliers out, and finds where the base model's descent is to start.
+pub fn prepare(records: &[Record], experiment: &Experiment) -> Result<Prepared> {
+    let marks = records.first().map_or(0, Record::links);
+    let (base, beliefs) = base_of(experiment, marks)?;
+    let mut problem = Problem { beliefs, ..Problem::new(records, experiment, &base)? };
+    let shot = multiple_shooting(&mut problem)?;
+    problem.integrate_below_the_noise();
+    let (kept, _) = crate::fit::without_outliers(&problem, &shot.x)?;
+    Ok(Prepared {
+        noise_rad: problem.noise_rad.clone(),
+        colour: colour(&shot.residuals, &problem.noise_rad),
+        step_error_rad: problem.accuracy.step_error_rad,
+        x: shot.x,
+        records: kept,
+    })
+}
+
+/// The correlation of neighbouring residuals of each angle, where it is more than chance and the stretches' own starts make of it.
+fn colour(residuals: &[(usize, usize, f64)], like: &[Vec<f64>]) -> Vec<Vec<f64>> {
+    let of = |record: usize, link: usize| {
+        let r: Vec<f64> = residuals.iter().filter(|r| r.0 == record && r.1 == link).map(|r| r.2).collect();
+        let power: f64 = r.iter().map(|v| v * v).sum();
+        let rho = r.windows(2).map(|w| w[0] * w[1]).sum::<f64>() / power.max(1e-300);
+        if rho > COLOURED { (rho + 0.05).min(0.9) } else { 0.0 }
+    };
+    like.iter().enumerate().map(|(record, links)| (0..links.len()).map(|link| of(record, link)).collect()).collect()
+}
+
+/// Diagnoses recordings of one specimen.
+///
+/// # Errors
+/// [`Error::Simulation`] where the specimen cannot swing, or no motion near the start values follows the recording.
+pub fn diagnose<'a>(
+    prepared: &'a Prepared,
+    experiment: &'a Experiment,
+    progress: &dyn Progress,
+) -> Result<Diagnosis<'a>> {
+    let records = &prepared.records;
+    let marks = records.first().map_or(0, Record::links);
+    let (base, beliefs) = base_of(experiment, marks)?;
+    let causes: Vec<Cause> =
+        Cause::ALL.into_iter().filter(|c| c.may_be_missing(experiment, &base, marks)).collect();
+    let mut ground = Ground {
+        records,
+        experiment,
+        base,
+        beliefs,
+        noise_rad: prepared.noise_rad.clone(),
+        colour: prepared.colour.clone(),
+        step_error_rad: prepared.step_error_rad,
+    };
+    let refused = || Error::Simulation {
+        detail: "no motion near the start values follows the recording; check [specimen] and [model]".into(),
+    };
+    let nothing = Hypothesis::default();
+    let null = ground.descend(&nothing, ground.problem(&nothing)?, prepared.x.clone(), refit::MOST_STEPS).ok_or_else(refused)?;
+    let fits = selection::fits(&mut ground, null, &causes, progress);
+    let (weighed, unknown, unknowns) = verdict::weigh(fits, ground.values(), causes.len(), |fit, variance| {
+        (locate::unknowns(fit, variance), locate::added_torque_n_m(fit))
+    });
+    let verdict = Verdict::of(&weighed, unknown, marks);
+    let mut diagnosis = Diagnosis {
+        weighed,
+        unknowns,
+        verdict,
+        departure: Departure::default(),
+        energy_shares: [0.0; 3],
+        held_out: None,
+        detectable: Vec::new(),
+        p_value: 1.0,
+        noise_rad: ground.noise_rad.clone(),
+        colour: ground.colour.clone(),
+    };
+    diagnosis.departure = locate::departure(diagnosis.null());
+    diagnosis.energy_shares = locate::energy_shares(&diagnosis.weighed[0].fit);
+    diagnosis.held_out = heldout::held_out(&ground, diagnosis.null(), diagnosis.named(), None);
+    let adequacy = adequacy::adequacy(&ground, diagnosis.null(), &causes);
+    (diagnosis.p_value, diagnosis.detectable) = (adequacy.p_value, adequacy.detectable);
+    Ok(diagnosis)
+}

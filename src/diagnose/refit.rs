@@ -1,0 +1,354 @@
+//! The base model with some effects added, fitted to whole recordings.
+
+use nalgebra::{DMatrix, DVector};
+
+use super::Cause;
+use crate::error::Result;
+use crate::experiment::{Experiment, Hysteresis};
+use crate::fit::descent::{Descent, Ending, Outcome};
+use crate::fit::problem::stacked;
+use crate::fit::shooting::multiple_shooting;
+use crate::fit::{Belief, Problem, Record};
+use crate::model::observe::links_from_chords;
+use crate::model::{Camera, ForwardModel, Parameter, State, Trajectory};
+
+/// A yield angle of the joint's hysteresis to start from, as a part of the largest bend.
+const YIELD_SHARE: f64 = 0.2;
+/// A motion that leaves more than this part of the swing has lost step.
+const OUT_OF_STEP: f64 = 0.35;
+/// Steps of the integration for each row of the recording before a motion is given up.
+const STEPS_EACH_ROW: usize = 8;
+/// The corners of a hysteresis cost many steps: its motion need not be as exact.
+const CORNERS: f64 = 20.0;
+/// Rods between two marks while bending all along the strip is only a candidate.
+const CANDIDATE_PIECES: usize = 3;
+/// Steps of a first descent, and of one that is worth it.
+const FEW_STEPS: usize = 12;
+pub(super) const MOST_STEPS: usize = 30;
+
+/// What every fit of one diagnosis shares.
+#[derive(Debug, Clone)]
+pub struct Ground<'a> {
+    /// The recordings.
+    pub records: &'a [Record],
+    /// Specimen, rig and start values.
+    pub experiment: &'a Experiment,
+    /// The base model's parameters.
+    pub base: Vec<Parameter>,
+    /// What is known of them.
+    pub beliefs: Vec<Belief>,
+    /// Noise of each angle, `[record][link]`.
+    pub noise_rad: Vec<Vec<f64>>,
+    /// AR(1) correlation of the noise.
+    pub colour: Vec<Vec<f64>>,
+    /// Of the integration.
+    pub step_error_rad: f64,
+}
+
+/// The base model with some effects.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Hypothesis {
+    /// The effects added.
+    pub causes: Vec<Cause>,
+    /// From which stamp on frames are missing, and in which recording.
+    pub dropped: Option<(usize, f64)>,
+}
+
+impl Hypothesis {
+    /// With one effect more.
+    #[must_use]
+    pub fn and(&self, cause: Cause, dropped: Option<(usize, f64)>) -> Self {
+        let mut causes = self.causes.clone();
+        causes.push(cause);
+        causes.sort_unstable();
+        Self { causes, dropped: if cause == Cause::DroppedFrames { dropped } else { self.dropped } }
+    }
+}
+
+/// A hypothesis fitted to the recordings.
+#[derive(Debug, Clone)]
+pub struct Refit<'a> {
+    /// What was assumed.
+    pub hypothesis: Hypothesis,
+    /// The model with its free parameters.
+    pub problem: Problem<'a>,
+    /// The free parameters, then each recording's start.
+    pub x: Vec<f64>,
+    /// Σr² over the noise, beliefs included.
+    pub chi2: f64,
+    /// JᵀJ.
+    pub normal: DMatrix<f64>,
+    /// Steps of the descent.
+    pub steps: usize,
+    /// Whether the descent ended in a minimum.
+    pub converged: bool,
+}
+
+impl<'a> Ground<'a> {
+    /// The problem of a hypothesis.
+    ///
+    /// # Errors
+    /// As [`Problem::new`].
+    pub fn problem(&self, hypothesis: &Hypothesis) -> Result<Problem<'a>> {
+        let mut free = self.base.clone();
+        let mut beliefs = self.beliefs.clone();
+        let mut experiment = self.experiment.clone();
+        for cause in &hypothesis.causes {
+            if *cause == Cause::DistributedFlexibility {
+                free.retain(|p| *p != Parameter::JointStiffness);
+                experiment.model.pieces = CANDIDATE_PIECES;
+                let lengths_m = experiment.specimen.lengths_m();
+                let mark_m = lengths_m.iter().sum::<f64>() / lengths_m.len() as f64;
+                experiment.model.effects.distributed_flexibility = Some(experiment.model.k_eq_n_m_per_rad * mark_m);
+            }
+            if *cause == Cause::JointHysteretic {
+                let yield_rad = YIELD_SHARE * self.largest_bend_rad();
+                beliefs.push(Belief { parameter: Parameter::HysteresisYield, value: yield_rad, sd: yield_rad });
+                experiment.model.effects.joint_hysteretic = Some(Hysteresis { torque_n_m: 0.0, yield_rad });
+            }
+            free.extend(cause.parameters());
+        }
+        let mut problem = Problem::new(self.records, &experiment, &free)?;
+        problem.noise_rad.clone_from(&self.noise_rad);
+        problem.colour.clone_from(&self.colour);
+        problem.beliefs = beliefs;
+        problem.accuracy.step_error_rad = self.step_error_rad;
+        problem.accuracy.most_steps = STEPS_EACH_ROW * self.records.iter().map(Record::len).max().unwrap_or(0) + 1000;
+        if hypothesis.causes.contains(&Cause::JointHysteretic) {
+            problem.accuracy.step_error_rad *= CORNERS;
+        }
+        if let Some((record, at_s)) = hypothesis.dropped {
+            problem.dropped_at_s[record] = at_s;
+        }
+        Ok(problem)
+    }
+
+    /// Fits a hypothesis from the parameters of another fit; `start` gives values of further ones.
+    pub fn refit(&self, hypothesis: &Hypothesis, near: &Refit<'_>, start: &[(Parameter, f64)]) -> Option<Refit<'a>> {
+        let problem = self.problem(hypothesis).ok()?;
+        let mut x = problem.start_values().ok()?;
+        for (value, parameter) in x.iter_mut().zip(&problem.free) {
+            let given = start.iter().find(|(p, _)| p == parameter).map(|(_, v)| *v);
+            let inherited = near.value(*parameter);
+            *value = given.or(inherited).unwrap_or(*value);
+        }
+        if let (Some(k), Some(place)) =
+            (near.value(Parameter::JointStiffness), problem.free.iter().position(|p| *p == Parameter::BendingStiffness))
+        {
+            if near.value(Parameter::BendingStiffness).is_none() {
+                let lengths_m = self.experiment.specimen.lengths_m();
+                x[place] = k * lengths_m.iter().sum::<f64>() / lengths_m.len() as f64;
+            }
+        }
+        let lower = problem.lower();
+        x.iter_mut().zip(&lower).for_each(|(x, low)| *x = x.max(*low));
+        x.extend_from_slice(&near.x[near.problem.free.len()..]);
+        // a score is linear: where it overshoots, start from nothing
+        let mut careful = x.clone();
+        for (parameter, _) in start {
+            if let Some(i) = problem.free.iter().position(|p| p == parameter).filter(|_| *parameter != Parameter::SupportFrequency) {
+                careful[i] = lower[i].max(0.0);
+            }
+        }
+        let x = if problem.cost(&x) < problem.cost(&careful) { x } else { careful };
+        self.descend(hypothesis, problem, x, FEW_STEPS)
+    }
+
+    /// Fits a hypothesis from the start values of the experiment, by multiple shooting first: for a base model whose motion is out of step.
+    pub fn refit_anew(&self, hypothesis: &Hypothesis, start: &[(Parameter, f64)]) -> Option<Refit<'a>> {
+        let mut problem = self.problem(hypothesis).ok()?;
+        for (parameter, value) in start {
+            set(&mut problem.experiment, *parameter, *value);
+        }
+        let accuracy = problem.accuracy;
+        let x = multiple_shooting(&mut problem).ok()?.x;
+        problem.noise_rad.clone_from(&self.noise_rad);
+        problem.accuracy = accuracy;
+        self.descend(hypothesis, problem, x, FEW_STEPS)
+    }
+
+    /// The same hypothesis with the noise as it is known now.
+    pub fn again(&self, fit: Refit<'a>, steps: usize) -> Option<Refit<'a>> {
+        let Refit { hypothesis, mut problem, x, .. } = fit;
+        problem.noise_rad.clone_from(&self.noise_rad);
+        problem.colour.clone_from(&self.colour);
+        self.descend(&hypothesis, problem, x, steps)
+    }
+
+    /// Lowers the noise, and its correlation, to what a fit leaves; whether that changes anything that counts.
+    pub fn refine_noise(&mut self, by: &Refit<'_>) -> bool {
+        let mut changed = false;
+        for record in 0..self.records.len() {
+            let Ok(prediction) = by.problem.predict(record, &by.x, false) else { return false };
+            for link in 0..self.records[record].links() {
+                let left: Vec<f64> = prediction
+                    .values
+                    .iter()
+                    .filter(|v| v.link == link)
+                    .filter_map(|v| {
+                        let data = &self.records[record];
+                        Some((data.theta_rad[link][v.row]? - v.predicted_rad) / data.relative_sd[link][v.row])
+                    })
+                    .collect();
+                let freedom = (left.len() as f64 - 0.5 * by.x.len() as f64).max(1.0);
+                let power: f64 = left.iter().map(|v| v * v).sum();
+                let noise_rad = (power / freedom).sqrt();
+                let rho = left.windows(2).map(|w| w[0] * w[1]).sum::<f64>() / power.max(1e-300);
+                let (known_rad, known_rho) = (&mut self.noise_rad[record][link], &mut self.colour[record][link]);
+                changed |= noise_rad < 0.97 * *known_rad || rho < *known_rho - 0.05;
+                *known_rad = known_rad.min(noise_rad);
+                *known_rho = if rho < super::COLOURED { 0.0 } else { known_rho.min(rho) };
+            }
+        }
+        changed
+    }
+
+    /// Descends from given variables.
+    pub fn descend(&self, hypothesis: &Hypothesis, problem: Problem<'a>, x: Vec<f64>, most_steps: usize) -> Option<Refit<'a>> {
+        let lower = problem.lower();
+        let descent = Descent { most_steps, enough: 0.02, ..Descent::default() };
+        let outcome = descent.run(x, &lower, |x| problem.blocks(x))?;
+        Some(Refit::of(hypothesis.clone(), problem, outcome))
+    }
+
+    /// The same with other recordings of it.
+    #[must_use]
+    pub fn on<'b>(&self, records: &'b [Record]) -> Ground<'b>
+    where
+        'a: 'b,
+    {
+        let place = |record: &Record| self.records.iter().position(|own| own.path == record.path).unwrap_or(0);
+        let of = |all: &[Vec<f64>]| records.iter().map(|r| all[place(r)].clone()).collect();
+        Ground {
+            records,
+            experiment: self.experiment,
+            base: self.base.clone(),
+            beliefs: self.beliefs.clone(),
+            noise_rad: of(&self.noise_rad),
+            colour: of(&self.colour),
+            step_error_rad: self.step_error_rad,
+        }
+    }
+
+    /// Largest measured difference of two neighbouring angles; of one link the largest angle.
+    pub fn largest_bend_rad(&self) -> f64 {
+        let of = |record: &Record| {
+            let rows = 0..record.len();
+            let bend = |row: usize| match &record.theta_rad[..] {
+                [first, second, ..] => Some((second[row]? - first[row]?).abs()),
+                [only] => only[row].map(f64::abs),
+                [] => None,
+            };
+            rows.filter_map(bend).fold(0.0, f64::max)
+        };
+        self.records.iter().map(of).fold(1e-6, f64::max)
+    }
+
+    /// Number of values.
+    pub fn values(&self) -> usize {
+        self.records.iter().map(|r| r.values(0..r.len())).sum()
+    }
+}
+
+impl<'a> Refit<'a> {
+    /// From the end of a descent.
+    pub fn of(hypothesis: Hypothesis, problem: Problem<'a>, outcome: Outcome) -> Self {
+        let Outcome { x, cost, normal, ending, steps, .. } = outcome;
+        Self { hypothesis, problem, x, chi2: cost, normal, steps, converged: ending == Ending::Converged }
+    }
+
+    /// The value of a free parameter.
+    pub fn value(&self, parameter: Parameter) -> Option<f64> {
+        self.place(parameter).map(|i| self.x[i])
+    }
+
+    /// Where a free parameter stands among the variables.
+    pub fn place(&self, parameter: Parameter) -> Option<usize> {
+        self.problem.free.iter().position(|p| *p == parameter)
+    }
+
+    /// The coefficients of the added effects, in the order of the causes.
+    pub fn added(&self) -> Vec<Parameter> {
+        self.hypothesis.causes.iter().flat_map(|cause| cause.parameters()).copied().collect()
+    }
+
+    /// The covariance of some of the parameters, all other variables being free: the inverse of JᵀJ, of which variables held by their bound
+    /// are left out.
+    pub fn covariance(&self, of: &[Parameter]) -> DMatrix<f64> {
+        let places: Vec<usize> = of.iter().filter_map(|p| self.place(*p)).collect();
+        let lower = self.problem.lower();
+        let loose: Vec<usize> =
+            (0..self.x.len()).filter(|i| places.contains(i) || self.x[*i] > lower[*i]).collect();
+        let scale = |i: usize| self.normal[(i, i)].max(1e-300).sqrt();
+        let count = loose.len();
+        let mut unit = DMatrix::from_fn(count, count, |a, b| {
+            self.normal[(loose[a], loose[b])] / (scale(loose[a]) * scale(loose[b]))
+        });
+        (0..count).for_each(|i| unit[(i, i)] += 1e-13);
+        let inverse = unit.cholesky().map(|c| c.inverse()).unwrap_or_else(|| DMatrix::identity(count, count) * 1e13);
+        let at = |place: usize| loose.iter().position(|i| *i == place).unwrap_or(0);
+        DMatrix::from_fn(places.len(), places.len(), |a, b| {
+            inverse[(at(places[a]), at(places[b]))] / (scale(places[a]) * scale(places[b]))
+        })
+    }
+
+    /// The model, its motion through a recording, and the true time of every row.
+    pub fn motion(&self, record: usize) -> Option<(ForwardModel, Trajectory, Vec<f64>)> {
+        let problem = &self.problem;
+        let (model, camera) = problem.model(record, &self.x[..problem.free.len()]).ok()?;
+        let data = &problem.records[record];
+        let (start, marks) = (problem.start_of(record), problem.marks());
+        let links = |chords: &[f64]| links_from_chords(model.chain(), chords).0;
+        let state = State {
+            theta_rad: links(&self.x[start..start + marks]),
+            omega_rad_s: links(&self.x[start + marks..start + 2 * marks]),
+            hidden: Vec::new(),
+        };
+        let camera = Camera { origin_s: data.t_s[0], ..camera };
+        let true_s: Vec<f64> = data.t_s.iter().map(|t| camera.true_time_s(*t, 0)).collect();
+        let span_s = (true_s[0], true_s[data.len() - 1] + 1e-9);
+        let swing = Trajectory::with(&model, &state, span_s, None, &problem.accuracy).ok()?;
+        Some((model, swing, true_s))
+    }
+
+    /// Whether the motion has lost step with a recording: what is left is a good part of the swing.
+    pub fn is_out_of_step(&self) -> bool {
+        (0..self.problem.records.len()).any(|record| {
+            let Ok(prediction) = self.problem.predict(record, &self.x, false) else { return true };
+            let data = &self.problem.records[record];
+            let (mut left, mut whole) = (0.0, 0.0);
+            for value in &prediction.values {
+                let measured_rad = data.theta_rad[value.link][value.row].unwrap_or(value.predicted_rad);
+                left += (measured_rad - value.predicted_rad).powi(2);
+                whole += measured_rad * measured_rad;
+            }
+            left > OUT_OF_STEP * OUT_OF_STEP * whole
+        })
+    }
+
+    /// Residuals and their derivatives with all variables, both over the noise; `None` where the motion cannot be integrated.
+    pub fn linearised(&self) -> Option<(DVector<f64>, DMatrix<f64>)> {
+        let blocks = self.problem.blocks(&self.x)?;
+        Some(stacked(&blocks, self.x.len()))
+    }
+}
+
+/// Sets a start value where the experiment holds it.
+fn set(experiment: &mut Experiment, parameter: Parameter, value: f64) {
+    let model = &mut experiment.model;
+    match parameter {
+        Parameter::JointStiffness => model.k_eq_n_m_per_rad = value,
+        Parameter::JointDamping => model.c_eq_n_m_s_per_rad = value,
+        Parameter::HysteresisYield => {
+            if let Some(law) = &mut model.effects.joint_hysteretic {
+                law.yield_rad = value;
+            }
+        }
+        Parameter::SupportFrequency => {
+            if let Some(law) = &mut model.effects.support_motion {
+                law.frequency_hz = value;
+            }
+        }
+        _ => {}
+    }
+}

@@ -1,0 +1,289 @@
+//! The screen: which effect would lower the residuals of a fit, judged by exact sensitivities with everything else that is free projected out.
+//!
+//! With residuals r and derivatives J of the fit's own variables, c of an effect's coefficient β (all over the noise), Q an orthonormal basis of J:
+//!
+//! ```text
+//! c̃ = c − QQᵀc      β̂ = −c̃ᵀr/|c̃|²      z = β̂ |c̃|      Δχ² = z²      (Rao's score test)
+//! ```
+//!
+//! Two laws have no such c at the outset: frames may be missing at any instant, and the support may move at any frequency. Both are scanned.
+
+use nalgebra::{DMatrix, DVector};
+
+use super::refit::{Ground, Hypothesis, Refit};
+use super::surroundings::Surroundings;
+use super::{Cause, Place};
+use crate::model::Parameter;
+
+/// Of a column less than this is left by the projection: nothing can be said about it.
+const NOTHING_LEFT: f64 = 1e-5;
+/// Frequencies of a moving support: this fine for the length of the recording.
+const PER_RESOLUTION: f64 = 1.0;
+/// Highest frequency of a moving support, in units of the swing's.
+const HIGHEST: f64 = 8.0;
+
+/// What one effect promises.
+#[derive(Debug, Clone)]
+pub struct Score {
+    /// The effect.
+    pub cause: Cause,
+    /// Values of its coefficients.
+    pub start: Vec<(Parameter, f64)>,
+    /// Where frames are missing.
+    pub dropped: Option<(usize, f64)>,
+    /// Fall of χ² in linear approximation.
+    pub gain: f64,
+    /// Standard deviation of the first coefficient.
+    pub sd: f64,
+    /// c̃ of the effect, one column a coefficient that counts.
+    pub columns: DMatrix<f64>,
+}
+
+/// Residuals of a fit with what its variables can change taken out.
+#[derive(Debug, Clone)]
+pub struct Projection {
+    /// Orthonormal basis of the derivatives.
+    pub basis: DMatrix<f64>,
+    /// Residuals (predicted less measured) over the noise.
+    pub residual: DVector<f64>,
+}
+
+impl Projection {
+    /// Of a fit. Variables held by their bound do not count.
+    pub fn of(fit: &Refit<'_>) -> Option<Self> {
+        let (residual, slopes) = fit.linearised()?;
+        Some(Self::new(residual, slopes, fit))
+    }
+
+    fn new(residual: DVector<f64>, slopes: DMatrix<f64>, fit: &Refit<'_>) -> Self {
+        let lower = fit.problem.lower();
+        let loose: Vec<usize> = (0..fit.x.len()).filter(|i| fit.x[*i] > lower[*i]).collect();
+        let mut kept = slopes.select_columns(&loose);
+        for mut column in kept.column_iter_mut() {
+            let size = column.norm();
+            column /= size.max(1e-300);
+        }
+        let basis = kept.qr().q();
+        let residual = &residual - &basis * basis.tr_mul(&residual);
+        Self { basis, residual }
+    }
+
+    /// c̃ of c.
+    pub fn out(&self, columns: &DMatrix<f64>) -> DMatrix<f64> {
+        let once = columns - &self.basis * self.basis.tr_mul(columns);
+        &once - &self.basis * self.basis.tr_mul(&once)
+    }
+}
+
+/// Scores effects at a fit.
+pub struct Screen<'g, 'a> {
+    ground: &'g Ground<'a>,
+    fit: &'g Refit<'a>,
+    /// Of the fit.
+    pub projection: Projection,
+}
+
+impl<'g, 'a> Screen<'g, 'a> {
+    /// At a fit.
+    pub fn at(ground: &'g Ground<'a>, fit: &'g Refit<'a>) -> Option<Self> {
+        Some(Self { ground, fit, projection: Projection::of(fit)? })
+    }
+
+    /// The score of each effect that says anything; effects of the fit's own hypothesis are left out.
+    pub fn scores(&self, causes: &[Cause]) -> Vec<Score> {
+        let further: Vec<Cause> =
+            causes.iter().copied().filter(|c| !self.fit.hypothesis.causes.contains(c)).collect();
+        let smooth: Vec<Cause> = further
+            .iter()
+            .copied()
+            .filter(|c| !matches!(c, Cause::DroppedFrames | Cause::SupportMotion | Cause::DistributedFlexibility))
+            .collect();
+        let mut scores = self.of_coefficients(&smooth).unwrap_or_default();
+        if further.contains(&Cause::DroppedFrames) {
+            scores.extend(self.of_dropped_frames());
+        }
+        if further.contains(&Cause::SupportMotion) {
+            scores.extend(self.of_support());
+        }
+        scores
+    }
+
+    /// All effects that are proportional to a coefficient, from one motion with all their derivatives.
+    fn of_coefficients(&self, causes: &[Cause]) -> Option<Vec<Score>> {
+        let mut hypothesis = self.fit.hypothesis.clone();
+        hypothesis.causes.extend(causes);
+        let mut problem = self.ground.problem(&hypothesis).ok()?;
+        // only the first coefficient of each counts; the rest of a law keeps its value
+        let first: Vec<Parameter> = causes.iter().map(|c| c.parameters()[0]).collect();
+        let own = &self.fit.problem;
+        problem.free = own.free.iter().copied().chain(first.iter().copied()).collect();
+        problem.dropped_at_s.clone_from(&own.dropped_at_s);
+        let (free, added) = (own.free.len(), first.len());
+        let mut x = self.fit.x[..free].to_vec();
+        x.extend(vec![0.0; added]);
+        x.extend_from_slice(&self.fit.x[free..]);
+        let blocks = problem.blocks(&x)?;
+        let (_, slopes) = crate::fit::problem::stacked(&blocks, x.len());
+        let scored = causes.iter().enumerate().filter_map(|(k, cause)| {
+            let column = slopes.columns(free + k, 1).into_owned();
+            self.score(*cause, column, &first[k..=k], None)
+        });
+        Some(scored.collect())
+    }
+
+    /// The score of some coefficients of one effect together.
+    fn score(
+        &self,
+        cause: Cause,
+        columns: DMatrix<f64>,
+        of: &[Parameter],
+        dropped: Option<(usize, f64)>,
+    ) -> Option<Score> {
+        let size = columns.norm();
+        let columns = self.projection.out(&columns);
+        if !(columns.norm() > NOTHING_LEFT * size) {
+            return None;
+        }
+        let gram = columns.tr_mul(&columns);
+        let inverse = gram.try_inverse()?;
+        let pull = -columns.tr_mul(&self.projection.residual);
+        let mut value = &inverse * &pull;
+        let mut gain = pull.dot(&value);
+        if of[0].is_not_negative() && value[0] < 0.0 {
+            (value[0], gain) = (0.0, 0.0);
+        }
+        let start = of.iter().zip(value.iter()).map(|(p, v)| (*p, *v)).collect();
+        Some(Score { cause, start, dropped, gain, sd: inverse[(0, 0)].sqrt(), columns })
+    }
+
+    /// Frames missing before each row in turn: the angles after it are ahead.
+    fn of_dropped_frames(&self) -> Option<Score> {
+        let problem = &self.fit.problem;
+        let values: usize = self.ground.values();
+        let mut best: Option<(f64, usize, f64)> = None;
+        let mut first = 0;
+        let mut of_record = Vec::new();
+        for (record, data) in problem.records.iter().enumerate() {
+            let prediction = problem.predict(record, &self.fit.x, false).ok()?;
+            let rates: Vec<(f64, f64)> = prediction
+                .values
+                .iter()
+                .map(|v| {
+                    let sd = problem.noise_rad[record][v.link] * data.relative_sd[v.link][v.row];
+                    (data.t_s[v.row], v.rate_rad_s / sd)
+                })
+                .collect();
+            of_record.push((first, rates));
+            first += prediction.values.len();
+        }
+        for (record, data) in problem.records.iter().enumerate() {
+            let (first, rates) = &of_record[record];
+            let p = self.projection.basis.ncols();
+            // sums over the rows from each instant on, by adding one instant after another from the last
+            let mut order: Vec<usize> = (0..rates.len()).collect();
+            order.sort_by(|a, b| rates[*b].0.total_cmp(&rates[*a].0));
+            let (mut square, mut pull, mut along) = (0.0, 0.0, vec![0.0; p]);
+            let mut k = 0;
+            for row in (1..data.len()).rev() {
+                while k < order.len() && rates[order[k]].0 >= data.t_s[row] {
+                    let at = first + order[k];
+                    let rate = rates[order[k]].1;
+                    square += rate * rate;
+                    pull += rate * self.projection.residual[at];
+                    (0..p).for_each(|i| along[i] += rate * self.projection.basis[(at, i)]);
+                    k += 1;
+                }
+                let left = square - along.iter().map(|a| a * a).sum::<f64>();
+                if left > 1e-4 * square && k > 8 && k + 8 < order.len() {
+                    let gain = pull * pull / left;
+                    if best.is_none_or(|(most, _, _)| gain > most) {
+                        // between the two rows
+                        best = Some((gain, record, 0.5 * (data.t_s[row] + data.t_s[row - 1])));
+                    }
+                }
+            }
+        }
+        let (_, record, at_s) = best?;
+        let (first, rates) = &of_record[record];
+        let mut column = DMatrix::zeros(self.projection.residual.len().max(values), 1);
+        for (i, (t_s, rate)) in rates.iter().enumerate().filter(|(_, (t_s, _))| *t_s >= at_s) {
+            let _ = t_s;
+            column[(first + i, 0)] = *rate;
+        }
+        self.score(Cause::DroppedFrames, column, &[Parameter::DroppedFrames], Some((record, at_s)))
+    }
+
+    /// A support that moves at each frequency in turn.
+    fn of_support(&self) -> Option<Score> {
+        let problem = &self.fit.problem;
+        let records = problem.records.len();
+        let mut around = Vec::with_capacity(records);
+        for record in 0..records {
+            let (model, _) = problem.model(record, &self.fit.x[..problem.free.len()]).ok()?;
+            let surroundings = Surroundings::of(self.fit, record)?;
+            let chain = model.chain();
+            let transitions = surroundings.transitions(f64::INFINITY, |k| {
+                let theta_rad = &surroundings.rows[k].theta_rad;
+                Some(DVector::from_fn(chain.count(), |i, _| -chain.static_moment_kg_m(i) * theta_rad[i].cos()))
+            });
+            around.push((surroundings, transitions, model.pace_rad_s()));
+        }
+        let span_s = around.iter().map(|(a, _, _)| a.t_s[a.t_s.len() - 1] - a.t_s[0]).fold(0.0, f64::max);
+        let swing_hz = around[0].2 / std::f64::consts::TAU;
+        let nyquist_hz = 0.5 * around.iter().map(|(a, _, _)| a.t_s.len() as f64).fold(0.0, f64::max) / span_s;
+        let count = (PER_RESOLUTION * span_s * (HIGHEST * swing_hz).min(0.9 * nyquist_hz)) as usize;
+        let hz = |k: usize| (k as f64 + 0.5) / (PER_RESOLUTION * span_s);
+        let best = (1..count)
+            .filter_map(|k| Some((self.promise(&self.at_frequency(&around, hz(k)))?, hz(k))))
+            .max_by(|a, b| a.0.total_cmp(&b.0))?;
+        let columns = self.at_frequency(&around, best.1);
+        let parameters = [Parameter::SupportSine, Parameter::SupportCosine];
+        let mut score = self.score(Cause::SupportMotion, columns, &parameters, None)?;
+        score.start.push((Parameter::SupportFrequency, best.1));
+        Some(score)
+    }
+
+    /// Δχ² of some columns, without forming c̃.
+    fn promise(&self, columns: &DMatrix<f64>) -> Option<f64> {
+        let along = self.projection.basis.tr_mul(columns);
+        let gram = columns.tr_mul(columns) - along.tr_mul(&along);
+        let pull = columns.tr_mul(&self.projection.residual);
+        Some(pull.dot(&(gram.try_inverse()? * &pull)))
+    }
+
+    fn at_frequency(&self, around: &[(Surroundings, Vec<DMatrix<f64>>, f64)], frequency_hz: f64) -> DMatrix<f64> {
+        let rate = std::f64::consts::TAU * frequency_hz;
+        let mut columns = DMatrix::zeros(self.projection.residual.len(), 2);
+        let mut first = 0;
+        for (record, (surroundings, transitions, _)) in around.iter().enumerate() {
+            let data = &self.fit.problem.records[record];
+            // the pivot's acceleration for one metre of sine, and of cosine
+            let course = |t: f64| {
+                let (sin, cos) = (rate * t).sin_cos();
+                [-rate * rate * sin, -rate * rate * cos]
+            };
+            let seen = surroundings.responses(transitions, course);
+            for mark in 0..data.links() {
+                for row in (0..data.len()).filter(|row| data.theta_rad[mark][*row].is_some()) {
+                    let sd = self.fit.problem.noise_rad[record][mark] * data.relative_sd[mark][row];
+                    (0..2).for_each(|c| columns[(first, c)] = seen[row * data.links() + mark][c] / sd);
+                    first += 1;
+                }
+            }
+        }
+        columns
+    }
+}
+
+/// The hypothesis and start values a score leads to.
+impl Score {
+    /// The fit's hypothesis with this effect.
+    pub fn hypothesis(&self, of: &Hypothesis) -> Hypothesis {
+        of.and(self.cause, self.dropped)
+    }
+
+    /// Where the effect acts.
+    pub fn place(&self) -> Place {
+        self.cause.place()
+    }
+}

@@ -1,0 +1,169 @@
+//! Which hypotheses are fitted in full: the base model, every effect alone, and the pairs that promise most.
+
+use rayon::prelude::*;
+
+use super::Cause;
+use super::refit::{self, Ground, Hypothesis, Refit};
+use super::screen::{Score, Screen};
+use crate::progress::Progress;
+
+/// Fits from which pairs are built.
+const SEEDS: usize = 6;
+/// χ² beyond its expectation by this many standard deviations is worth a dear hypothesis.
+const SOMETHING_LEFT: f64 = 4.0;
+/// A fit whose χ² is this many times the best one's (and this much more) is not made any better.
+const HOPELESS: f64 = 10.0;
+/// A fit that is worse by this than one that only adds an effect may be in a false minimum.
+const STRAGGLES: f64 = 9.0;
+/// Pairs fitted in full.
+const MOST_PAIRS: usize = 20;
+/// Pairs fitted even where they promise little.
+const FEWEST_PAIRS: usize = 6;
+
+/// The fits of all hypotheses, the base model first; what the best of them leaves refines the noise.
+pub fn fits<'a>(ground: &mut Ground<'a>, null: Refit<'a>, causes: &[Cause], progress: &dyn Progress) -> Vec<Refit<'a>> {
+    let scores = Screen::at(ground, &null).map(|s| s.scores(causes)).unwrap_or_default();
+    let out_of_step = null.is_out_of_step();
+    progress.begin("effects", Some(causes.len() as u64));
+    let singles = causes.par_iter().filter_map(|cause| {
+        let b = std::time::Instant::now();
+        let fit = single(ground, &null, *cause, scores.iter().find(|s| s.cause == *cause), out_of_step);
+        T(&format!("{cause}"), b, &fit);
+        progress.advance(1);
+        fit
+    });
+    let singles: Vec<Refit<'a>> = singles.collect();
+    let mut all = vec![null];
+    all.extend(singles);
+    let mut all = with_refined_noise(ground, all);
+    let (null, singles) = (&all[0], &all[1..]);
+    let b = std::time::Instant::now();
+    let pairs = promising(ground, null, singles, causes);
+    T("screen pairs", b, &None);
+    progress.begin("pairs", Some(pairs.len() as u64));
+    let pairs = pairs.par_iter().filter_map(|(seed, score)| {
+        let b = std::time::Instant::now();
+        let fit = ground.refit(&score.hypothesis(&seed.hypothesis), seed, &score.start);
+        T(&format!("{:?}", score.hypothesis(&seed.hypothesis)), b, &fit);
+        progress.advance(1);
+        fit
+    });
+    let pairs: Vec<Refit<'a>> = pairs.collect();
+    all.extend(pairs);
+    let all = with_refined_noise(ground, all);
+    without_stragglers(ground, all)
+}
+
+/// Where a pair has found a better minimum of a simpler hypothesis, one of its effects being next to nothing, that hypothesis starts anew from it.
+fn without_stragglers<'a>(ground: &Ground<'a>, mut fits: Vec<Refit<'a>>) -> Vec<Refit<'a>> {
+    let better: Vec<Option<Refit<'a>>> = fits
+        .par_iter()
+        .map(|fit| {
+            let richer = |other: &&Refit<'a>| {
+                let (few, many) = (&fit.hypothesis.causes, &other.hypothesis.causes);
+                many.len() > few.len() && few.iter().all(|c| many.contains(c)) && other.chi2 < fit.chi2 - STRAGGLES
+            };
+            let best = fits.iter().filter(richer).min_by(|a, b| a.chi2.total_cmp(&b.chi2))?;
+            let hypothesis = Hypothesis { dropped: best.hypothesis.dropped, ..fit.hypothesis.clone() };
+            ground.refit(&hypothesis, best, &[]).filter(|again| again.chi2 < fit.chi2 - 1.0)
+        })
+        .collect();
+    for (fit, better) in fits.iter_mut().zip(better) {
+        if let Some(better) = better {
+            *fit = better;
+        }
+    }
+    fits
+}
+
+/// The same fits with the noise that the best of them leaves, where that is less than was thought.
+fn with_refined_noise<'a>(ground: &mut Ground<'a>, fits: Vec<Refit<'a>>) -> Vec<Refit<'a>> {
+    let best = fits.iter().min_by(|a, b| a.chi2.total_cmp(&b.chi2));
+    if !best.is_some_and(|best| ground.refine_noise(best)) {
+        return fits;
+    }
+    let ground = &*ground;
+    let least = fits.iter().map(|f| f.chi2).fold(f64::INFINITY, f64::min);
+    let worth = |fit: &Refit<'a>| fit.hypothesis.causes.is_empty() || fit.chi2 < HOPELESS * (least + HOPELESS);
+    let b = std::time::Instant::now();
+    let r = fits.into_par_iter().filter_map(|fit| { let steps = if worth(&fit) { refit::MOST_STEPS } else { 0 }; ground.again(fit, steps) }).collect();
+    T("refined", b, &None); r
+}
+
+/// One effect, from every start that may lead to its minimum.
+fn single<'a>(
+    ground: &Ground<'a>,
+    null: &Refit<'a>,
+    cause: Cause,
+    score: Option<&Score>,
+    out_of_step: bool,
+) -> Option<Refit<'a>> {
+    let mut tries = Vec::new();
+    match (cause, score) {
+        (Cause::DistributedFlexibility, _) => {
+            // many links are dear: only where there is something to explain
+            let left = null.chi2 - ground.values() as f64;
+            if left > SOMETHING_LEFT * (2.0 * ground.values() as f64).sqrt() {
+                tries.push(ground.refit(&Hypothesis::default().and(cause, None), null, &[]));
+            }
+        }
+        (_, Some(score)) => {
+            let hypothesis = score.hypothesis(&null.hypothesis);
+            let near = ground.refit(&hypothesis, null, &score.start);
+            if out_of_step && changes_pace(cause) && near.as_ref().is_none_or(Refit::is_out_of_step) {
+                tries.push(ground.refit_anew(&hypothesis, &score.start));
+            }
+            tries.push(near);
+        }
+        (_, None) => {}
+    }
+    tries.into_iter().flatten().min_by(|a, b| a.chi2.total_cmp(&b.chi2))
+}
+
+/// Whether an effect can put the base model out of step by its frequency.
+fn changes_pace(cause: Cause) -> bool {
+    matches!(cause, Cause::TimeBase | Cause::HingeStiffness | Cause::AddedMass | Cause::JointCubicStiffness)
+}
+
+/// The pairs whose χ² promises to be lowest, each from the better of its two singles.
+fn promising<'s, 'a>(
+    ground: &Ground<'a>,
+    null: &Refit<'a>,
+    singles: &'s [Refit<'a>],
+    causes: &[Cause],
+) -> Vec<(&'s Refit<'a>, Score)> {
+    let mut seeds: Vec<&Refit<'a>> = singles.iter().filter(|s| s.chi2 < null.chi2 - 4.0).collect();
+    seeds.sort_by(|a, b| a.chi2.total_cmp(&b.chi2));
+    seeds.truncate(SEEDS);
+    let scored: Vec<(&Refit<'a>, Vec<Score>)> = seeds
+        .par_iter()
+        .filter_map(|seed| Some((*seed, Screen::at(ground, seed)?.scores(causes))))
+        .collect();
+    let mut pairs: Vec<(f64, &Refit<'a>, Score)> = Vec::new();
+    for (seed, scores) in scored {
+        for score in scores.into_iter().filter(|s| s.gain > 4.0) {
+            let promised = seed.chi2 - score.gain;
+            let hypothesis = score.hypothesis(&seed.hypothesis);
+            let same = pairs.iter_mut().find(|p| p.2.hypothesis(&p.1.hypothesis).causes == hypothesis.causes);
+            match same {
+                Some(known) if promised < known.0 => *known = (promised, seed, score),
+                Some(_) => {}
+                None => pairs.push((promised, seed, score)),
+            }
+        }
+    }
+    pairs.sort_by(|a, b| a.0.total_cmp(&b.0));
+    pairs.truncate(MOST_PAIRS);
+    let least = pairs.first().map_or(0.0, |p| p.0);
+    let mut kept = 0;
+    pairs.retain(|p| {
+        kept += 1;
+        kept <= FEWEST_PAIRS || p.0 < HOPELESS * (least + HOPELESS)
+    });
+    pairs.into_iter().map(|(_, seed, score)| (seed, score)).collect()
+}
+
+#[allow(non_snake_case)]
+fn T(w: &str, b: std::time::Instant, f: &Option<Refit<'_>>) {
+    if std::env::var("DT").is_ok() { eprintln!("{w} {:.3} {:?}", b.elapsed().as_secs_f64(), f.as_ref().map(|f| (f.steps, f.converged, f.chi2))); }
+}

@@ -1,0 +1,216 @@
+//! A fitted motion's surroundings: what a small torque at any instant would have done to the angles.
+//!
+//! The balance of torques linearised along the motion (`δ` of state and parameters, `u` an input torque),
+//!
+//! ```text
+//! δα = −(∂Q/∂α)⁻¹ [∂Q/∂θ δθ + ∂Q/∂rate δrate + ∂Q/∂p δp + B u]
+//! ```
+//!
+//! from one row of the recording to the next, by the exponential of the matrix in the middle between them.
+
+use nalgebra::{DMatrix, DVector};
+
+use super::Place;
+use super::refit::Refit;
+use crate::model::observe::{chord_angles_rad, chord_slopes};
+use crate::model::{Chain, ForwardModel, Hinge, Motion, Parameter, Partials, Trajectory};
+
+/// One recording's motion, linearised.
+#[derive(Debug, Clone)]
+pub struct Surroundings {
+    /// Stamps of the rows.
+    pub t_s: Vec<f64>,
+    /// Links, and further rates of the laws.
+    pub links: usize,
+    /// Number of rates.
+    pub rates: usize,
+    /// Free parameters of the fit.
+    pub parameters: usize,
+    /// At each row, what happens there.
+    pub rows: Vec<Row>,
+    /// From each row to the next: d(δθ, δrate)/dt with δθ, δrate, then the parameters, then the torque on each rate's equation.
+    flows: Vec<DMatrix<f64>>,
+}
+
+/// One row of the recording beside the motion.
+#[derive(Debug, Clone)]
+pub struct Row {
+    /// Angles between marks.
+    pub chord_rad: Vec<f64>,
+    /// θ.
+    pub theta_rad: Vec<f64>,
+    /// Rates.
+    pub rate: Vec<f64>,
+    /// ∂(angle seen)/∂θ, marks × links.
+    pub observed: DMatrix<f64>,
+    /// Measured less predicted.
+    pub left_rad: Vec<Option<f64>>,
+    /// Its standard deviation.
+    pub sd_rad: Vec<f64>,
+}
+
+impl Surroundings {
+    /// Of one recording of a fit; `None` where the motion cannot be integrated.
+    pub fn of(fit: &Refit<'_>, record: usize) -> Option<Self> {
+        let problem = &fit.problem;
+        let data = &problem.records[record];
+        let prediction = problem.predict(record, &fit.x, false).ok()?;
+        let (model, swing, true_s) = fit.motion(record)?;
+        let chain = model.chain();
+        let gain = 1.0 + fit.value(Parameter::AngleGain).unwrap_or(0.0);
+        let mut rows: Vec<Row> = true_s.iter().map(|t| row(chain, &swing, *t, gain)).collect();
+        for value in &prediction.values {
+            let sd_rad = problem.noise_rad[record][value.link] * data.relative_sd[value.link][value.row];
+            let row = &mut rows[value.row];
+            row.left_rad[value.link] = data.theta_rad[value.link][value.row].map(|m| m - value.predicted_rad);
+            row.sd_rad[value.link] = sd_rad * long_run(problem.colour[record][value.link]);
+        }
+        let flows = true_s.windows(2).map(|pair| flow(&model, &problem.free, &swing, 0.5 * (pair[0] + pair[1])));
+        Some(Self {
+            flows: flows.collect::<Option<Vec<_>>>()?,
+            t_s: true_s,
+            links: chain.count(),
+            rates: model.rates(),
+            parameters: problem.free.len(),
+            rows,
+        })
+    }
+
+    /// Number of numbers in a state: δθ and δrate.
+    pub fn state(&self) -> usize {
+        self.links + self.rates
+    }
+
+    /// From each row to the next, in the order state, input, parameters. The input is a torque on the links that fades within `memory_s`
+    /// (an Ornstein–Uhlenbeck process; infinite where it is held); without a pattern there is none.
+    pub fn transitions(&self, memory_s: f64, pattern: impl Fn(usize) -> Option<DVector<f64>>) -> Vec<DMatrix<f64>> {
+        (0..self.flows.len()).map(|k| self.transition(k, pattern(k).as_ref(), memory_s)).collect()
+    }
+
+    fn transition(&self, k: usize, pattern: Option<&DVector<f64>>, memory_s: f64) -> DMatrix<f64> {
+        let (state, inputs) = (self.state(), usize::from(pattern.is_some()));
+        let total = state + inputs + self.parameters;
+        let flow = &self.flows[k];
+        let mut matrix = DMatrix::zeros(total, total);
+        matrix.view_mut((0, 0), (state, state)).copy_from(&flow.columns(0, state));
+        matrix.view_mut((0, state + inputs), (state, self.parameters)).copy_from(&flow.columns(state, self.parameters));
+        if let Some(pattern) = pattern {
+            let torque = flow.columns(state + self.parameters, self.links) * pattern;
+            matrix.view_mut((0, state), (state, 1)).copy_from(&torque);
+            matrix[(state, state)] = -1.0 / memory_s;
+        }
+        (matrix * (self.t_s[k + 1] - self.t_s[k])).exp()
+    }
+
+    /// What inputs that follow two courses would add to the angles seen, row after row, mark after mark; `transitions` are those of a held
+    /// input.
+    pub fn responses(&self, transitions: &[DMatrix<f64>], course: impl Fn(f64) -> [f64; 2]) -> Vec<[f64; 2]> {
+        let (state, marks) = (self.state(), self.rows[0].observed.nrows());
+        let mut z = vec![[0.0; 2]; state];
+        let mut next = z.clone();
+        let mut seen = Vec::with_capacity(self.rows.len() * marks);
+        for (k, row) in self.rows.iter().enumerate() {
+            if k > 0 {
+                let transition = &transitions[k - 1];
+                let input = course(0.5 * (self.t_s[k - 1] + self.t_s[k]));
+                for (i, next) in next.iter_mut().enumerate() {
+                    *next = input.map(|u| u * transition[(i, state)]);
+                    for (j, z) in z.iter().enumerate() {
+                        (0..2).for_each(|c| next[c] += transition[(i, j)] * z[c]);
+                    }
+                }
+                std::mem::swap(&mut z, &mut next);
+            }
+            for mark in 0..marks {
+                let angle = |c: usize| (0..self.links).map(|i| row.observed[(mark, i)] * z[i][c]).sum();
+                seen.push([angle(0), angle(1)]);
+            }
+        }
+        seen
+    }
+
+    /// The pattern of torques on the links of a unit input at a place, at row k.
+    pub fn pattern(&self, chain: &Chain, place: Place, k: usize) -> DVector<f64> {
+        let n = self.links;
+        let mut pattern = DVector::zeros(n);
+        match place {
+            Place::Hinge => pattern[0] = 1.0,
+            Place::Joint => {
+                pattern[0] = 1.0;
+                pattern[n - 1] -= 1.0;
+            }
+            Place::Air => {
+                // a push across the strip that grows with the distance from the hinge, as a drag does
+                let theta_rad = &self.rows[k].theta_rad;
+                let mut above_m = 0.0;
+                for j in 0..n {
+                    let length_m = chain.length_m(j);
+                    let push = length_m * (above_m + 0.5 * length_m);
+                    for i in 0..j {
+                        pattern[i] += chain.length_m(i) * push * (theta_rad[i] - theta_rad[j]).cos();
+                    }
+                    pattern[j] += length_m * length_m * (0.5 * above_m + length_m / 3.0);
+                    above_m += length_m;
+                }
+                let size = pattern.norm();
+                pattern /= size;
+            }
+            Place::Camera => {}
+        }
+        pattern
+    }
+}
+
+/// Correlated noise weighs less: the standard deviation that white noise of the same power at low frequencies has.
+fn long_run(rho: f64) -> f64 {
+    ((1.0 + rho) / (1.0 - rho)).sqrt()
+}
+
+fn row(chain: &Chain, swing: &Trajectory, t_s: f64, gain: f64) -> Row {
+    let state = swing.at(t_s);
+    let observed = chord_slopes(chain, &state.theta_rad) * gain;
+    let marks = observed.nrows();
+    let mut rate = state.omega_rad_s;
+    rate.extend(state.hidden);
+    Row {
+        chord_rad: chord_angles_rad(chain, &state.theta_rad),
+        theta_rad: state.theta_rad,
+        rate,
+        observed,
+        left_rad: vec![None; marks],
+        sd_rad: vec![1.0; marks],
+    }
+}
+
+/// The instant of a motion, with its accelerations.
+pub fn motion_at(model: &ForwardModel, swing: &Trajectory, t_s: f64) -> Option<Motion> {
+    let (step, tau) = swing.step_at(t_s)?;
+    let mut motion = model.motion(t_s, &step.theta_rad(tau), &step.rate(tau));
+    motion.acceleration = step.acceleration(tau);
+    motion.hinge = step.hinge;
+    Some(motion)
+}
+
+fn flow(model: &ForwardModel, free: &[Parameter], swing: &Trajectory, t_s: f64) -> Option<DMatrix<f64>> {
+    let (n, m) = (model.chain().count(), model.rates());
+    let motion = motion_at(model, swing, t_s)?;
+    let mut partials = Partials::zero(n, m);
+    model.partials(&motion, &mut partials);
+    let mut right = DMatrix::zeros(m, n + m + free.len() + n);
+    right.columns_mut(0, n).copy_from(&partials.theta);
+    right.columns_mut(n, m).copy_from(&partials.rate);
+    let mut q = vec![0.0; m];
+    for (column, parameter) in free.iter().enumerate() {
+        model.sensitivity(*parameter, &motion, &partials, &mut q);
+        right.column_mut(n + m + column).copy_from_slice(&q);
+    }
+    (0..n).for_each(|link| right[(link, n + m + free.len() + link)] = 1.0);
+    if motion.hinge == Hinge::Sticks {
+        right.row_mut(0).fill(0.0);
+    }
+    let accelerations = (-partials.acceleration).lu().solve(&right)?;
+    let mut flow = DMatrix::zeros(n + m, right.ncols());
+    (0..n).for_each(|i| flow[(i, n + i)] = 1.0);
+    flow.rows_mut(n, m).copy_from(&accelerations);
+    Some(flow)
+}

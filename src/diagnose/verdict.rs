@@ -1,0 +1,179 @@
+//! The verdict: adequate, identified, ambiguous or unknown; what cannot be told apart; and the measurement that would tell.
+
+use super::evidence::{self, normalised};
+use super::latent::Latent;
+use super::refit::Refit;
+use super::{Cause, Place};
+
+/// A verdict stands alone when it is at least this probable.
+const ALONE: f64 = 0.8;
+/// A hypothesis this much less probable than the best named one is told from it.
+const TOLD_APART: f64 = 0.05;
+/// A named law may be wrong by this part of its own torque before something unknown is suspected beside it.
+const LAW_SHARE: f64 = 0.03;
+
+/// What the recordings say.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Status {
+    /// Nothing is missing that could be seen.
+    Adequate,
+    /// One answer.
+    Identified,
+    /// Several answers that the recordings do not tell apart.
+    Ambiguous,
+    /// Something is missing that is not in the table.
+    Unknown,
+}
+
+impl Status {
+    /// The name in files.
+    pub fn id(self) -> &'static str {
+        match self {
+            Self::Adequate => "adequate",
+            Self::Identified => "identified",
+            Self::Ambiguous => "ambiguous",
+            Self::Unknown => "unknown",
+        }
+    }
+}
+
+/// A hypothesis with its probability.
+#[derive(Debug, Clone)]
+pub struct Weighed<'a> {
+    /// Fitted.
+    pub fit: Refit<'a>,
+    /// ln Z.
+    pub ln_evidence: f64,
+    /// Posterior.
+    pub probability: f64,
+}
+
+/// The verdict.
+#[derive(Debug, Clone)]
+pub struct Verdict {
+    /// What kind.
+    pub status: Status,
+    /// The best names.
+    pub effects: Vec<Cause>,
+    /// Every effect that the recordings do not tell from them.
+    pub class: Vec<Cause>,
+    /// Of the answer as it is given.
+    pub probability: f64,
+    /// Of anything outside the table.
+    pub unknown: f64,
+    /// The measurement that would split the class.
+    pub to_decide: Option<String>,
+}
+
+/// Hypotheses with probabilities, likeliest first; the last number is that of the unknown. `remainder` is the unknown around the likeliest fit,
+/// `added_n_m` the torque of that fit's own effects.
+pub fn weigh<'a>(
+    fits: Vec<Refit<'a>>,
+    values: usize,
+    candidates: usize,
+    remainder: impl Fn(&Refit<'a>, f64) -> (Vec<Latent>, f64),
+) -> (Vec<Weighed<'a>>, f64, Vec<Latent>) {
+    let least = fits.iter().map(|f| f.chi2).fold(f64::INFINITY, f64::min);
+    let variance = (least / values as f64).max(1.0);
+    let ln: Vec<f64> = fits.iter().map(|f| evidence::ln_evidence(f, variance)).collect();
+    let mut posterior: Vec<f64> =
+        fits.iter().zip(&ln).map(|(f, ln)| ln + evidence::ln_prior(&f.hypothesis, candidates)).collect();
+    let best = (0..fits.len()).max_by(|a, b| posterior[*a].total_cmp(&posterior[*b])).unwrap_or(0);
+    let (latents, added_n_m) = remainder(&fits[best], fits[best].chi2 / values as f64);
+    posterior.push(ln[best] + evidence::PRIOR_UNKNOWN.ln() + unknown_gain(&latents, added_n_m));
+    let mut probability = normalised(&posterior);
+    let unknown = probability.pop().unwrap_or(0.0);
+    let mut weighed: Vec<Weighed<'a>> = (fits.into_iter().zip(ln).zip(probability))
+        .map(|((fit, ln_evidence), probability)| Weighed { fit, ln_evidence, probability })
+        .collect();
+    weighed.sort_by(|a, b| b.probability.total_cmp(&a.probability));
+    (weighed, unknown, latents)
+}
+
+/// How much likelier an unknown of any size makes the recordings than one that a law's own error allows.
+fn unknown_gain(latents: &[Latent], added_n_m: f64) -> f64 {
+    let of = |latent: &Latent| {
+        let allowed = if latent.place == Place::Camera { 0.0 } else { LAW_SHARE * added_n_m };
+        let tolerated = latent.tried.iter().filter(|t| t.0 <= allowed).map(|t| t.1).fold(0.0, f64::max);
+        latent.gain - tolerated
+    };
+    // any size is as likely as any other, at any place
+    let looks: usize = latents.iter().map(|l| l.tried.len()).sum();
+    latents.iter().map(of).fold(f64::NEG_INFINITY, f64::max) - (looks.max(1) as f64).ln()
+}
+
+impl Verdict {
+    /// From the probabilities.
+    pub fn of(weighed: &[Weighed<'_>], unknown: f64, marks: usize) -> Self {
+        let adequate: f64 = weighed.iter().filter(|w| w.fit.hypothesis.causes.is_empty()).map(|w| w.probability).sum();
+        let named = 1.0 - adequate - unknown;
+        let nothing = |status, probability| Self {
+            status,
+            effects: Vec::new(),
+            class: Vec::new(),
+            probability,
+            unknown,
+            to_decide: None,
+        };
+        if unknown > adequate && unknown > named {
+            return nothing(Status::Unknown, unknown);
+        }
+        if adequate >= named {
+            return nothing(Status::Adequate, adequate);
+        }
+        let named: Vec<&Weighed<'_>> = weighed.iter().filter(|w| !w.fit.hypothesis.causes.is_empty()).collect();
+        let best = named[0];
+        let mut class: Vec<Cause> = best.fit.hypothesis.causes.clone();
+        for other in named.iter().filter(|w| w.probability > TOLD_APART * best.probability) {
+            for cause in &other.fit.hypothesis.causes {
+                if !class.contains(cause) {
+                    class.push(*cause);
+                }
+            }
+        }
+        let effects = best.fit.hypothesis.causes.clone();
+        let status = if best.probability >= ALONE { Status::Identified } else { Status::Ambiguous };
+        if status == Status::Identified {
+            class.clone_from(&effects);
+        }
+        let to_decide = to_decide(&effects, &class, marks);
+        Self { status, effects, class, probability: best.probability, unknown, to_decide }
+    }
+}
+
+/// What to measure to split a class.
+fn to_decide(effects: &[Cause], class: &[Cause], marks: usize) -> Option<String> {
+    if class.len() <= effects.len() {
+        return None;
+    }
+    let has = |of: &[Cause]| of.iter().filter(|c| class.contains(c)).count() > 1;
+    let mut advice: Vec<&str> = Vec::new();
+    if has(&[Cause::CameraTilt, Cause::SideForce, Cause::RestCurl]) {
+        advice.push("film a plumb line beside the strip, and the strip turned about its length by half a turn");
+    }
+    if has(&[Cause::TimeBase, Cause::HingeStiffness, Cause::AddedMass, Cause::DistributedFlexibility]) {
+        advice.push(
+            "film a clock with the strip, and release it at a much larger angle: only a spring's share in the frequency falls with amplitude",
+        );
+    }
+    if has(&[Cause::HingeViscous, Cause::AirLinear, Cause::JointHysteretic]) {
+        advice.push(if marks > 1 {
+            "release it in the other shape (θ2 against θ1), and again with a card on the tip: only the air's loss grows with its area"
+        } else {
+            "repeat it with a card on the tip: only the air's loss grows with its area"
+        });
+    }
+    if has(&[Cause::HingeViscous, Cause::HingeCoulomb, Cause::AirQuadratic, Cause::AirLinear, Cause::JointHysteretic]) {
+        advice.push("release it at twice the angle and record until it is at rest: the losses differ in how they fall with amplitude");
+    }
+    if has(&[Cause::AngleGain, Cause::JointCubicStiffness, Cause::RestCurl, Cause::AddedMass]) {
+        advice.push("film a grid in the plane of the swing, which fixes the gain of the angles");
+    }
+    if has(&[Cause::DifferentialLag, Cause::DroppedFrames, Cause::TimeBase]) {
+        advice.push("film a running clock beside the strip");
+    }
+    if advice.is_empty() {
+        advice.push("a longer recording with less noise, from a larger release and from another shape of release");
+    }
+    Some(advice.join("; "))
+}
