@@ -1,7 +1,7 @@
 //! Is the base model enough? Its residuals against what chance alone would leave, and what could have been seen.
 //!
 //! The residuals of a fit to data that its model made are (1 − QQᵀ)ε, ε being the noise: replicates of them cost no integration. Each statistic
-//! (the best score of any effect, the worst window, the strongest frequency) is ranked among its replicates, and the smallest rank among the smallest
+//! (the best score of any effect, the worst window, the correlation of neighbours, each over the mean square) is ranked among its replicates, and the smallest rank among the smallest
 //! ranks of the replicates, so that looking in many places is paid for.
 
 use nalgebra::DVector;
@@ -64,10 +64,10 @@ pub fn adequacy(ground: &Ground<'_>, null: &Refit<'_>, causes: &[Cause]) -> Adeq
             .map(|k| residual.rows(k * WINDOW, WINDOW).norm_squared())
             .fold(0.0, f64::max);
         let neighbours: f64 = (1..residual.len()).map(|i| residual[i] * residual[i - 1]).sum();
-        [score, window, (neighbours / residual.norm_squared().max(1e-300)).abs(), residual.norm_squared()]
+        let mean_square = residual.norm_squared() / residual.len() as f64;
+        [score / mean_square, window / mean_square, (neighbours / residual.norm_squared().max(1e-300)).abs()]
     };
-    let freedom = (residual_count(&screen) - basis.ncols()).max(1) as f64;
-    let replicates: Vec<[f64; 4]> = (0..REPLICATES as u64)
+    let replicates: Vec<[f64; 3]> = (0..REPLICATES as u64)
         .into_par_iter()
         .map(|seed| {
             let mut random = StdRng::seed_from_u64(seed);
@@ -76,18 +76,13 @@ pub fn adequacy(ground: &Ground<'_>, null: &Refit<'_>, causes: &[Cause]) -> Adeq
         })
         .collect();
     let own = statistics(&screen.projection.residual);
-    let _ = freedom;
     Adequacy { p_value: ranked(&own, &replicates), detectable: detectable(&scores, causes) }
 }
 
-fn residual_count(screen: &Screen<'_, '_>) -> usize {
-    screen.projection.residual.len()
-}
-
 /// The share of replicates whose least rank is as small as the recording's.
-fn ranked(own: &[f64; 4], replicates: &[[f64; 4]]) -> f64 {
+fn ranked(own: &[f64; 3], replicates: &[[f64; 3]]) -> f64 {
     let count = replicates.len() as f64;
-    let rank = |of: &[f64; 4]| {
+    let rank = |of: &[f64; 3]| {
         (0..own.len())
             .map(|s| (1.0 + replicates.iter().filter(|r| r[s] >= of[s]).count() as f64) / (count + 1.0))
             .fold(1.0, f64::min)

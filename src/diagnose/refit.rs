@@ -17,9 +17,11 @@ const YIELD_SHARE: f64 = 0.2;
 /// A motion that leaves more than this part of the swing has lost step.
 const OUT_OF_STEP: f64 = 0.35;
 /// Steps of the integration for each row of the recording before a motion is given up.
-const STEPS_EACH_ROW: usize = 8;
+const STEPS_EACH_ROW: usize = 5;
 /// The corners of a hysteresis cost many steps: its motion need not be as exact.
 const CORNERS: f64 = 20.0;
+/// What a fit leaves is noise up to this many times the noise of short stretches.
+const BELIEVED: f64 = 1.2;
 /// Rods between two marks while bending all along the strip is only a candidate.
 const CANDIDATE_PIECES: usize = 3;
 /// Steps of a first descent, and of one that is worth it.
@@ -103,7 +105,7 @@ impl<'a> Ground<'a> {
             }
             if *cause == Cause::JointHysteretic {
                 let yield_rad = YIELD_SHARE * self.largest_bend_rad();
-                beliefs.push(Belief { parameter: Parameter::HysteresisYield, value: yield_rad, sd: yield_rad });
+                beliefs.push(Belief { parameter: Parameter::HysteresisYield, value: yield_rad, sd: 2.5 * yield_rad });
                 experiment.model.effects.joint_hysteretic = Some(Hysteresis { torque_n_m: 0.0, yield_rad });
             }
             free.extend(cause.parameters());
@@ -175,7 +177,7 @@ impl<'a> Ground<'a> {
         self.descend(&hypothesis, problem, x, steps)
     }
 
-    /// Lowers the noise, and its correlation, to what a fit leaves; whether that changes anything that counts.
+    /// Takes the noise, and its correlation, from what a fit leaves where that can be noise; whether it changes anything that counts.
     pub fn refine_noise(&mut self, by: &Refit<'_>) -> bool {
         let mut changed = false;
         for record in 0..self.records.len() {
@@ -195,9 +197,11 @@ impl<'a> Ground<'a> {
                 let noise_rad = (power / freedom).sqrt();
                 let rho = left.windows(2).map(|w| w[0] * w[1]).sum::<f64>() / power.max(1e-300);
                 let (known_rad, known_rho) = (&mut self.noise_rad[record][link], &mut self.colour[record][link]);
-                changed |= noise_rad < 0.97 * *known_rad || rho < *known_rho - 0.05;
-                *known_rad = known_rad.min(noise_rad);
-                *known_rho = if rho < super::COLOURED { 0.0 } else { known_rho.min(rho) };
+                // what is left far beyond the noise is the model's, not the noise's
+                let believed_rad = if noise_rad < BELIEVED * *known_rad { noise_rad } else { *known_rad };
+                let believed_rho = if rho < super::COLOURED { 0.0 } else { rho.min(*known_rho + 0.1) };
+                changed |= (believed_rad / *known_rad - 1.0).abs() > 0.03 || (believed_rho - *known_rho).abs() > 0.05;
+                (*known_rad, *known_rho) = (believed_rad, if *known_rho == 0.0 { 0.0 } else { believed_rho });
             }
         }
         changed

@@ -17,6 +17,8 @@ use crate::model::Parameter;
 
 /// Of a column less than this is left by the projection: nothing can be said about it.
 const NOTHING_LEFT: f64 = 1e-5;
+/// Yield angles of the joint's hysteresis, as parts of the largest bend.
+const YIELDS: [f64; 3] = [0.03, 0.15, 0.6];
 /// Frequencies of a moving support: this fine for the length of the recording.
 const PER_RESOLUTION: f64 = 1.0;
 /// Highest frequency of a moving support, in units of the swing's.
@@ -98,7 +100,16 @@ impl<'g, 'a> Screen<'g, 'a> {
             .copied()
             .filter(|c| !matches!(c, Cause::DroppedFrames | Cause::SupportMotion | Cause::DistributedFlexibility))
             .collect();
-        let mut scores = self.of_coefficients(&smooth).unwrap_or_default();
+        // the corners of a hysteresis ask for a coarser integration, which the others must not suffer
+        let (kinked, smooth): (Vec<Cause>, Vec<Cause>) = smooth.into_iter().partition(|c| *c == Cause::JointHysteretic);
+        let mut scores = self.of_coefficients(&smooth, None).unwrap_or_default();
+        let yields_rad = YIELDS.map(|share| share * self.ground.largest_bend_rad());
+        let kinked = yields_rad.into_iter().filter_map(|yield_rad| {
+            let mut score = self.of_coefficients(&kinked, Some(yield_rad))?.pop()?;
+            score.start.push((Parameter::HysteresisYield, yield_rad));
+            Some(score)
+        });
+        scores.extend(kinked.max_by(|a, b| a.gain.total_cmp(&b.gain)));
         if further.contains(&Cause::DroppedFrames) {
             scores.extend(self.of_dropped_frames());
         }
@@ -109,10 +120,16 @@ impl<'g, 'a> Screen<'g, 'a> {
     }
 
     /// All effects that are proportional to a coefficient, from one motion with all their derivatives.
-    fn of_coefficients(&self, causes: &[Cause]) -> Option<Vec<Score>> {
+    fn of_coefficients(&self, causes: &[Cause], yield_rad: Option<f64>) -> Option<Vec<Score>> {
+        if causes.is_empty() {
+            return None;
+        }
         let mut hypothesis = self.fit.hypothesis.clone();
         hypothesis.causes.extend(causes);
         let mut problem = self.ground.problem(&hypothesis).ok()?;
+        if let (Some(law), Some(yield_rad)) = (&mut problem.experiment.model.effects.joint_hysteretic, yield_rad) {
+            law.yield_rad = yield_rad;
+        }
         // only the first coefficient of each counts; the rest of a law keeps its value
         let first: Vec<Parameter> = causes.iter().map(|c| c.parameters()[0]).collect();
         let own = &self.fit.problem;

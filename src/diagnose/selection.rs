@@ -11,10 +11,14 @@ use crate::progress::Progress;
 const SEEDS: usize = 6;
 /// χ² beyond its expectation by this many standard deviations is worth a dear hypothesis.
 const SOMETHING_LEFT: f64 = 4.0;
+/// A pair that promises more than this many times the least χ² is not fitted.
+const PROMISING: f64 = 3.0;
 /// A fit whose χ² is this many times the best one's (and this much more) is not made any better.
 const HOPELESS: f64 = 10.0;
 /// A fit that is worse by this than one that only adds an effect may be in a false minimum.
 const STRAGGLES: f64 = 9.0;
+/// Of these, the ones beside which a moving support is looked for.
+const SCANNED: usize = 3;
 /// Pairs fitted in full.
 const MOST_PAIRS: usize = 20;
 /// Pairs fitted even where they promise little.
@@ -115,6 +119,9 @@ fn single<'a>(
             }
             tries.push(near);
         }
+        (Cause::JointHysteretic, None) => {
+            tries.push(ground.refit(&Hypothesis::default().and(cause, None), null, &[]));
+        }
         (_, None) => {}
     }
     tries.into_iter().flatten().min_by(|a, b| a.chi2.total_cmp(&b.chi2))
@@ -137,7 +144,13 @@ fn promising<'s, 'a>(
     seeds.truncate(SEEDS);
     let scored: Vec<(&Refit<'a>, Vec<Score>)> = seeds
         .par_iter()
-        .filter_map(|seed| Some((*seed, Screen::at(ground, seed)?.scores(causes))))
+        .enumerate()
+        .filter_map(|(rank, seed)| {
+            // every frequency of a moving support is dear
+            let few: Vec<Cause> =
+                causes.iter().copied().filter(|c| rank < SCANNED || *c != Cause::SupportMotion).collect();
+            Some((*seed, Screen::at(ground, seed)?.scores(&few)))
+        })
         .collect();
     let mut pairs: Vec<(f64, &Refit<'a>, Score)> = Vec::new();
     for (seed, scores) in scored {
@@ -158,7 +171,7 @@ fn promising<'s, 'a>(
     let mut kept = 0;
     pairs.retain(|p| {
         kept += 1;
-        kept <= FEWEST_PAIRS || p.0 < HOPELESS * (least + HOPELESS)
+        kept <= FEWEST_PAIRS || p.0 < PROMISING * least + 100.0
     });
     pairs.into_iter().map(|(_, seed, score)| (seed, score)).collect()
 }

@@ -80,7 +80,7 @@ pub fn weigh<'a>(
         fits.iter().zip(&ln).map(|(f, ln)| ln + evidence::ln_prior(&f.hypothesis, candidates)).collect();
     let best = (0..fits.len()).max_by(|a, b| posterior[*a].total_cmp(&posterior[*b])).unwrap_or(0);
     let (latents, added_n_m) = remainder(&fits[best], fits[best].chi2 / values as f64);
-    posterior.push(ln[best] + evidence::PRIOR_UNKNOWN.ln() + unknown_gain(&latents, added_n_m));
+    posterior.push(posterior[best] + evidence::PRIOR_UNKNOWN.ln() + unknown_gain(&latents, added_n_m));
     let mut probability = normalised(&posterior);
     let unknown = probability.pop().unwrap_or(0.0);
     let mut weighed: Vec<Weighed<'a>> = (fits.into_iter().zip(ln).zip(probability))
