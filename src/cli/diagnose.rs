@@ -238,7 +238,8 @@ impl Report<'_> {
                 "phase": self.phase().map(locate::Phase::id),
                 "frequency_hz": departure.frequency_hz,
                 "statement": self.where_statement(),
-                "unknown": diagnosis.unknowns.iter().map(|u| json!({"place": u.place.id(), "size": u.size, "log_likelihood_gain": u.gain})).collect::<Vec<_>>(),
+                "named_torque_n_m": diagnosis.added_torque_n_m,
+                "unknown": diagnosis.unknowns.iter().map(|u| json!({"place": u.place.id(), "size": u.size, "log_likelihood_gain": u.gain, "tried": u.tried})).collect::<Vec<_>>(),
             },
             "candidates": diagnosis.weighed.iter().take(WRITTEN).map(candidate_json).collect::<Vec<_>>(),
             "verdict": {

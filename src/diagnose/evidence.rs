@@ -9,7 +9,7 @@
 //! s² = max(1, χ²/N of the best hypothesis) allows for noise that was estimated too low. A support's frequency, a joint's yield angle and the instant
 //! of missing frames count as any value within their range.
 
-use super::Cause;
+use super::{Cause, Place};
 use super::refit::{Hypothesis, Refit};
 use crate::model::Parameter;
 
@@ -24,13 +24,17 @@ const TOLD_FROM_ZERO: f64 = 1.5;
 const PRIOR_NULL: f64 = 0.25;
 const PRIOR_ONE: f64 = 0.40;
 const PRIOR_TWO: f64 = 0.25;
+/// An effect of the camera is this much likelier than one of physics.
+const CAMERA_FIRST: f64 = 2.0;
 /// Of physics outside the table.
 pub const PRIOR_UNKNOWN: f64 = 0.10;
 
 /// ln of the prior probability of a hypothesis, of `candidates` effects.
 pub fn ln_prior(hypothesis: &Hypothesis, candidates: usize) -> f64 {
     let count = candidates.max(1) as f64;
-    match hypothesis.causes.len() {
+    // in doubt it is the camera
+    let camera = hypothesis.causes.iter().filter(|c| c.place() == Place::Camera).count() as f64 * CAMERA_FIRST.ln();
+    camera + match hypothesis.causes.len() {
         0 => PRIOR_NULL.ln(),
         1 => (PRIOR_ONE / count).ln(),
         _ => (PRIOR_TWO / (0.5 * count * (count - 1.0)).max(1.0)).ln(),

@@ -16,6 +16,7 @@ pub mod evidence;
 pub mod heldout;
 pub mod latent;
 pub mod locate;
+pub mod noise;
 pub mod refit;
 pub mod screen;
 pub mod selection;
@@ -49,6 +50,8 @@ pub struct Diagnosis<'a> {
     pub weighed: Vec<Weighed<'a>>,
     /// The unknown around the likeliest one, at each place, likeliest first.
     pub unknowns: Vec<Latent>,
+    /// Root mean square of the torque of the likeliest one's effects (N·m).
+    pub added_torque_n_m: f64,
     /// The verdict.
     pub verdict: Verdict,
     /// Where and when the base model departs.
@@ -184,6 +187,7 @@ pub fn diagnose<'a>(
     let mut diagnosis = Diagnosis {
         weighed,
         unknowns,
+        added_torque_n_m: 0.0,
         verdict,
         departure: Departure::default(),
         energy_shares: [0.0; 3],
@@ -194,6 +198,7 @@ pub fn diagnose<'a>(
         colour: ground.colour.clone(),
     };
     diagnosis.departure = locate::departure(diagnosis.null());
+    diagnosis.added_torque_n_m = locate::added_torque_n_m(&diagnosis.weighed[0].fit);
     diagnosis.energy_shares = locate::energy_shares(&diagnosis.weighed[0].fit);
     diagnosis.held_out = heldout::held_out(&ground, diagnosis.null(), diagnosis.named(), None);
     let adequacy = adequacy::adequacy(&ground, diagnosis.null(), &causes);

@@ -2,7 +2,7 @@
 
 use nalgebra::{DMatrix, DVector};
 
-use super::Cause;
+use super::{Cause, noise};
 use crate::error::Result;
 use crate::experiment::{Experiment, Hysteresis};
 use crate::fit::descent::{Descent, Ending, Outcome};
@@ -20,8 +20,6 @@ const OUT_OF_STEP: f64 = 0.35;
 const STEPS_EACH_ROW: usize = 5;
 /// The corners of a hysteresis cost many steps: its motion need not be as exact.
 const CORNERS: f64 = 20.0;
-/// What a fit leaves is noise up to this many times the noise of short stretches.
-const BELIEVED: f64 = 1.2;
 /// Rods between two marks while bending all along the strip is only a candidate.
 const CANDIDATE_PIECES: usize = 3;
 /// Steps of a first descent, and of one that is worth it.
@@ -127,6 +125,32 @@ impl<'a> Ground<'a> {
 
     /// Fits a hypothesis from the parameters of another fit; `start` gives values of further ones.
     pub fn refit(&self, hypothesis: &Hypothesis, near: &Refit<'_>, start: &[(Parameter, f64)]) -> Option<Refit<'a>> {
+        let (problem, x) = self.start(hypothesis, near, start)?;
+        // a score is linear: where it overshoots, start from nothing
+        let mut careful = x.clone();
+        for cause in &hypothesis.causes {
+            let first = cause.parameters()[0];
+            let given = start.iter().any(|(p, _)| *p == first);
+            if let Some(i) = problem.free.iter().position(|p| *p == first).filter(|_| given) {
+                careful[i] = 0.0;
+            }
+        }
+        let x = if problem.cost(&x) < problem.cost(&careful) { x } else { careful };
+        self.descend(hypothesis, problem, x, FEW_STEPS)
+    }
+
+    /// Σr² where a refit would start.
+    pub fn cost_at(&self, hypothesis: &Hypothesis, near: &Refit<'_>, start: &[(Parameter, f64)]) -> f64 {
+        self.start(hypothesis, near, start).map_or(f64::INFINITY, |(problem, x)| problem.cost(&x))
+    }
+
+    /// The problem of a hypothesis, and its variables from another fit and some given values.
+    fn start(
+        &self,
+        hypothesis: &Hypothesis,
+        near: &Refit<'_>,
+        start: &[(Parameter, f64)],
+    ) -> Option<(Problem<'a>, Vec<f64>)> {
         let problem = self.problem(hypothesis).ok()?;
         let mut x = problem.start_values().ok()?;
         for (value, parameter) in x.iter_mut().zip(&problem.free) {
@@ -145,15 +169,7 @@ impl<'a> Ground<'a> {
         let lower = problem.lower();
         x.iter_mut().zip(&lower).for_each(|(x, low)| *x = x.max(*low));
         x.extend_from_slice(&near.x[near.problem.free.len()..]);
-        // a score is linear: where it overshoots, start from nothing
-        let mut careful = x.clone();
-        for (parameter, _) in start {
-            if let Some(i) = problem.free.iter().position(|p| p == parameter).filter(|_| *parameter != Parameter::SupportFrequency) {
-                careful[i] = lower[i].max(0.0);
-            }
-        }
-        let x = if problem.cost(&x) < problem.cost(&careful) { x } else { careful };
-        self.descend(hypothesis, problem, x, FEW_STEPS)
+        Some((problem, x))
     }
 
     /// Fits a hypothesis from the start values of the experiment, by multiple shooting first: for a base model whose motion is out of step.
@@ -177,31 +193,23 @@ impl<'a> Ground<'a> {
         self.descend(&hypothesis, problem, x, steps)
     }
 
-    /// Takes the noise, and its correlation, from what a fit leaves where that can be noise; whether it changes anything that counts.
+    /// Takes the noise from what a fit leaves where the motion has no power; whether that changes anything that counts.
     pub fn refine_noise(&mut self, by: &Refit<'_>) -> bool {
         let mut changed = false;
         for record in 0..self.records.len() {
             let Ok(prediction) = by.problem.predict(record, &by.x, false) else { return false };
-            for link in 0..self.records[record].links() {
-                let left: Vec<f64> = prediction
-                    .values
-                    .iter()
-                    .filter(|v| v.link == link)
-                    .filter_map(|v| {
-                        let data = &self.records[record];
-                        Some((data.theta_rad[link][v.row]? - v.predicted_rad) / data.relative_sd[link][v.row])
-                    })
-                    .collect();
-                let freedom = (left.len() as f64 - 0.5 * by.x.len() as f64).max(1.0);
-                let power: f64 = left.iter().map(|v| v * v).sum();
-                let noise_rad = (power / freedom).sqrt();
-                let rho = left.windows(2).map(|w| w[0] * w[1]).sum::<f64>() / power.max(1e-300);
+            let data = &self.records[record];
+            for link in 0..data.links() {
+                let (mut left, mut motion) = (vec![0.0; data.len()], vec![0.0; data.len()]);
+                for value in prediction.values.iter().filter(|v| v.link == link) {
+                    let measured_rad = data.theta_rad[link][value.row].unwrap_or(value.predicted_rad);
+                    left[value.row] = (measured_rad - value.predicted_rad) / data.relative_sd[link][value.row];
+                    motion[value.row] = value.predicted_rad;
+                }
+                let Some(noise) = noise::off_the_lines(&left, &motion) else { continue };
                 let (known_rad, known_rho) = (&mut self.noise_rad[record][link], &mut self.colour[record][link]);
-                // what is left far beyond the noise is the model's, not the noise's
-                let believed_rad = if noise_rad < BELIEVED * *known_rad { noise_rad } else { *known_rad };
-                let believed_rho = if rho < super::COLOURED { 0.0 } else { rho.min(*known_rho + 0.1) };
-                changed |= (believed_rad / *known_rad - 1.0).abs() > 0.03 || (believed_rho - *known_rho).abs() > 0.05;
-                (*known_rad, *known_rho) = (believed_rad, if *known_rho == 0.0 { 0.0 } else { believed_rho });
+                changed |= (noise.sd / *known_rad - 1.0).abs() > 0.03 || (noise.rho - *known_rho).abs() > 0.03;
+                (*known_rad, *known_rho) = (noise.sd, noise.rho);
             }
         }
         changed

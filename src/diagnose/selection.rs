@@ -3,6 +3,7 @@
 use rayon::prelude::*;
 
 use super::Cause;
+use crate::model::Parameter;
 use super::refit::{self, Ground, Hypothesis, Refit};
 use super::screen::{Score, Screen};
 use crate::progress::Progress;
@@ -19,6 +20,9 @@ const HOPELESS: f64 = 10.0;
 const STRAGGLES: f64 = 9.0;
 /// Of these, the ones beside which a moving support is looked for.
 const SCANNED: usize = 3;
+/// Starts of a hysteresis: yield angles as parts of the largest bend, and its part of the spring.
+const YIELD_SHARES: [f64; 3] = [0.05, 0.2, 0.6];
+const SPRING_SHARES: [f64; 2] = [0.4, 0.9];
 /// Pairs fitted in full.
 const MOST_PAIRS: usize = 20;
 /// Pairs fitted even where they promise little.
@@ -103,12 +107,22 @@ fn single<'a>(
     out_of_step: bool,
 ) -> Option<Refit<'a>> {
     let mut tries = Vec::new();
+    if cause == Cause::JointHysteretic {
+        tries.push(softened(ground, null));
+    }
+    let unexplained = null.chi2 - ground.values() as f64 > SOMETHING_LEFT * (2.0 * ground.values() as f64).sqrt();
+    if cause == Cause::RestCurl && unexplained {
+        // a base model that has given its spring up says nothing about where that spring rests
+        tries.push(ground.refit_anew(&Hypothesis::default().and(cause, None), &[]));
+    }
     match (cause, score) {
         (Cause::DistributedFlexibility, _) => {
             // many links are dear: only where there is something to explain
-            let left = null.chi2 - ground.values() as f64;
-            if left > SOMETHING_LEFT * (2.0 * ground.values() as f64).sqrt() {
+            if unexplained {
                 tries.push(ground.refit(&Hypothesis::default().and(cause, None), null, &[]));
+                if tries.iter().flatten().all(Refit::is_out_of_step) {
+                    tries.push(ground.refit_anew(&Hypothesis::default().and(cause, None), &[]));
+                }
             }
         }
         (_, Some(score)) => {
@@ -119,12 +133,29 @@ fn single<'a>(
             }
             tries.push(near);
         }
-        (Cause::JointHysteretic, None) => {
-            tries.push(ground.refit(&Hypothesis::default().and(cause, None), null, &[]));
-        }
         (_, None) => {}
     }
     tries.into_iter().flatten().min_by(|a, b| a.chi2.total_cmp(&b.chi2))
+}
+
+/// The joint's hysteresis where it makes up a part of what the base model takes for the spring.
+fn softened<'a>(ground: &Ground<'a>, null: &Refit<'a>) -> Option<Refit<'a>> {
+    let spring = [Parameter::JointStiffness, Parameter::BendingStiffness].into_iter().find(|p| null.value(*p).is_some())?;
+    let hypothesis = Hypothesis::default().and(Cause::JointHysteretic, None);
+    let stiffness = null.problem.model(0, &null.x[..null.problem.free.len()]).ok()?.0.value(Parameter::JointStiffness)?;
+    let starts = YIELD_SHARES.iter().flat_map(|yields| SPRING_SHARES.iter().map(move |share| (*yields, *share)));
+    let start = |(yields, share): (f64, f64)| {
+        let yield_rad = yields * ground.largest_bend_rad();
+        vec![
+            (spring, (1.0 - share) * null.value(spring).unwrap_or(0.0)),
+            (Parameter::HysteresisTorque, share * stiffness * yield_rad),
+            (Parameter::HysteresisYield, yield_rad),
+        ]
+    };
+    let best = starts.map(start).min_by(|a, b| {
+        ground.cost_at(&hypothesis, null, a).total_cmp(&ground.cost_at(&hypothesis, null, b))
+    })?;
+    ground.refit(&hypothesis, null, &best)
 }
 
 /// Whether an effect can put the base model out of step by its frequency.

@@ -10,7 +10,7 @@ const ALONE: f64 = 0.8;
 /// A hypothesis this much less probable than the best named one is told from it.
 const TOLD_APART: f64 = 0.05;
 /// A named law may be wrong by this part of its own torque before something unknown is suspected beside it.
-const LAW_SHARE: f64 = 0.03;
+const LAW_SHARE: f64 = 0.005;
 
 /// What the recordings say.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

@@ -1,0 +1,113 @@
+//! The noise of a recording, from the frequencies at which the motion itself has no power.
+//!
+//! What a model lacks shows where the specimen swings: at its own frequencies and their combinations. Elsewhere the residual of even a poor fit is noise.
+//! Of its power there, after a Hann window, the noise's standard deviation and its correlation from row to row are found by Whittle's
+//! likelihood of a first-order autoregression:
+//!
+//! ```text
+//! S(f) = σ²(1 − ρ²) / (1 + ρ² − 2ρ cos 2πfΔt)
+//! ```
+
+use rustfft::FftPlanner;
+use rustfft::num_complex::Complex;
+
+use crate::statistics::median;
+
+/// A frequency belongs to the motion where its power exceeds this part of the motion's largest…
+const MOTION: f64 = 1e-7;
+/// … or lies this many bins from such a one.
+const BINS: usize = 4;
+/// Part of the frequencies that has to be left.
+const ENOUGH: f64 = 0.15;
+/// Correlations tried.
+const RHO_STEPS: usize = 48;
+/// Less correlation than this is none: ln-likelihood it must gain.
+const COLOURED: f64 = 6.0;
+
+/// Noise of one angle.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Noise {
+    /// Standard deviation.
+    pub sd: f64,
+    /// Correlation from row to row.
+    pub rho: f64,
+}
+
+/// The noise in a residual, given the motion it is the residual of; missing rows are zero in both. `None` where the motion has power nearly everywhere.
+pub fn off_the_lines(residual: &[f64], motion: &[f64]) -> Option<Noise> {
+    let (noise, lines) = (spectrum(residual), spectrum(motion));
+    let present = residual.iter().filter(|r| **r != 0.0).count() as f64 / residual.len() as f64;
+    let strongest = lines.iter().copied().fold(0.0, f64::max);
+    let of_motion = |k: usize| {
+        lines[k.saturating_sub(BINS)..(k + BINS + 1).min(lines.len())].iter().any(|p| *p > MOTION * strongest)
+    };
+    let free: Vec<usize> = (1..noise.len()).filter(|k| !of_motion(*k)).collect();
+    if (free.len() as f64) < ENOUGH * noise.len() as f64 {
+        return None;
+    }
+    // a line that the motion does not have, as of a moving support, must not count as noise
+    let mut sorted: Vec<f64> = free.iter().map(|k| noise[*k]).collect();
+    let usual = median(&mut sorted)? / std::f64::consts::LN_2;
+    let free: Vec<usize> = free.into_iter().filter(|k| noise[*k] < 25.0 * usual).collect();
+    let count = free.len() as f64;
+    let shape = |rho: f64, k: usize| {
+        let angle = std::f64::consts::PI * k as f64 / (noise.len() - 1) as f64;
+        (1.0 - rho * rho) / (1.0 + rho * rho - 2.0 * rho * angle.cos())
+    };
+    let fitted = |rho: f64| {
+        let variance = free.iter().map(|k| noise[*k] / shape(rho, *k)).sum::<f64>() / count;
+        let ln: f64 = free.iter().map(|k| shape(rho, *k).ln()).sum::<f64>() + count * variance.ln();
+        (-ln, variance)
+    };
+    let (white, variance) = fitted(0.0);
+    let tried = (1..RHO_STEPS).map(|k| 0.02 * k as f64).map(|rho| (rho, fitted(rho)));
+    let (rho, (likelihood, coloured)) = tried.max_by(|a, b| a.1.0.total_cmp(&b.1.0))?;
+    let (rho, variance) = if likelihood > white + COLOURED { (rho, coloured) } else { (0.0, variance) };
+    Some(Noise { sd: (variance / present).sqrt(), rho })
+}
+
+/// Power of each frequency from zero to half the rate, scaled so that white noise has its variance.
+fn spectrum(values: &[f64]) -> Vec<f64> {
+    let n = values.len();
+    let window = |i: usize| 0.5 - 0.5 * (std::f64::consts::TAU * (i as f64 + 0.5) / n as f64).cos();
+    let mut buffer: Vec<Complex<f64>> =
+        values.iter().enumerate().map(|(i, v)| Complex::new(v * window(i), 0.0)).collect();
+    FftPlanner::new().plan_fft_forward(n).process(&mut buffer);
+    let scale: f64 = (0..n).map(|i| window(i) * window(i)).sum();
+    buffer[..=n / 2].iter().map(|c| c.norm_sqr() / scale).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use rand::SeedableRng;
+    use rand_distr::{Distribution, StandardNormal};
+
+    /// A decaying swing, and a residual of noise with a misfit of the swing ten times as large.
+    fn case(rho: f64) -> Option<Noise> {
+        let mut random = rand::rngs::StdRng::seed_from_u64(3);
+        let swing = |i: usize, phase: f64| (-0.001 * i as f64).exp() * (0.28 * i as f64 + phase).sin();
+        let mut noise = 0.0;
+        let residual: Vec<f64> = (0..1800)
+            .map(|i| {
+                let white: f64 = StandardNormal.sample(&mut random);
+                noise = rho * noise + (1.0 - rho * rho).sqrt() * white;
+                1e-3 * noise + 1e-2 * swing(i, 1.0)
+            })
+            .collect();
+        let motion: Vec<f64> = (0..1800).map(|i| 0.5 * swing(i, 0.0)).collect();
+        off_the_lines(&residual, &motion)
+    }
+
+    #[test]
+    fn a_misfit_of_the_swing_is_not_taken_for_noise() {
+        let noise = case(0.0).unwrap();
+        assert!((noise.sd / 1e-3 - 1.0).abs() < 0.06 && noise.rho == 0.0, "{noise:?}");
+    }
+
+    #[test]
+    fn coloured_noise_is_told_from_white() {
+        let noise = case(0.6).unwrap();
+        assert!((noise.rho - 0.6).abs() < 0.08 && (noise.sd / 1e-3 - 1.0).abs() < 0.15, "{noise:?}");
+    }
+}
