@@ -179,6 +179,11 @@ pub fn diagnose<'a>(
     };
     let nothing = Hypothesis::default();
     let null = ground.descend(&nothing, ground.problem(&nothing)?, prepared.x.clone(), refit::MOST_STEPS).ok_or_else(refused)?;
+    let null = if ground.refine_noise(&null) {
+        ground.again(null, refit::MOST_STEPS).ok_or_else(refused)?
+    } else {
+        null
+    };
     let fits = selection::fits(&mut ground, null, &causes, progress);
     let (weighed, unknown, unknowns) = verdict::weigh(fits, ground.values(), causes.len(), |fit, variance| {
         (locate::unknowns(fit, variance), locate::added_torque_n_m(fit))

@@ -66,6 +66,15 @@ pub fn off_the_lines(residual: &[f64], motion: &[f64]) -> Option<Noise> {
     Some(Noise { sd: (variance / present).sqrt(), rho })
 }
 
+/// The noise in a residual that is nothing but noise; missing rows are zero.
+pub fn of_all(residual: &[f64]) -> Noise {
+    let present: Vec<f64> = residual.iter().copied().filter(|r| *r != 0.0).collect();
+    let power: f64 = present.iter().map(|r| r * r).sum();
+    let rho = present.windows(2).map(|pair| pair[0] * pair[1]).sum::<f64>() / power.max(1e-300);
+    let told_from_none = 3.0 / (present.len().max(1) as f64).sqrt();
+    Noise { sd: (power / present.len().max(1) as f64).sqrt(), rho: if rho > told_from_none { rho } else { 0.0 } }
+}
+
 /// Power of each frequency from zero to half the rate, scaled so that white noise has its variance.
 fn spectrum(values: &[f64]) -> Vec<f64> {
     let n = values.len();

@@ -9,7 +9,7 @@ use crate::fit::descent::{Descent, Ending, Outcome};
 use crate::fit::problem::stacked;
 use crate::fit::shooting::multiple_shooting;
 use crate::fit::{Belief, Problem, Record};
-use crate::model::observe::links_from_chords;
+use crate::model::observe::{chord_angles_rad, links_from_chords};
 use crate::model::{Camera, ForwardModel, Parameter, State, Trajectory};
 
 /// A yield angle of the joint's hysteresis to start from, as a part of the largest bend.
@@ -198,16 +198,25 @@ impl<'a> Ground<'a> {
         let mut changed = false;
         for record in 0..self.records.len() {
             let Ok(prediction) = by.problem.predict(record, &by.x, false) else { return false };
+            let Some((model, swing, true_s)) = by.motion(record) else { return false };
             let data = &self.records[record];
+            let chords: Vec<Vec<f64>> =
+                true_s.iter().map(|t| chord_angles_rad(model.chain(), &swing.at(*t).theta_rad)).collect();
             for link in 0..data.links() {
-                let (mut left, mut motion) = (vec![0.0; data.len()], vec![0.0; data.len()]);
+                let mut left = vec![0.0; data.len()];
+                let motion: Vec<f64> = chords.iter().map(|chord| chord[link]).collect();
                 for value in prediction.values.iter().filter(|v| v.link == link) {
                     let measured_rad = data.theta_rad[link][value.row].unwrap_or(value.predicted_rad);
                     left[value.row] = (measured_rad - value.predicted_rad) / data.relative_sd[link][value.row];
-                    motion[value.row] = value.predicted_rad;
                 }
-                let Some(noise) = noise::off_the_lines(&left, &motion) else { continue };
                 let (known_rad, known_rho) = (&mut self.noise_rad[record][link], &mut self.colour[record][link]);
+                let whole = noise::of_all(&left);
+                let noise = match noise::off_the_lines(&left, &motion) {
+                    Some(noise) => noise,
+                    // a motion with power everywhere, as one with a jump has: what is left at most
+                    None if whole.sd < *known_rad => whole,
+                    None => continue,
+                };
                 changed |= (noise.sd / *known_rad - 1.0).abs() > 0.03 || (noise.rho - *known_rho).abs() > 0.03;
                 (*known_rad, *known_rho) = (noise.sd, noise.rho);
             }

@@ -110,7 +110,8 @@ fn single<'a>(
     if cause == Cause::JointHysteretic {
         tries.push(softened(ground, null));
     }
-    let unexplained = null.chi2 - ground.values() as f64 > SOMETHING_LEFT * (2.0 * ground.values() as f64).sqrt();
+    let values = ground.values() as f64;
+    let unexplained = null.chi2 > values + SOMETHING_LEFT * (2.0 * values).sqrt();
     if cause == Cause::RestCurl && unexplained {
         // a base model that has given its spring up says nothing about where that spring rests
         tries.push(ground.refit_anew(&Hypothesis::default().and(cause, None), &[]));
