@@ -322,6 +322,7 @@ impl Report<'_> {
                 "effects": verdict.effects.iter().map(|c| c.id()).collect::<Vec<_>>(),
                 "class": verdict.class.iter().map(|c| c.id()).collect::<Vec<_>>(),
                 "probability": verdict.probability,
+                "class_probability": verdict.class_probability,
                 "unknown_probability": verdict.unknown,
                 "statement": self.statement(),
                 "to_decide": verdict.to_decide,

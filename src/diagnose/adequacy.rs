@@ -10,7 +10,7 @@ use rand::rngs::StdRng;
 use rand_distr::{Distribution, StandardNormal};
 use rayon::prelude::*;
 
-use super::Cause;
+use super::{Cause, selection};
 use super::refit::{Ground, Refit};
 use super::screen::{Score, Screen};
 use crate::model::Parameter;
@@ -65,7 +65,7 @@ pub fn adequacy(
 ) -> Adequacy {
     let nothing = Adequacy { p_value: 0.0, detectable: Vec::new() };
     let Some(screen) = Screen::at(ground, null) else { return nothing };
-    let scores = screen.scores(causes);
+    let scores = screen.scores(&selection::cheap(ground, causes));
     let basis = &screen.projection.basis;
     let statistics = |residual: &DVector<f64>| {
         let score = scores

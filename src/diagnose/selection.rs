@@ -32,7 +32,7 @@ const FEWEST_PAIRS: usize = 6;
 
 /// The fits of all hypotheses, the base model first; what the best of them leaves refines the noise.
 pub fn fits<'a>(ground: &mut Ground<'a>, null: Refit<'a>, causes: &[Cause], progress: &dyn Progress) -> Vec<Refit<'a>> {
-    let scores = Screen::at(ground, &null).map(|s| s.scores(causes)).unwrap_or_default();
+    let scores = Screen::at(ground, &null).map(|s| s.scores(&cheap(ground, causes))).unwrap_or_default();
     let out_of_step = null.is_out_of_step();
     progress.begin("effects", Some(causes.len() as u64));
     let singles = causes.par_iter().filter_map(|cause| {
@@ -171,6 +171,12 @@ fn is_loss(cause: Cause) -> bool {
     matches!(cause, Cause::HingeViscous | Cause::HingeCoulomb | Cause::AirLinear | Cause::AirQuadratic)
 }
 
+/// The effects that are screened: a hysteresis in each joint of a strip of many links costs more than all others, and is only fitted alone.
+pub(super) fn cheap(ground: &Ground<'_>, causes: &[Cause]) -> Vec<Cause> {
+    let strip = ground.base.contains(&Parameter::BendingStiffness);
+    causes.iter().copied().filter(|c| !(strip && *c == Cause::JointHysteretic)).collect()
+}
+
 /// The pairs whose χ² promises to be lowest, each from the better of its two singles.
 fn promising<'s, 'a>(
     ground: &Ground<'a>,
@@ -178,6 +184,7 @@ fn promising<'s, 'a>(
     singles: &'s [Refit<'a>],
     causes: &[Cause],
 ) -> Vec<(&'s Refit<'a>, Score)> {
+    let further = cheap(ground, causes);
     let mut seeds: Vec<&Refit<'a>> = singles.iter().filter(|s| s.chi2 < null.chi2 - 4.0).collect();
     seeds.sort_by(|a, b| a.chi2.total_cmp(&b.chi2));
     seeds.truncate(SEEDS);
@@ -187,7 +194,7 @@ fn promising<'s, 'a>(
         .filter_map(|(rank, seed)| {
             // every frequency of a moving support is dear
             let few: Vec<Cause> =
-                causes.iter().copied().filter(|c| rank < SCANNED || *c != Cause::SupportMotion).collect();
+                further.iter().copied().filter(|c| rank < SCANNED || *c != Cause::SupportMotion).collect();
             Some((*seed, Screen::at(ground, seed)?.scores(&few)))
         })
         .collect();
