@@ -181,7 +181,7 @@ impl Report<'_> {
         let mut table = Table::new(["the base model and", "probability", "left mrad", "coefficient", "sd", "unit"]);
         for weighed in self.diagnosis.weighed.iter().take(LISTED) {
             let left = rmse_rad(&weighed.fit).iter().map(|r| number(1e3 * r, 3)).collect::<Vec<_>>().join(" ");
-            let mut first = [names(&weighed.fit.hypothesis.causes, "nothing else"), number(weighed.probability, 3), left];
+            let mut first = [names(&weighed.fit.hypothesis.causes, "nothing else"), number(weighed.probability.max(0.0), 3), left];
             for (parameter, value, sd) in coefficients(&weighed.fit) {
                 let [name, probability, left] = std::mem::take(&mut first);
                 table.row([name, probability, left, number(value, 4), number(sd, 2), parameter.unit().to_owned()]);
@@ -228,7 +228,23 @@ impl Report<'_> {
         let percent = 1e2 * verdict.probability;
         match verdict.status {
             Status::Adequate => format!("Nothing is missing that this recording could show: the base model leaves only noise ({percent:.0} %)."),
-            Status::Unknown => format!("Something is missing that is not in the table of effects ({percent:.0} %): no named law, nor two of them, leaves only noise."),
+            Status::Unknown => {
+                let named = &self.diagnosis.weighed[0];
+                let causes = &named.fit.hypothesis.causes;
+                let nearest = if causes.is_empty() {
+                    "; no law of the table comes nearer than the base model".to_owned()
+                } else {
+                    format!(
+                        ". Of the table {} comes nearest ({:.0} % among the named): it explains {:.1} % of what the base model leaves beyond the noise",
+                        words(causes),
+                        1e2 * named.if_named,
+                        1e2 * self.diagnosis.explained()
+                    )
+                };
+                format!(
+                    "Something is missing that is not in the table of effects ({percent:.0} %): no named law, nor two of them, leaves only noise{nearest}."
+                )
+            }
             Status::Identified => format!("Missing: {} ({percent:.0} %).", words(&verdict.effects)),
             Status::Ambiguous => format!(
                 "Missing: most likely {} ({percent:.0} %), but the recording does not tell it from others: {}.",
@@ -241,7 +257,9 @@ impl Report<'_> {
     fn place(&self) -> Option<Place> {
         match self.diagnosis.verdict.status {
             Status::Adequate => None,
-            Status::Unknown => self.diagnosis.unknowns.first().map(|u| u.place),
+            Status::Unknown if self.diagnosis.unknowns.first().is_some_and(|u| u.gain > 0.0) => {
+                self.diagnosis.unknowns.first().map(|u| u.place)
+            }
             _ => self.diagnosis.main_effect().map(Cause::place),
         }
     }
@@ -374,6 +392,7 @@ fn candidate_json(weighed: &Weighed<'_>) -> Value {
     json!({
         "effects": fit.hypothesis.causes.iter().map(|c| c.id()).collect::<Vec<_>>(),
         "probability": weighed.probability,
+        "probability_if_named": weighed.if_named,
         "parameters": parameters_json(fit, &fit.added()),
         "dropped_at_s": fit.hypothesis.dropped.map(|d| d.1),
         "rmse_rad": rmse_rad(fit),

@@ -79,19 +79,29 @@ impl<'a> Diagnosis<'a> {
         self.weighed.iter().find(|w| w.fit.hypothesis.causes.is_empty()).map_or(&self.weighed[0].fit, |w| &w.fit)
     }
 
-    /// Of the effects named, the one that explains most: without which the fit would be worst.
-    pub fn main_effect(&self) -> Option<Cause> {
-        let left_without = |cause: &Cause| {
-            let others: Vec<Cause> = self.verdict.effects.iter().copied().filter(|c| c != cause).collect();
-            self.weighed.iter().find(|w| w.fit.hypothesis.causes == others).map_or(f64::INFINITY, |w| w.fit.chi2)
-        };
-        self.verdict.effects.iter().copied().max_by(|a, b| left_without(a).total_cmp(&left_without(b)))
+    /// The part of what the base model leaves beyond the noise that the named fit explains.
+    pub fn explained(&self) -> f64 {
+        let values: usize = self.null().problem.records.iter().map(|r| r.values(0..r.len())).sum();
+        let beyond = |fit: &Refit<'_>| (fit.chi2 - values as f64).max(0.0);
+        1.0 - beyond(self.named()) / beyond(self.null()).max(1.0)
     }
 
-    /// The fit that the verdict names, or the base model.
+    /// Of the effects named, the one that explains most: without which the fit would be worst.
+    pub fn main_effect(&self) -> Option<Cause> {
+        let causes = &self.named().hypothesis.causes;
+        let left_without = |cause: &Cause| {
+            let others: Vec<Cause> = causes.iter().copied().filter(|c| c != cause).collect();
+            self.weighed.iter().find(|w| w.fit.hypothesis.causes == others).map_or(f64::INFINITY, |w| w.fit.chi2)
+        };
+        causes.iter().copied().max_by(|a, b| left_without(a).total_cmp(&left_without(b)))
+    }
+
+    /// The fit that the verdict names; the likeliest of the table where something else is at work; the base model where that is enough.
     pub fn named(&self) -> &Refit<'a> {
-        let named = |w: &&Weighed<'a>| w.fit.hypothesis.causes == self.verdict.effects;
-        self.weighed.iter().find(named).map_or(self.null(), |w| &w.fit)
+        match self.verdict.status {
+            Status::Adequate => self.null(),
+            _ => &self.weighed[0].fit,
+        }
     }
 }
 
@@ -192,7 +202,7 @@ pub fn diagnose<'a>(
     let nothing = Hypothesis::default();
     let null = ground.descend(&nothing, ground.problem(&nothing)?, prepared.x.clone(), refit::MOST_STEPS).ok_or_else(refused)?;
     let null = if ground.refine_noise(&null) {
-        ground.again(null, refit::MOST_STEPS).ok_or_else(refused)?
+        ground.again(&null, refit::MOST_STEPS).ok_or_else(refused)?
     } else {
         null
     };

@@ -188,11 +188,11 @@ impl<'a> Ground<'a> {
     }
 
     /// The same hypothesis with the noise as it is known now.
-    pub fn again(&self, fit: Refit<'a>, steps: usize) -> Option<Refit<'a>> {
-        let Refit { hypothesis, mut problem, x, .. } = fit;
+    pub fn again(&self, fit: &Refit<'a>, steps: usize) -> Option<Refit<'a>> {
+        let mut problem = fit.problem.clone();
         problem.noise_rad.clone_from(&self.noise_rad);
         problem.colour.clone_from(&self.colour);
-        self.descend(&hypothesis, problem, x, steps)
+        self.descend(&fit.hypothesis, problem, fit.x.clone(), steps)
     }
 
     /// Takes the noise from what a fit leaves where the motion has no power; whether that changes anything that counts.

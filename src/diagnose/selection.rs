@@ -3,9 +3,9 @@
 use rayon::prelude::*;
 
 use super::Cause;
-use crate::model::Parameter;
 use super::refit::{self, Ground, Hypothesis, Refit};
 use super::screen::{Score, Screen};
+use crate::model::Parameter;
 use crate::progress::Progress;
 
 /// Fits from which pairs are built.
@@ -89,12 +89,12 @@ fn with_refined_noise<'a>(ground: &mut Ground<'a>, fits: Vec<Refit<'a>>) -> Vec<
     let again = |fit: Refit<'a>| {
         let worth = fit.hypothesis.causes.is_empty() || fit.chi2 < HOPELESS * (least + HOPELESS);
         match (changed, worth) {
-            (true, _) => ground.again(fit, if worth { refit::MOST_STEPS } else { 0 }),
-            (false, true) if !fit.converged => ground.again(fit, refit::MOST_STEPS),
-            _ => Some(fit),
+            (true, _) => ground.again(&fit, if worth { refit::MOST_STEPS } else { 0 }).unwrap_or(fit),
+            (false, true) if !fit.converged => ground.again(&fit, refit::MOST_STEPS).unwrap_or(fit),
+            _ => fit,
         }
     };
-    fits.into_par_iter().filter_map(again).collect()
+    fits.into_par_iter().map(again).collect()
 }
 
 /// One effect, from every start that may lead to its minimum.

@@ -50,6 +50,8 @@ pub struct Weighed<'a> {
     pub ln_evidence: f64,
     /// Posterior.
     pub probability: f64,
+    /// Posterior where nothing outside the table is at work.
+    pub if_named: f64,
 }
 
 /// The verdict.
@@ -87,6 +89,7 @@ pub fn weigh<'a>(
     let best = (0..fits.len()).max_by(|a, b| posterior[*a].total_cmp(&posterior[*b])).unwrap_or(0);
     let (latents, added_n_m) = remainder(&fits[best], fits[best].chi2 / values as f64);
     posterior.push(posterior[best] + evidence::PRIOR_UNKNOWN.ln() + unknown_gain(&latents, added_n_m));
+    let if_named = normalised(&posterior[..fits.len()]);
     let mut probability = normalised(&posterior);
     let mut unknown = probability.pop().unwrap_or(0.0);
     // a support in step with the swing is a stand-in for what is not known
@@ -97,10 +100,12 @@ pub fn weigh<'a>(
             unknown += std::mem::take(probability);
         }
     }
-    let mut weighed: Vec<Weighed<'a>> = (fits.into_iter().zip(ln).zip(probability))
-        .map(|((fit, ln_evidence), probability)| Weighed { fit, ln_evidence, probability })
+    let mut weighed: Vec<Weighed<'a>> = (fits.into_iter().zip(ln).zip(probability.into_iter().zip(if_named)))
+        .map(|((fit, ln_evidence), (probability, if_named))| Weighed { fit, ln_evidence, probability, if_named })
         .collect();
-    weighed.sort_by(|a, b| b.probability.total_cmp(&a.probability));
+    // where the unknown takes all, their order among themselves still counts
+    let order = |w: &Weighed<'_>| (w.probability, w.if_named);
+    weighed.sort_by(|a, b| order(b).partial_cmp(&order(a)).unwrap_or(std::cmp::Ordering::Equal));
     (weighed, unknown, latents)
 }
 
