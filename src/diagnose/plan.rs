@@ -1,0 +1,68 @@
+//! Before an experiment: what a planned recording could show, and what it could tell apart.
+
+use super::adequacy::{Detectable, detectable};
+use super::refit::{Ground, Hypothesis};
+use super::screen::Screen;
+use super::{Cause, base_of};
+use crate::error::{Error, Result};
+use crate::experiment::Experiment;
+use crate::fit::Record;
+use crate::model::observe::chord_angles_rad;
+use crate::model::{ForwardModel, State, Trajectory};
+
+/// A recording that is planned.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Plan {
+    /// Its length.
+    pub duration_s: f64,
+    /// Rows a second.
+    pub rate_hz: f64,
+    /// Standard deviation of the noise of every angle.
+    pub noise_rad: f64,
+}
+
+/// What a recording of the experiment's own release would show of every effect that its base model lacks.
+///
+/// # Errors
+/// [`Error::Simulation`] where the specimen cannot swing.
+pub fn planned(experiment: &Experiment, plan: &Plan) -> Result<Vec<Detectable>> {
+    let record = [recorded(experiment, plan)?];
+    let marks = record[0].links();
+    let (base, beliefs) = base_of(experiment, marks)?;
+    let causes: Vec<Cause> = Cause::ALL.into_iter().filter(|c| c.may_be_missing(experiment, &base, marks)).collect();
+    let ground = Ground {
+        records: &record,
+        experiment,
+        base,
+        beliefs,
+        noise_rad: vec![vec![plan.noise_rad; marks]],
+        colour: vec![vec![0.0; marks]],
+        step_error_rad: (1e-3 * plan.noise_rad).clamp(1e-10, 1e-6),
+    };
+    let nothing = Hypothesis::default();
+    let problem = ground.problem(&nothing)?;
+    let mut x = problem.start_values()?;
+    x.extend(&experiment.model.release_rad);
+    x.resize(x.len() + marks, 0.0);
+    let refused = || Error::Simulation { detail: "the planned swing cannot be integrated; check [model]".into() };
+    let null = ground.descend(&nothing, problem, x, 1).ok_or_else(refused)?;
+    let screen = Screen::at(&ground, &null).ok_or_else(refused)?;
+    Ok(detectable(&screen.scores(&causes), &causes))
+}
+
+/// The base model's own swing, released at rest, without noise.
+fn recorded(experiment: &Experiment, plan: &Plan) -> Result<Record> {
+    let model = ForwardModel::of(experiment)?;
+    let release = State::released(model.chain(), &experiment.model.release_rad)?;
+    let swing = Trajectory::swing(&model, &release, 0.0, plan.duration_s)?;
+    let rows = (plan.duration_s * plan.rate_hz).floor() as usize + 1;
+    let t_s: Vec<f64> = (0..rows).map(|row| row as f64 / plan.rate_hz).collect();
+    let chords: Vec<Vec<f64>> = t_s.iter().map(|t| chord_angles_rad(model.chain(), &swing.at(*t).theta_rad)).collect();
+    let marks = model.chain().groups().len();
+    Ok(Record {
+        path: "a planned recording".into(),
+        theta_rad: (0..marks).map(|link| chords.iter().map(|c| Some(c[link])).collect()).collect(),
+        relative_sd: vec![vec![1.0; rows]; marks],
+        t_s,
+    })
+}
