@@ -8,7 +8,7 @@ use serde_json::{Map, Value, json};
 use super::Bar;
 use super::figure::Figure;
 use super::table::{Table, number, paragraph};
-use crate::diagnose::{self, Cause, Diagnosis, Place, Refit, Status, Weighed, locate};
+use crate::diagnose::{self, Cause, Detectable, Diagnosis, Place, Refit, Status, Weighed, locate};
 use crate::error::{Error, Result};
 use crate::experiment::Experiment;
 use crate::fit::Record;
@@ -16,6 +16,8 @@ use crate::model::{ForwardModel, Parameter};
 use crate::output::OutputFile;
 use crate::series::AngleSeries;
 
+/// Longest planned recording.
+const MOST_ROWS: f64 = 1e6;
 /// Candidates listed on the page.
 const LISTED: usize = 6;
 /// Candidates written to the file.
@@ -27,12 +29,13 @@ const WRITTEN: usize = 25;
 Examples:
   freeswing diagnose angles.csv --config videos/kapton.toml
   freeswing diagnose small.csv large.csv --config experiment.toml --json diagnosis.json
+  freeswing diagnose --detectable --config experiment.toml --duration 60 --rate 30 --noise-rad 3e-4
 
 The base model is that of `fit`: the joint's spring and damper, every effect named in [model.effects], and each recording's start; of one link
 the hinge's viscous damper. All other effects are candidates, those of the camera first.")]
 pub struct DiagnoseArgs {
     /// Tables of angles of one specimen; `-` is standard input.
-    #[arg(required = true, value_name = "ANGLES")]
+    #[arg(required_unless_present = "detectable", conflicts_with = "detectable", value_name = "ANGLES")]
     angles: Vec<PathBuf>,
     /// The experiment file: specimen, rig and base model.
     #[arg(long, value_name = "FILE")]
@@ -49,6 +52,24 @@ pub struct DiagnoseArgs {
     /// Use rows before this stamp.
     #[arg(long, value_name = "S", default_value_t = f64::INFINITY, hide_default_value = true, allow_negative_numbers = true)]
     until: f64,
+    /// Predict a single recording from this stamp on, fitted before it [default: two thirds through it].
+    #[arg(long, value_name = "S", allow_negative_numbers = true)]
+    predict_from: Option<f64>,
+    /// Judge the base model by this many recordings made from it and fitted anew, not by their residuals to first order.
+    #[arg(long, value_name = "N", default_value_t = 0)]
+    bootstraps: usize,
+    /// Before an experiment: what a recording of the file's release would show of each effect, and what it would confuse.
+    #[arg(long)]
+    detectable: bool,
+    /// Length of the planned recording.
+    #[arg(long, value_name = "S", default_value_t = 60.0, requires = "detectable")]
+    duration: f64,
+    /// Rows a second of the planned recording.
+    #[arg(long, value_name = "HZ", default_value_t = 30.0, requires = "detectable")]
+    rate: f64,
+    /// Noise of the planned recording's angles.
+    #[arg(long, value_name = "RAD", default_value_t = 1e-3, requires = "detectable")]
+    noise_rad: f64,
     /// Nothing on standard output, no progress.
     #[arg(long)]
     quiet: bool,
@@ -61,6 +82,9 @@ impl DiagnoseArgs {
     /// One line: what, where, what to do.
     pub fn run(&self) -> Result<()> {
         let experiment = Experiment::read(&self.config)?;
+        if self.detectable {
+            return self.plan(&experiment);
+        }
         let marks = ForwardModel::of(&experiment)?.chain().groups().len();
         let records = (self.angles.iter())
             .map(|path| {
@@ -77,7 +101,7 @@ impl DiagnoseArgs {
         let figure = self.figure.as_deref().map(OutputFile::create).transpose()?;
         let bar = Bar::new(self.quiet);
         let prepared = diagnose::prepare(&records, &experiment)?;
-        let diagnosis = diagnose::diagnose(&prepared, &experiment, &bar)?;
+        let diagnosis = diagnose::diagnose(&prepared, &experiment, &self.options(), &bar)?;
         drop(bar);
         let report = Report { diagnosis: &diagnosis, specimen: &experiment.specimen.name };
         let alone = figure.as_ref().is_some_and(OutputFile::is_standard_output);
@@ -87,6 +111,66 @@ impl DiagnoseArgs {
         }
         super::deliver(&text, &report.json(), json)
     }
+}
+
+impl DiagnoseArgs {
+    fn options(&self) -> diagnose::Options {
+        diagnose::Options { bootstraps: self.bootstraps, predict_from_s: self.predict_from }
+    }
+
+    /// What a planned recording could show.
+    fn plan(&self, experiment: &Experiment) -> Result<()> {
+        for (option, value) in [("--duration", self.duration), ("--rate", self.rate), ("--noise-rad", self.noise_rad)] {
+            if !(value.is_finite() && value > 0.0) {
+                let message = format!("{value}: must be a positive number");
+                return Err(Error::Option { option: option.to_owned(), message });
+            }
+        }
+        let plan = diagnose::Plan { duration_s: self.duration, rate_hz: self.rate, noise_rad: self.noise_rad };
+        if !(plan.duration_s * plan.rate_hz <= MOST_ROWS) {
+            let message = "too many rows; give a shorter --duration or a lower --rate".to_owned();
+            return Err(Error::Option { option: "--duration".to_owned(), message });
+        }
+        let json = self.json.as_deref().map(OutputFile::create).transpose()?;
+        let limits = diagnose::planned(experiment, &plan)?;
+        let heading = format!(
+            "{}: {} s at {} Hz with {} mrad of noise would show\n",
+            experiment.specimen.name,
+            plan.duration_s,
+            plan.rate_hz,
+            number(1e3 * plan.noise_rad, 3)
+        );
+        let text = if self.quiet { String::new() } else { heading + &limits_table(&limits) };
+        super::deliver(&text, &json!({"schema": "freeswing.diagnosis/1", "detectable": limits_json(&limits)}), json)
+    }
+}
+
+fn limits_table(limits: &[Detectable]) -> String {
+    let mut table = Table::new(["effect", "from", "named from", "unit", "not told from"]);
+    for limit in limits {
+        let amount = |value: f64| if value.is_finite() { number(value, 2) } else { "never".to_owned() };
+        table.row([
+            limit.cause.id().to_owned(),
+            amount(limit.smallest),
+            amount(limit.named),
+            limit.parameter.unit().to_owned(),
+            names(&limit.confused_with, ""),
+        ]);
+    }
+    table.text()
+}
+
+fn limits_json(limits: &[Detectable]) -> Value {
+    let one = |d: &Detectable| {
+        let value = json!({
+            "smallest": d.smallest.is_finite().then_some(d.smallest),
+            "named_from": d.named.is_finite().then_some(d.named),
+            "unit": d.parameter.unit(),
+            "confused_with": d.confused_with.iter().map(|c| c.id()).collect::<Vec<_>>(),
+        });
+        (d.cause.id().to_owned(), value)
+    };
+    Value::Object(limits.iter().map(one).collect())
 }
 
 struct Report<'a> {
@@ -145,16 +229,7 @@ impl Report<'_> {
             return;
         }
         text.push_str("\nThis recording would have shown\n");
-        let mut table = Table::new(["effect", "from", "unit", "not told from"]);
-        for limit in &self.diagnosis.detectable {
-            table.row([
-                limit.cause.id().to_owned(),
-                if limit.smallest.is_finite() { number(limit.smallest, 2) } else { "never".to_owned() },
-                limit.parameter.unit().to_owned(),
-                names(&limit.confused_with, ""),
-            ]);
-        }
-        text.push_str(&table.text());
+        text.push_str(&limits_table(&self.diagnosis.detectable));
     }
 
     fn statement(&self) -> String {
@@ -256,6 +331,7 @@ impl Report<'_> {
                 "effects": verdict.effects.iter().map(|c| c.id()).collect::<Vec<_>>(),
                 "class": verdict.class.iter().map(|c| c.id()).collect::<Vec<_>>(),
                 "probability": verdict.probability,
+                "class_probability": verdict.class_probability,
                 "unknown_probability": verdict.unknown,
                 "statement": self.statement(),
                 "to_decide": verdict.to_decide,
@@ -267,10 +343,7 @@ impl Report<'_> {
                     "baseline_rmse_rad": h.baseline_rad, "augmented_rmse_rad": h.augmented_rad,
                 })
             }),
-            "detectable": diagnosis.detectable.iter().map(|d| (d.cause.id().to_owned(), json!({
-                "smallest": d.smallest.is_finite().then_some(d.smallest), "unit": d.parameter.unit(),
-                "confused_with": d.confused_with.iter().map(|c| c.id()).collect::<Vec<_>>(),
-            }))).collect::<Map<_, _>>(),
+            "detectable": limits_json(&diagnosis.detectable),
         })
     }
 }

@@ -10,10 +10,11 @@ use rand::rngs::StdRng;
 use rand_distr::{Distribution, StandardNormal};
 use rayon::prelude::*;
 
-use super::Cause;
+use super::{Cause, selection};
 use super::refit::{Ground, Refit};
 use super::screen::{Score, Screen};
 use crate::model::Parameter;
+use crate::progress::Progress;
 
 /// Replicates of the residuals.
 const REPLICATES: usize = 500;
@@ -21,6 +22,10 @@ const REPLICATES: usize = 500;
 const WINDOW: usize = 40;
 /// An effect is detected at this many standard deviations.
 const DETECTED: f64 = 4.0;
+/// An effect is named when it is this many standard deviations from its nearest rival.
+const NAMED: f64 = 5.0;
+/// Columns that differ by less than this part do the same.
+const NEVER_TOLD: f64 = 1e-3;
 /// Two effects whose columns go together by more than this cannot be named apart at twice the size at which they are detected.
 const CONFUSED: f64 = 0.93;
 
@@ -33,6 +38,8 @@ pub struct Detectable {
     pub parameter: Parameter,
     /// The amount; infinite where no amount can be told from the base model.
     pub smallest: f64,
+    /// From this amount on its name is told from every other single effect's; infinite where it never is.
+    pub named: f64,
     /// Effects that would do nearly the same.
     pub confused_with: Vec<Cause>,
 }
@@ -47,10 +54,18 @@ pub struct Adequacy {
 }
 
 /// Judges the base model's fit.
-pub fn adequacy(ground: &Ground<'_>, null: &Refit<'_>, causes: &[Cause]) -> Adequacy {
+///
+/// With `bootstraps` whole recordings are made from it and fitted anew, that many; otherwise only their residuals, to first order.
+pub fn adequacy(
+    ground: &Ground<'_>,
+    null: &Refit<'_>,
+    causes: &[Cause],
+    bootstraps: usize,
+    progress: &dyn Progress,
+) -> Adequacy {
     let nothing = Adequacy { p_value: 0.0, detectable: Vec::new() };
     let Some(screen) = Screen::at(ground, null) else { return nothing };
-    let scores = screen.scores(causes);
+    let scores = screen.scores(&selection::cheap(ground, causes));
     let basis = &screen.projection.basis;
     let statistics = |residual: &DVector<f64>| {
         let score = scores
@@ -67,16 +82,42 @@ pub fn adequacy(ground: &Ground<'_>, null: &Refit<'_>, causes: &[Cause]) -> Adeq
         let mean_square = residual.norm_squared() / residual.len() as f64;
         [score / mean_square, window / mean_square, (neighbours / residual.norm_squared().max(1e-300)).abs()]
     };
-    let replicates: Vec<[f64; 3]> = (0..REPLICATES as u64)
-        .into_par_iter()
-        .map(|seed| {
+    let replicates: Vec<[f64; 3]> = if bootstraps > 0 {
+        progress.begin("bootstraps", Some(bootstraps as u64));
+        let of = |seed: u64| {
+            let residual = replicate(ground, null, seed);
+            progress.advance(1);
+            residual.map(|r| statistics(&r))
+        };
+        (0..bootstraps as u64).into_par_iter().filter_map(of).collect()
+    } else {
+        let of = |seed: u64| {
             let mut random = StdRng::seed_from_u64(seed);
             let noise = DVector::from_fn(basis.nrows(), |_, _| StandardNormal.sample(&mut random));
             statistics(&(&noise - basis * basis.tr_mul(&noise)))
-        })
-        .collect();
+        };
+        (0..REPLICATES as u64).into_par_iter().map(of).collect()
+    };
     let own = statistics(&screen.projection.residual);
     Adequacy { p_value: ranked(&own, &replicates), detectable: detectable(&scores, causes) }
+}
+
+/// The residuals, over the noise, of the base model fitted to a recording that it made itself, with noise as it was found.
+fn replicate(ground: &Ground<'_>, null: &Refit<'_>, seed: u64) -> Option<DVector<f64>> {
+    let mut random = StdRng::seed_from_u64(seed);
+    let mut records = ground.records.to_vec();
+    for (index, record) in records.iter_mut().enumerate() {
+        let mut noise = vec![0.0; record.links()];
+        for value in null.problem.predict(index, &null.x, false).ok()?.values {
+            let fresh: f64 = StandardNormal.sample(&mut random);
+            let rho = ground.colour[index][value.link];
+            noise[value.link] = rho * noise[value.link] + (1.0 - rho * rho).sqrt() * fresh;
+            let sd_rad = ground.noise_rad[index][value.link] * record.relative_sd[value.link][value.row];
+            record.theta_rad[value.link][value.row] = Some(value.predicted_rad + sd_rad * noise[value.link]);
+        }
+    }
+    let again = ground.on(&records).refit(&null.hypothesis, null, &[])?;
+    again.linearised().map(|(residual, _)| residual.rows(0, ground.values()).into_owned())
 }
 
 /// The share of replicates whose least rank is as small as the recording's.
@@ -97,13 +138,16 @@ pub fn detectable(scores: &[Score], causes: &[Cause]) -> Vec<Detectable> {
     let of = |cause: &Cause| {
         let parameter = cause.parameters()[0];
         let Some(score) = scores.iter().find(|s| s.cause == *cause) else {
-            return Detectable { cause: *cause, parameter, smallest: f64::INFINITY, confused_with: Vec::new() };
+            return Detectable { cause: *cause, parameter, smallest: f64::INFINITY, named: f64::INFINITY, confused_with: Vec::new() };
         };
         let confused = |other: &&Score| other.cause != *cause && together(score, other) > CONFUSED;
+        let nearest = scores.iter().filter(|o| o.cause != *cause).map(|o| together(score, o)).fold(0.0, f64::max);
+        let apart = (1.0 - nearest * nearest).max(0.0).sqrt();
         Detectable {
             cause: *cause,
             parameter,
             smallest: DETECTED * score.sd,
+            named: if apart > NEVER_TOLD { NAMED * score.sd / apart } else { f64::INFINITY },
             confused_with: scores.iter().filter(confused).map(|s| s.cause).collect(),
         }
     };

@@ -5,10 +5,13 @@ use rayon::prelude::*;
 use super::latent::{Filter, Latent, likeliest};
 use super::refit::Refit;
 use super::surroundings::{Surroundings, motion_at};
-use super::{Cause, Place};
+use super::{Cause, Place, noise};
 use crate::fit::{Residual, Residuals, Verdict};
+use crate::model::observe::chord_angles_rad;
 use crate::model::{Parameter, Partials};
 
+/// Power of the motion at a frequency, over its largest, from which on a torque of that frequency is in step with it.
+const IN_STEP: f64 = 3e-4;
 /// Places of an unknown.
 const PLACES: [Place; 4] = [Place::Hinge, Place::Joint, Place::Air, Place::Camera];
 
@@ -40,6 +43,24 @@ fn typical(fit: &Refit<'_>, place: Place) -> f64 {
     let angles = fit.problem.records.iter().flat_map(|r| r.theta_rad.iter().flatten().flatten());
     let largest_rad = angles.fold(0.0f64, |a, b| a.max(b.abs()));
     0.3 * model.gravity_m_s2() * model.chain().static_moment_kg_m(0) * largest_rad
+}
+
+/// Whether a support would move at a frequency at which the base model's own motion has power. Such a support can stand for any torque in step with
+/// the swing, so it names nothing.
+pub fn is_in_step(null: &Refit<'_>, frequency_hz: f64) -> bool {
+    (0..null.problem.records.len()).any(|record| {
+        let Some((model, swing, true_s)) = null.motion(record) else { return false };
+        let chords: Vec<Vec<f64>> =
+            true_s.iter().map(|t| chord_angles_rad(model.chain(), &swing.at(*t).theta_rad)).collect();
+        let span_s = true_s[true_s.len() - 1] - true_s[0];
+        let bin = (frequency_hz * span_s).round() as usize;
+        (0..null.problem.marks()).any(|link| {
+            let power = noise::spectrum(&chords.iter().map(|c| c[link]).collect::<Vec<f64>>());
+            let strongest = power[1..].iter().copied().fold(0.0, f64::max);
+            let near = bin.saturating_sub(1)..(bin + 2).min(power.len());
+            power[near.start.min(power.len())..near.end].iter().any(|p| *p > IN_STEP * strongest)
+        })
+    })
 }
 
 /// Root mean square of the torque that the added effects exert, on all links together (N·m).

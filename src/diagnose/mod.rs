@@ -17,6 +17,7 @@ pub mod heldout;
 pub mod latent;
 pub mod locate;
 pub mod noise;
+pub mod plan;
 pub mod refit;
 pub mod screen;
 pub mod selection;
@@ -35,6 +36,7 @@ pub use adequacy::Detectable;
 pub use heldout::HeldOut;
 pub use latent::Latent;
 pub use locate::Departure;
+pub use plan::{Plan, planned};
 pub use refit::{Ground, Hypothesis, Refit};
 pub use verdict::{Status, Verdict, Weighed};
 
@@ -91,6 +93,15 @@ impl<'a> Diagnosis<'a> {
         let named = |w: &&Weighed<'a>| w.fit.hypothesis.causes == self.verdict.effects;
         self.weighed.iter().find(named).map_or(self.null(), |w| &w.fit)
     }
+}
+
+/// What may be asked of a diagnosis.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub struct Options {
+    /// Recordings made anew from the base model and fitted, to judge it by; with none, residuals are made anew to first order.
+    pub bootstraps: usize,
+    /// The stamp from which on a single recording is predicted; two thirds through it otherwise.
+    pub predict_from_s: Option<f64>,
 }
 
 /// What the recordings, cleaned of outliers, are held against.
@@ -158,6 +169,7 @@ fn colour(residuals: &[(usize, usize, f64)], like: &[Vec<f64>]) -> Vec<Vec<f64>>
 pub fn diagnose<'a>(
     prepared: &'a Prepared,
     experiment: &'a Experiment,
+    options: &Options,
     progress: &dyn Progress,
 ) -> Result<Diagnosis<'a>> {
     let records = &prepared.records;
@@ -205,8 +217,8 @@ pub fn diagnose<'a>(
     diagnosis.departure = locate::departure(diagnosis.null());
     diagnosis.added_torque_n_m = locate::added_torque_n_m(&diagnosis.weighed[0].fit);
     diagnosis.energy_shares = locate::energy_shares(&diagnosis.weighed[0].fit);
-    diagnosis.held_out = heldout::held_out(&ground, diagnosis.null(), diagnosis.named(), None);
-    let adequacy = adequacy::adequacy(&ground, diagnosis.null(), &causes);
+    diagnosis.held_out = heldout::held_out(&ground, diagnosis.null(), diagnosis.named(), options.predict_from_s);
+    let adequacy = adequacy::adequacy(&ground, diagnosis.null(), &causes, options.bootstraps, progress);
     (diagnosis.p_value, diagnosis.detectable) = (adequacy.p_value, adequacy.detectable);
     Ok(diagnosis)
 }

@@ -76,7 +76,7 @@ pub fn of_all(residual: &[f64]) -> Noise {
 }
 
 /// Power of each frequency from zero to half the rate, scaled so that white noise has its variance.
-fn spectrum(values: &[f64]) -> Vec<f64> {
+pub(super) fn spectrum(values: &[f64]) -> Vec<f64> {
     let n = values.len();
     let window = |i: usize| 0.5 - 0.5 * (std::f64::consts::TAU * (i as f64 + 0.5) / n as f64).cos();
     let mut buffer: Vec<Complex<f64>> =

@@ -16,12 +16,14 @@ use crate::model::{Camera, ForwardModel, Parameter, State, Trajectory};
 const YIELD_SHARE: f64 = 0.2;
 /// A motion that leaves more than this part of the swing has lost step.
 const OUT_OF_STEP: f64 = 0.35;
-/// Steps of the integration for each row of the recording before a motion is given up.
-const STEPS_EACH_ROW: usize = 5;
+/// Steps of the integration for each second of the recording before a motion is given up.
+const STEPS_EACH_SECOND: f64 = 300.0;
 /// The corners of a hysteresis cost many steps: its motion need not be as exact.
 const CORNERS: f64 = 20.0;
 /// Rods between two marks while bending all along the strip is only a candidate.
 const CANDIDATE_PIECES: usize = 3;
+/// Losses imitate each other closely: only a weakly damped step goes along the valley between them.
+const FIRST_DAMPING: f64 = 1e-8;
 /// Steps of a first descent, and of one that is worth it.
 const FEW_STEPS: usize = 12;
 pub(super) const MOST_STEPS: usize = 30;
@@ -113,7 +115,7 @@ impl<'a> Ground<'a> {
         problem.colour.clone_from(&self.colour);
         problem.beliefs = beliefs;
         problem.accuracy.step_error_rad = self.step_error_rad;
-        problem.accuracy.most_steps = STEPS_EACH_ROW * self.records.iter().map(Record::len).max().unwrap_or(0) + 1000;
+        problem.accuracy.most_steps = 1000 + (STEPS_EACH_SECOND * self.longest_s()) as usize;
         if hypothesis.causes.contains(&Cause::JointHysteretic) {
             problem.accuracy.step_error_rad *= CORNERS;
         }
@@ -227,7 +229,7 @@ impl<'a> Ground<'a> {
     /// Descends from given variables.
     pub fn descend(&self, hypothesis: &Hypothesis, problem: Problem<'a>, x: Vec<f64>, most_steps: usize) -> Option<Refit<'a>> {
         let lower = problem.lower();
-        let descent = Descent { most_steps, enough: 0.02, ..Descent::default() };
+        let descent = Descent { most_steps, enough: 0.02, damping: FIRST_DAMPING, ..Descent::default() };
         let outcome = descent.run(x, &lower, |x| problem.blocks(x))?;
         Some(Refit::of(hypothesis.clone(), problem, outcome))
     }
@@ -263,6 +265,10 @@ impl<'a> Ground<'a> {
             rows.filter_map(bend).fold(0.0, f64::max)
         };
         self.records.iter().map(of).fold(1e-6, f64::max)
+    }
+
+    fn longest_s(&self) -> f64 {
+        self.records.iter().map(|r| r.t_s[r.len() - 1] - r.t_s[0]).fold(0.0, f64::max)
     }
 
     /// Number of values.
@@ -334,8 +340,13 @@ impl<'a> Refit<'a> {
 
     /// Whether the motion has lost step with a recording: what is left is a good part of the swing.
     pub fn is_out_of_step(&self) -> bool {
-        (0..self.problem.records.len()).any(|record| {
-            let Ok(prediction) = self.problem.predict(record, &self.x, false) else { return true };
+        self.left_share() > OUT_OF_STEP
+    }
+
+    /// What is left of the worst recording, as a part of the swing: root mean squares of both.
+    pub fn left_share(&self) -> f64 {
+        let of = |record: usize| {
+            let Ok(prediction) = self.problem.predict(record, &self.x, false) else { return f64::INFINITY };
             let data = &self.problem.records[record];
             let (mut left, mut whole) = (0.0, 0.0);
             for value in &prediction.values {
@@ -343,8 +354,9 @@ impl<'a> Refit<'a> {
                 left += (measured_rad - value.predicted_rad).powi(2);
                 whole += measured_rad * measured_rad;
             }
-            left > OUT_OF_STEP * OUT_OF_STEP * whole
-        })
+            (left / whole.max(1e-300)).sqrt()
+        };
+        (0..self.problem.records.len()).map(of).fold(0.0, f64::max)
     }
 
     /// Residuals and their derivatives with all variables, both over the noise; `None` where the motion cannot be integrated.

@@ -14,6 +14,8 @@ const SEEDS: usize = 6;
 const SOMETHING_LEFT: f64 = 4.0;
 /// A pair that promises more than this many times the least χ² is not fitted.
 const PROMISING: f64 = 3.0;
+/// A base model that leaves this part of the swing lacks something, whatever the noise.
+const MUCH_LEFT: f64 = 0.05;
 /// A fit whose χ² is this many times the best one's (and this much more) is not made any better.
 const HOPELESS: f64 = 10.0;
 /// A fit that is worse by this than one that only adds an effect may be in a false minimum.
@@ -30,13 +32,11 @@ const FEWEST_PAIRS: usize = 6;
 
 /// The fits of all hypotheses, the base model first; what the best of them leaves refines the noise.
 pub fn fits<'a>(ground: &mut Ground<'a>, null: Refit<'a>, causes: &[Cause], progress: &dyn Progress) -> Vec<Refit<'a>> {
-    let scores = Screen::at(ground, &null).map(|s| s.scores(causes)).unwrap_or_default();
+    let scores = Screen::at(ground, &null).map(|s| s.scores(&cheap(ground, causes))).unwrap_or_default();
     let out_of_step = null.is_out_of_step();
     progress.begin("effects", Some(causes.len() as u64));
     let singles = causes.par_iter().filter_map(|cause| {
-        let b = std::time::Instant::now();
         let fit = single(ground, &null, *cause, scores.iter().find(|s| s.cause == *cause), out_of_step);
-        T(&format!("{cause}"), b, &fit);
         progress.advance(1);
         fit
     });
@@ -45,14 +45,10 @@ pub fn fits<'a>(ground: &mut Ground<'a>, null: Refit<'a>, causes: &[Cause], prog
     all.extend(singles);
     let mut all = with_refined_noise(ground, all);
     let (null, singles) = (&all[0], &all[1..]);
-    let b = std::time::Instant::now();
     let pairs = promising(ground, null, singles, causes);
-    T("screen pairs", b, &None);
     progress.begin("pairs", Some(pairs.len() as u64));
     let pairs = pairs.par_iter().filter_map(|(seed, score)| {
-        let b = std::time::Instant::now();
         let fit = ground.refit(&score.hypothesis(&seed.hypothesis), seed, &score.start);
-        T(&format!("{:?}", score.hypothesis(&seed.hypothesis)), b, &fit);
         progress.advance(1);
         fit
     });
@@ -84,18 +80,21 @@ fn without_stragglers<'a>(ground: &Ground<'a>, mut fits: Vec<Refit<'a>>) -> Vec<
     fits
 }
 
-/// The same fits with the noise that the best of them leaves, where that is less than was thought.
+/// The same fits with the noise that the best of them leaves; those that have not yet converged, and are worth it, go on.
 fn with_refined_noise<'a>(ground: &mut Ground<'a>, fits: Vec<Refit<'a>>) -> Vec<Refit<'a>> {
     let best = fits.iter().min_by(|a, b| a.chi2.total_cmp(&b.chi2));
-    if !best.is_some_and(|best| ground.refine_noise(best)) {
-        return fits;
-    }
+    let changed = best.is_some_and(|best| ground.refine_noise(best));
     let ground = &*ground;
-    let least = fits.iter().map(|f| f.chi2).fold(f64::INFINITY, f64::min);
-    let worth = |fit: &Refit<'a>| fit.hypothesis.causes.is_empty() || fit.chi2 < HOPELESS * (least + HOPELESS);
-    let b = std::time::Instant::now();
-    let r = fits.into_par_iter().filter_map(|fit| { let steps = if worth(&fit) { refit::MOST_STEPS } else { 0 }; ground.again(fit, steps) }).collect();
-    T("refined", b, &None); r
+    let least = best.map_or(0.0, |best| best.chi2);
+    let again = |fit: Refit<'a>| {
+        let worth = fit.hypothesis.causes.is_empty() || fit.chi2 < HOPELESS * (least + HOPELESS);
+        match (changed, worth) {
+            (true, _) => ground.again(fit, if worth { refit::MOST_STEPS } else { 0 }),
+            (false, true) if !fit.converged => ground.again(fit, refit::MOST_STEPS),
+            _ => Some(fit),
+        }
+    };
+    fits.into_par_iter().filter_map(again).collect()
 }
 
 /// One effect, from every start that may lead to its minimum.
@@ -111,7 +110,7 @@ fn single<'a>(
         tries.push(softened(ground, null));
     }
     let values = ground.values() as f64;
-    let unexplained = null.chi2 > values + SOMETHING_LEFT * (2.0 * values).sqrt();
+    let unexplained = null.left_share() > MUCH_LEFT || null.chi2 > values + SOMETHING_LEFT * (2.0 * values).sqrt();
     if cause == Cause::RestCurl && unexplained {
         // a base model that has given its spring up says nothing about where that spring rests
         tries.push(ground.refit_anew(&Hypothesis::default().and(cause, None), &[]));
@@ -129,7 +128,10 @@ fn single<'a>(
         (_, Some(score)) => {
             let hypothesis = score.hypothesis(&null.hypothesis);
             let near = ground.refit(&hypothesis, null, &score.start);
-            if out_of_step && changes_pace(cause) && near.as_ref().is_none_or(Refit::is_out_of_step) {
+            let lost = out_of_step && changes_pace(cause) && near.as_ref().is_none_or(Refit::is_out_of_step);
+            // a base model may have damped away what a better one keeps: short stretches remember it
+            let slow = unexplained && is_loss(cause) && near.as_ref().is_none_or(|n| !n.converged);
+            if lost || slow {
                 tries.push(ground.refit_anew(&hypothesis, &score.start));
             }
             tries.push(near);
@@ -164,6 +166,17 @@ fn changes_pace(cause: Cause) -> bool {
     matches!(cause, Cause::TimeBase | Cause::HingeStiffness | Cause::AddedMass | Cause::JointCubicStiffness)
 }
 
+/// Whether an effect takes energy away, as the base model's own damper does.
+fn is_loss(cause: Cause) -> bool {
+    matches!(cause, Cause::HingeViscous | Cause::HingeCoulomb | Cause::AirLinear | Cause::AirQuadratic)
+}
+
+/// The effects that are screened: a hysteresis in each joint of a strip of many links costs more than all others, and is only fitted alone.
+pub(super) fn cheap(ground: &Ground<'_>, causes: &[Cause]) -> Vec<Cause> {
+    let strip = ground.base.contains(&Parameter::BendingStiffness);
+    causes.iter().copied().filter(|c| !(strip && *c == Cause::JointHysteretic)).collect()
+}
+
 /// The pairs whose χ² promises to be lowest, each from the better of its two singles.
 fn promising<'s, 'a>(
     ground: &Ground<'a>,
@@ -171,6 +184,7 @@ fn promising<'s, 'a>(
     singles: &'s [Refit<'a>],
     causes: &[Cause],
 ) -> Vec<(&'s Refit<'a>, Score)> {
+    let further = cheap(ground, causes);
     let mut seeds: Vec<&Refit<'a>> = singles.iter().filter(|s| s.chi2 < null.chi2 - 4.0).collect();
     seeds.sort_by(|a, b| a.chi2.total_cmp(&b.chi2));
     seeds.truncate(SEEDS);
@@ -180,7 +194,7 @@ fn promising<'s, 'a>(
         .filter_map(|(rank, seed)| {
             // every frequency of a moving support is dear
             let few: Vec<Cause> =
-                causes.iter().copied().filter(|c| rank < SCANNED || *c != Cause::SupportMotion).collect();
+                further.iter().copied().filter(|c| rank < SCANNED || *c != Cause::SupportMotion).collect();
             Some((*seed, Screen::at(ground, seed)?.scores(&few)))
         })
         .collect();
@@ -206,9 +220,4 @@ fn promising<'s, 'a>(
         kept <= FEWEST_PAIRS || p.0 < PROMISING * least + 100.0
     });
     pairs.into_iter().map(|(_, seed, score)| (seed, score)).collect()
-}
-
-#[allow(non_snake_case)]
-fn T(w: &str, b: std::time::Instant, f: &Option<Refit<'_>>) {
-    if std::env::var("DT").is_ok() { eprintln!("{w} {:.3} {:?}", b.elapsed().as_secs_f64(), f.as_ref().map(|f| (f.steps, f.converged, f.chi2))); }
 }

@@ -3,7 +3,8 @@
 use super::evidence::{self, normalised};
 use super::latent::Latent;
 use super::refit::Refit;
-use super::{Cause, Place};
+use super::{Cause, Place, locate};
+use crate::model::Parameter;
 
 /// A verdict stands alone when it is at least this probable.
 const ALONE: f64 = 0.8;
@@ -11,6 +12,9 @@ const ALONE: f64 = 0.8;
 const TOLD_APART: f64 = 0.05;
 /// A named law may be wrong by this part of its own torque before something unknown is suspected beside it.
 const LAW_SHARE: f64 = 0.005;
+
+/// Probabilities below this change nothing.
+const NEGLIGIBLE: f64 = 1e-4;
 
 /// What the recordings say.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -59,6 +63,8 @@ pub struct Verdict {
     pub class: Vec<Cause>,
     /// Of the answer as it is given.
     pub probability: f64,
+    /// That the truth is one of the hypotheses that make up the class.
+    pub class_probability: f64,
     /// Of anything outside the table.
     pub unknown: f64,
     /// The measurement that would split the class.
@@ -82,7 +88,15 @@ pub fn weigh<'a>(
     let (latents, added_n_m) = remainder(&fits[best], fits[best].chi2 / values as f64);
     posterior.push(posterior[best] + evidence::PRIOR_UNKNOWN.ln() + unknown_gain(&latents, added_n_m));
     let mut probability = normalised(&posterior);
-    let unknown = probability.pop().unwrap_or(0.0);
+    let mut unknown = probability.pop().unwrap_or(0.0);
+    // a support in step with the swing is a stand-in for what is not known
+    let null = fits.iter().position(|f| f.hypothesis.causes.is_empty());
+    for (fit, probability) in fits.iter().zip(&mut probability).filter(|(_, p)| **p > NEGLIGIBLE) {
+        let hz = fit.value(Parameter::SupportFrequency);
+        if hz.zip(null).is_some_and(|(hz, null)| locate::is_in_step(&fits[null], hz)) {
+            unknown += std::mem::take(probability);
+        }
+    }
     let mut weighed: Vec<Weighed<'a>> = (fits.into_iter().zip(ln).zip(probability))
         .map(|((fit, ln_evidence), probability)| Weighed { fit, ln_evidence, probability })
         .collect();
@@ -112,6 +126,7 @@ impl Verdict {
             effects: Vec::new(),
             class: Vec::new(),
             probability,
+            class_probability: probability,
             unknown,
             to_decide: None,
         };
@@ -137,7 +152,9 @@ impl Verdict {
             class.clone_from(&effects);
         }
         let to_decide = to_decide(&effects, &class, marks);
-        Self { status, effects, class, probability: best.probability, unknown, to_decide }
+        let within = |w: &&&Weighed<'_>| w.fit.hypothesis.causes.iter().all(|c| class.contains(c));
+        let class_probability = named.iter().filter(within).map(|w| w.probability).sum();
+        Self { status, effects, class, probability: best.probability, class_probability, unknown, to_decide }
     }
 }
 

@@ -28,11 +28,13 @@ pub struct Descent {
     pub enough: f64,
     /// A variable that is to stay where it is.
     pub fixed: Option<usize>,
+    /// Damping of the first step, in units of the normal matrix' diagonal: small where the start is known to be near.
+    pub damping: f64,
 }
 
 impl Default for Descent {
     fn default() -> Self {
-        Self { huber: f64::INFINITY, most_steps: 60, enough: 1e-5, fixed: None }
+        Self { huber: f64::INFINITY, most_steps: 60, enough: 1e-5, fixed: None, damping: 1e-4 }
     }
 }
 
@@ -90,7 +92,7 @@ impl Descent {
         let mut x = x;
         let mut blocks = evaluate(&x)?;
         let mut normals = self.normals(&blocks, x.len());
-        let (mut damping, mut growth) = (1e-4, 2.0);
+        let (mut damping, mut growth) = (self.damping, 2.0);
         let mut ending = Ending::LostPatience;
         let mut steps = 0;
         while steps < self.most_steps {

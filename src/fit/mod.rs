@@ -125,7 +125,7 @@ pub fn fit(records: &[Record], experiment: &Experiment, free: &[Parameter]) -> R
         detail: "no motion near the start values follows the recording; check [specimen] and [model]".into(),
     };
     let lower = problem.lower();
-    let robust = Descent { huber: 4.0, most_steps: 30, enough: 0.03, fixed: None };
+    let robust = Descent { huber: 4.0, most_steps: 30, enough: 0.03, ..Descent::default() };
     let first = robust.run(start, &lower, |x| problem.blocks(x)).ok_or_else(refused)?;
     let (kept, outliers) = without_outliers(&problem, &first.x)?;
     let problem = Problem { records: &kept, ..problem };

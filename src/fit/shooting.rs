@@ -92,7 +92,7 @@ pub fn multiple_shooting(problem: &mut Problem<'_>) -> Result<Shot> {
     problem.accuracy = Accuracy { step_error_rad: 3e-6, ..Accuracy::default() };
     let mut left_by_stretches = Vec::new();
     for (round, seam) in SEAMS.iter().enumerate() {
-        let descent = Descent { huber: 4.0, most_steps: STEPS_EACH, enough: 0.3, fixed: None };
+        let descent = Descent { huber: 4.0, most_steps: STEPS_EACH, enough: 0.3, ..Descent::default() };
         let Some(outcome) = descent.run(x.clone(), &lower, |x| blocks(problem, &stretches, x, *seam, pace_rad_s))
         else {
             break;
