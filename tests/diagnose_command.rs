@@ -109,13 +109,15 @@ fn assert_keys(of: &Value, keys: &[&str]) {
 #[test]
 fn dry_friction_is_named_with_its_size_and_place_and_drawn() {
     let folder = Folder::new();
-    let angles = folder.swing(BASE, "hinge_coulomb = 4.0e-7\n");
+    // both modes at once: one alone moves hinge and joint together, and friction could be in either
+    let base = BASE.replace("0.62", "0.9");
+    let angles = folder.swing(&base, "hinge_coulomb = 4.0e-7\n");
     let figure = folder.path("figure.svg");
-    let report = folder.diagnosis(&angles, BASE, &["--figure", figure.to_str().unwrap()]);
+    let report = folder.diagnosis(&angles, &base, &["--figure", figure.to_str().unwrap()]);
     assert_eq!(report["verdict"]["status"], "identified", "{:#}", report["verdict"]);
     assert_eq!(names(&report["verdict"]["effects"]), ["hinge_coulomb"]);
     assert_eq!(report["where"]["place"], "hinge");
-    assert!(report["where"]["energy_share"]["hinge"].as_f64().unwrap() > 0.9);
+    assert!(report["where"]["energy_share"]["hinge"].as_f64().unwrap() > 0.4);
     let friction = &report["candidates"][0]["parameters"]["hinge_coulomb"];
     let (value, sd) = (friction["value"].as_f64().unwrap(), friction["sd"].as_f64().unwrap());
     assert!((value - 4.0e-7).abs() < 3.0 * sd && sd < 4.0e-9, "{friction}");
