@@ -6,6 +6,7 @@ help:
 	@echo 'make demo      track videos/kapton.mp4 into demo/'
 	@echo 'make test      every test'
 	@echo 'make accuracy  the slow accuracy tests, optimised'
+	@echo 'make concealed find hidden effects in recordings made by another program, and score it'
 	@echo 'make bench     each stage, then the whole against ffmpeg and OpenCV'
 	@echo 'make lint      formatting, clippy, documentation; no warning passes'
 	@echo 'make clean     remove what was built or made'
@@ -29,6 +30,29 @@ test: setup
 accuracy: setup
 	cargo test --release --test accuracy --test identify --test fit -- --include-ignored --nocapture
 
+# Cases that are there are not made again, nor diagnosed again; `rm -r target/concealed/*/results` for a new build.
+BANKS = ode strip video
+# Debian's packages are for its own Python, which need not be the first on the path.
+PYTHON = OMP_NUM_THREADS=1 $(shell python3 -c 'import numpy, scipy' 2>/dev/null && echo python3 || echo /usr/bin/python3)
+FREESWING = $${CARGO_TARGET_DIR:-target}/release/freeswing
+
+concealed: $(BANKS:%=target/concealed/%/labels.json)
+	cargo build --release
+	@for bank in $(BANKS); do \
+	    FREESWING=$(FREESWING) fixtures/concealed/run.sh target/concealed/$$bank target/concealed/$$bank/results; \
+	    $(PYTHON) fixtures/concealed/score.py target/concealed/$$bank target/concealed/$$bank/results; \
+	done
+	@$(PYTHON) fixtures/concealed/baselines.py target/concealed/ode
+
+target/concealed/ode/labels.json: what = --cases 200
+target/concealed/strip/labels.json: what = --cases 24 --levels strip
+target/concealed/video/labels.json: what = --cases 8 --levels video
+target/concealed/%/labels.json: | setup-concealed
+	$(PYTHON) fixtures/concealed/generate.py --bank test --out $(@D) $(what)
+
+setup-concealed:
+	@scripts/setup concealed
+
 bench: setup
 	cargo bench
 	benches/paired.sh
@@ -42,4 +66,4 @@ clean:
 	cargo clean
 	rm -rf demo
 
-.PHONY: help setup demo test accuracy bench lint clean
+.PHONY: help setup setup-concealed demo test accuracy concealed bench lint clean

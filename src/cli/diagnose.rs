@@ -6,6 +6,7 @@ use std::path::PathBuf;
 use serde_json::{Map, Value, json};
 
 use super::Bar;
+use super::figure::Figure;
 use super::table::{Table, number, paragraph};
 use crate::diagnose::{self, Cause, Detectable, Diagnosis, Place, Refit, Status, Weighed, locate};
 use crate::error::{Error, Result};
@@ -42,6 +43,9 @@ pub struct DiagnoseArgs {
     /// Write all of it as JSON; `-` for standard output.
     #[arg(long, value_name = "FILE")]
     json: Option<PathBuf>,
+    /// Draw before and after as SVG; `-` for standard output.
+    #[arg(long, value_name = "FILE")]
+    figure: Option<PathBuf>,
     /// Use rows from this stamp on.
     #[arg(long, value_name = "S", default_value_t = f64::NEG_INFINITY, hide_default_value = true, allow_negative_numbers = true)]
     from: f64,
@@ -94,12 +98,17 @@ impl DiagnoseArgs {
             })
             .collect::<Result<Vec<Record>>>()?;
         let json = self.json.as_deref().map(OutputFile::create).transpose()?;
+        let figure = self.figure.as_deref().map(OutputFile::create).transpose()?;
         let bar = Bar::new(self.quiet);
         let prepared = diagnose::prepare(&records, &experiment)?;
         let diagnosis = diagnose::diagnose(&prepared, &experiment, &self.options(), &bar)?;
         drop(bar);
         let report = Report { diagnosis: &diagnosis, specimen: &experiment.specimen.name };
-        let text = if self.quiet { String::new() } else { report.text() };
+        let alone = figure.as_ref().is_some_and(OutputFile::is_standard_output);
+        let text = if self.quiet || alone { String::new() } else { report.text() };
+        if let Some(file) = figure {
+            file.commit(Figure::of(&diagnosis, &prepared, &experiment)?.svg().as_bytes())?;
+        }
         super::deliver(&text, &report.json(), json)
     }
 }

@@ -2,12 +2,14 @@
 
 mod bar;
 mod diagnose;
+mod figure;
 mod fit;
 mod identify;
 mod modes;
 mod paper;
 mod render;
 mod simulate;
+mod svg;
 mod table;
 mod track;
 

@@ -1,0 +1,256 @@
+//! `freeswing diagnose` as a user types it.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use assert_cmd::Command;
+use predicates::prelude::*;
+use predicates::str::contains;
+use serde_json::Value;
+
+const BASE: &str = "
+[model]
+k_eq_n_m_per_rad = 2.0e-4
+c_eq_n_m_s_per_rad = 2.0e-7
+release_rad = [0.5, 0.62]
+";
+const ONE_LINK: &str = "
+[specimen]
+[[specimen.links]]
+length_m = 0.66
+mass_kg = 0.1
+com_m = 0.66
+inertia_kg_m2 = 1e-5
+[model]
+release_rad = [0.6]
+[model.effects]
+hinge_viscous = 1e-3
+";
+/// The upper arm of a real double pendulum, as published, swinging alone.
+const REAL_ARM: &str = "
+[[specimen.links]]
+length_m = 0.1727
+mass_kg = 0.0938
+com_m = 0.1086
+inertia_kg_m2 = 4.375e-4
+[rig]
+gravity_m_s2 = 9.809
+[model]
+release_rad = [-1.6]
+[model.effects]
+hinge_viscous = 2.371e-4
+";
+
+struct Folder(tempfile::TempDir);
+
+impl Folder {
+    fn new() -> Self {
+        Self(tempfile::tempdir().unwrap())
+    }
+
+    fn path(&self, name: &str) -> PathBuf {
+        self.0.path().join(name)
+    }
+
+    fn write(&self, name: &str, text: &str) -> PathBuf {
+        fs::write(self.path(name), text).unwrap();
+        self.path(name)
+    }
+
+    /// 15 s of a swing with the effects given, which the base model lacks.
+    fn swing(&self, base: &str, effects: &str) -> PathBuf {
+        let heading = if base.contains("[model.effects]") { "" } else { "[model.effects]\n" };
+        let config = self.write("simulated.toml", &format!("{base}{heading}{effects}"));
+        let out = self.path("angles.csv");
+        freeswing("simulate")
+            .args(["--duration", "15", "--rate", "30", "--noise-rad", "1e-3"])
+            .arg("--config")
+            .arg(config)
+            .arg("--out")
+            .arg(&out)
+            .assert()
+            .success();
+        out
+    }
+
+    /// What a diagnosis with some further options writes.
+    fn diagnosis(&self, angles: &Path, base: &str, options: &[&str]) -> Value {
+        let config = self.write("base.toml", base);
+        let json = self.path("diagnosis.json");
+        freeswing("diagnose")
+            .arg(angles)
+            .arg("--config")
+            .arg(config)
+            .arg("--json")
+            .arg(&json)
+            .args(options)
+            .assert()
+            .success();
+        serde_json::from_str(&fs::read_to_string(json).unwrap()).unwrap()
+    }
+}
+
+fn freeswing(command: &str) -> Command {
+    let mut freeswing = Command::cargo_bin("freeswing").unwrap();
+    freeswing.arg(command);
+    freeswing
+}
+
+fn names(of: &Value) -> Vec<&str> {
+    of.as_array().unwrap().iter().map(|name| name.as_str().unwrap()).collect()
+}
+
+fn assert_keys(of: &Value, keys: &[&str]) {
+    for key in keys {
+        assert!(of.get(key).is_some(), "no {key} in {of:#}");
+    }
+}
+
+#[test]
+fn dry_friction_is_named_with_its_size_and_place_and_drawn() {
+    let folder = Folder::new();
+    // both modes at once: one alone moves hinge and joint together, and friction could be in either
+    let base = BASE.replace("0.62", "0.9");
+    let angles = folder.swing(&base, "hinge_coulomb = 4.0e-7\n");
+    let figure = folder.path("figure.svg");
+    let report = folder.diagnosis(&angles, &base, &["--figure", figure.to_str().unwrap()]);
+    assert_eq!(report["verdict"]["status"], "identified", "{:#}", report["verdict"]);
+    assert_eq!(names(&report["verdict"]["effects"]), ["hinge_coulomb"]);
+    assert_eq!(report["where"]["place"], "hinge");
+    assert!(report["where"]["energy_share"]["hinge"].as_f64().unwrap() > 0.4);
+    let friction = &report["candidates"][0]["parameters"]["hinge_coulomb"];
+    let (value, sd) = (friction["value"].as_f64().unwrap(), friction["sd"].as_f64().unwrap());
+    assert!((value - 4.0e-7).abs() < 3.0 * sd && sd < 4.0e-9, "{friction}");
+    let left = |key: &str| report["heldout"][key][0].as_f64().unwrap();
+    assert!(left("augmented_rmse_rad") < 0.3 * left("baseline_rmse_rad"), "{}", report["heldout"]);
+    let svg = fs::read_to_string(figure).unwrap();
+    assert!(svg.starts_with("<svg") && svg.ends_with("</svg>\n"));
+    for words in ["base model (before)", "with hinge_coulomb (after)", "predicted from here", "θ2 left (mrad)"] {
+        assert!(svg.contains(words), "{words}");
+    }
+    assert!(!svg.contains("NaN") && !svg.contains("inf"));
+}
+
+#[test]
+fn the_file_has_every_field_and_a_null_says_what_it_would_have_shown() {
+    let folder = Folder::new();
+    let angles = folder.swing(BASE, "");
+    let report = folder.diagnosis(&angles, BASE, &["--quiet"]);
+    assert_eq!(report["schema"], "freeswing.diagnosis/1");
+    assert_keys(&report, &["baseline", "where", "candidates", "verdict", "heldout", "detectable"]);
+    assert_keys(&report["baseline"], &["parameters", "rmse_rad", "noise_rad", "adequate", "p_value"]);
+    assert_keys(&report["baseline"]["parameters"]["k_eq_n_m_per_rad"], &["value", "sd"]);
+    let keys = ["place", "energy_share", "time_s", "amplitude_rad", "phase", "frequency_hz", "statement"];
+    assert_keys(&report["where"], &keys);
+    assert_keys(&report["where"]["energy_share"], &["hinge", "joint", "air"]);
+    for candidate in report["candidates"].as_array().unwrap() {
+        assert_keys(candidate, &["effects", "probability", "parameters", "rmse_rad", "bic"]);
+        for parameter in candidate["parameters"].as_object().unwrap().values() {
+            assert_keys(parameter, &["value", "sd", "unit"]);
+        }
+    }
+    let keys = ["status", "effects", "class", "probability", "statement", "to_decide"];
+    assert_keys(&report["verdict"], &keys);
+    assert_keys(&report["heldout"], &["from_s", "baseline_rmse_rad", "augmented_rmse_rad"]);
+    assert_eq!(report["verdict"]["status"], "adequate", "{:#}", report["verdict"]);
+    assert_eq!(report["baseline"]["adequate"], true);
+    assert!(report["baseline"]["p_value"].as_f64().unwrap() > 0.001);
+    assert!(names(&report["verdict"]["effects"]).is_empty());
+    let friction = &report["detectable"]["hinge_coulomb"];
+    assert_keys(friction, &["smallest", "unit", "confused_with"]);
+    let smallest = friction["smallest"].as_f64().unwrap();
+    assert!(0.0 < smallest && smallest < 1e-7, "{friction}");
+}
+
+#[test]
+fn a_tilted_camera_is_not_told_from_a_side_force_without_a_plumb_line() {
+    let folder = Folder::new();
+    let angles = folder.swing(BASE, "camera_tilt = 0.003\n");
+    let verdict = &folder.diagnosis(&angles, BASE, &[])["verdict"];
+    assert_eq!(verdict["status"], "ambiguous", "{verdict:#}");
+    let class = names(&verdict["class"]);
+    assert!(class.contains(&"side_force") && class.contains(&"camera_tilt"), "{class:?}");
+    assert!(verdict["to_decide"].as_str().unwrap().contains("plumb line"), "{verdict:#}");
+}
+
+#[test]
+fn one_link_is_diagnosed_alone_and_together_with_another_recording_of_it() {
+    let folder = Folder::new();
+    let first = folder.swing(ONE_LINK, "hinge_coulomb = 4e-3\n");
+    let report = folder.diagnosis(&first, ONE_LINK, &[]);
+    assert!(names(&report["verdict"]["effects"]).contains(&"hinge_coulomb"), "{:#}", report["verdict"]);
+    assert_eq!(report["baseline"]["rmse_rad"].as_array().unwrap().len(), 1);
+    let large = folder.path("large.csv");
+    fs::rename(first, &large).unwrap();
+    let small = folder.swing(&ONE_LINK.replace("[0.6]", "[0.3]"), "hinge_coulomb = 4e-3\n");
+    let report = folder.diagnosis(&large, ONE_LINK, &[small.to_str().unwrap()]);
+    assert!(names(&report["verdict"]["effects"]).contains(&"hinge_coulomb"), "{:#}", report["verdict"]);
+    assert!(report["heldout"]["recording"].as_str().unwrap().ends_with("angles.csv"), "{}", report["heldout"]);
+    let left = |key: &str| report["heldout"][key][0].as_f64().unwrap();
+    assert!(left("augmented_rmse_rad") < 0.5 * left("baseline_rmse_rad"), "{}", report["heldout"]);
+}
+
+#[test]
+fn one_thread_and_two_write_the_same_bytes() {
+    let folder = Folder::new();
+    let angles = folder.swing(ONE_LINK, "air_quadratic = 4e-3\n");
+    let config = folder.write("base.toml", ONE_LINK);
+    let written = ["1", "2"].map(|threads| {
+        let mut diagnose = freeswing("diagnose");
+        diagnose.env("RAYON_NUM_THREADS", threads).arg(&angles).arg("--config").arg(&config).args(["--json", "-"]);
+        diagnose.assert().success().get_output().stdout.clone()
+    });
+    serde_json::from_slice::<Value>(&written[0]).unwrap();
+    assert_eq!(written[0], written[1]);
+}
+
+#[test]
+fn bad_input_is_one_line_and_exit_code_2_and_touches_no_output() {
+    let folder = Folder::new();
+    let angles = folder.swing(ONE_LINK, "");
+    let config = folder.write("base.toml", ONE_LINK);
+    let two_links = folder.write("two.toml", BASE);
+    let json = folder.write("diagnosis.json", "of another day");
+    let figure = folder.write("figure.svg", "of another day");
+    let cases = [
+        (folder.path("absent.csv"), &config, vec![], "absent.csv: cannot be read"),
+        (angles.clone(), &folder.path("absent.toml"), vec![], "absent.toml: cannot be read"),
+        (angles.clone(), &two_links, vec![], "has 1 angle, and the specimen 2 links"),
+        (angles.clone(), &config, vec!["--from", "14.9"], "rows between --from and --until; widen them"),
+        (angles.clone(), &config, vec!["--until", "0.1"], "rows between --from and --until; widen them"),
+        (angles.clone(), &config, vec!["--figure", "/nowhere/figure.svg"], "cannot be written"),
+    ];
+    for (table, config, options, message) in cases {
+        let mut diagnose = freeswing("diagnose");
+        diagnose.arg(table).arg("--config").arg(config).arg("--json").arg(&json);
+        if !options.contains(&"--figure") {
+            diagnose.arg("--figure").arg(&figure);
+        }
+        diagnose
+            .args(options)
+            .assert()
+            .code(2)
+            .stdout("")
+            .stderr(contains(message).and(predicate::function(|text: &str| text.trim_end().lines().count() == 1)));
+    }
+    for output in [json, figure] {
+        assert_eq!(fs::read_to_string(output).unwrap(), "of another day");
+    }
+    let left_behind = fs::read_dir(folder.0.path()).unwrap().map(|entry| entry.unwrap().file_name());
+    assert!(left_behind.into_iter().all(|name| !name.to_string_lossy().starts_with(".freeswing")));
+}
+
+#[test]
+fn a_viscous_hinge_is_not_all_of_a_real_arm() {
+    let table = PathBuf::from("../shared/data/multiarm_single.csv");
+    if !table.exists() {
+        println!("skipped: {} is not there", table.display());
+        return;
+    }
+    let folder = Folder::new();
+    let report = folder.diagnosis(&table, REAL_ARM, &["--until", "12"]);
+    let verdict = &report["verdict"];
+    println!("{}", verdict["statement"]);
+    assert_ne!(verdict["status"], "adequate", "{verdict:#}");
+    assert!(report["baseline"]["p_value"].as_f64().unwrap() < 0.01, "{}", report["baseline"]);
+}
