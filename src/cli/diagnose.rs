@@ -190,7 +190,8 @@ impl Report<'_> {
         let mut table = Table::new(["the base model and", "probability", "left mrad", "coefficient", "sd", "unit"]);
         for weighed in self.diagnosis.weighed.iter().take(LISTED) {
             let left = rmse_rad(&weighed.fit).iter().map(|r| number(1e3 * r, 3)).collect::<Vec<_>>().join(" ");
-            let mut first = [names(&weighed.fit.hypothesis.causes, "nothing else"), number(weighed.probability.max(0.0), 3), left];
+            let mut first =
+                [names(&weighed.fit.hypothesis.causes, "nothing else"), number(weighed.probability.max(0.0), 3), left];
             for (parameter, value, sd) in coefficients(&weighed.fit) {
                 let [name, probability, left] = std::mem::take(&mut first);
                 table.row([name, probability, left, number(value, 4), number(sd, 2), parameter.unit().to_owned()]);
@@ -236,7 +237,9 @@ impl Report<'_> {
         let verdict = &self.diagnosis.verdict;
         let percent = 1e2 * verdict.probability;
         match verdict.status {
-            Status::Adequate => format!("Nothing is missing that this recording could show: the base model leaves only noise ({percent:.0} %)."),
+            Status::Adequate => format!(
+                "Nothing is missing that this recording could show: the base model leaves only noise ({percent:.0} %)."
+            ),
             Status::Unknown => {
                 let named = &self.diagnosis.weighed[0];
                 let causes = &named.fit.hypothesis.causes;

@@ -10,9 +10,9 @@ use rand::rngs::StdRng;
 use rand_distr::{Distribution, StandardNormal};
 use rayon::prelude::*;
 
-use super::{Cause, selection};
 use super::refit::{Ground, Refit};
 use super::screen::{Score, Screen};
+use super::{Cause, selection};
 use crate::model::Parameter;
 use crate::progress::Progress;
 
@@ -75,9 +75,8 @@ pub fn adequacy(
                 pull.dot(&(s.columns.tr_mul(&s.columns).try_inverse().map_or(pull.clone() * 0.0, |i| i * &pull)))
             })
             .fold(0.0, f64::max);
-        let window = (0..residual.len() / WINDOW)
-            .map(|k| residual.rows(k * WINDOW, WINDOW).norm_squared())
-            .fold(0.0, f64::max);
+        let window =
+            (0..residual.len() / WINDOW).map(|k| residual.rows(k * WINDOW, WINDOW).norm_squared()).fold(0.0, f64::max);
         let neighbours: f64 = (1..residual.len()).map(|i| residual[i] * residual[i - 1]).sum();
         let mean_square = residual.norm_squared() / residual.len() as f64;
         [score / mean_square, window / mean_square, (neighbours / residual.norm_squared().max(1e-300)).abs()]
@@ -138,7 +137,13 @@ pub fn detectable(scores: &[Score], causes: &[Cause]) -> Vec<Detectable> {
     let of = |cause: &Cause| {
         let parameter = cause.parameters()[0];
         let Some(score) = scores.iter().find(|s| s.cause == *cause) else {
-            return Detectable { cause: *cause, parameter, smallest: f64::INFINITY, named: f64::INFINITY, confused_with: Vec::new() };
+            return Detectable {
+                cause: *cause,
+                parameter,
+                smallest: f64::INFINITY,
+                named: f64::INFINITY,
+                confused_with: Vec::new(),
+            };
         };
         let confused = |other: &&Score| other.cause != *cause && together(score, other) > CONFUSED;
         let nearest = scores.iter().filter(|o| o.cause != *cause).map(|o| together(score, o)).fold(0.0, f64::max);

@@ -9,8 +9,8 @@
 //! s² = max(1, χ²/N of the best hypothesis) allows for noise that was estimated too low. A support's frequency, a joint's yield angle and the instant
 //! of missing frames count as any value within their range.
 
-use super::{Cause, Place};
 use super::refit::{Hypothesis, Refit};
+use super::{Cause, Place};
 use crate::model::Parameter;
 
 /// ln R: sizes over four decades.
@@ -34,11 +34,12 @@ pub fn ln_prior(hypothesis: &Hypothesis, candidates: usize) -> f64 {
     let count = candidates.max(1) as f64;
     // in doubt it is the camera
     let camera = hypothesis.causes.iter().filter(|c| c.place() == Place::Camera).count() as f64 * CAMERA_FIRST.ln();
-    camera + match hypothesis.causes.len() {
-        0 => PRIOR_NULL.ln(),
-        1 => (PRIOR_ONE / count).ln(),
-        _ => (PRIOR_TWO / (0.5 * count * (count - 1.0)).max(1.0)).ln(),
-    }
+    camera
+        + match hypothesis.causes.len() {
+            0 => PRIOR_NULL.ln(),
+            1 => (PRIOR_ONE / count).ln(),
+            _ => (PRIOR_TWO / (0.5 * count * (count - 1.0)).max(1.0)).ln(),
+        }
 }
 
 /// ln Z of a fitted hypothesis; −∞ where a coefficient is not told from zero.

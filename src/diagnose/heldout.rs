@@ -51,7 +51,8 @@ fn across(ground: &Ground<'_>, null: &Refit<'_>, best: &Refit<'_>) -> Option<Hel
     let alone = ground.on(&ground.records[last..]);
     let starts = 2 * null.problem.marks();
     let predicted = |fit: &Refit<'_>| {
-        let hypothesis = Hypothesis { dropped: fit.hypothesis.dropped.filter(|d| d.0 < last), ..fit.hypothesis.clone() };
+        let hypothesis =
+            Hypothesis { dropped: fit.hypothesis.dropped.filter(|d| d.0 < last), ..fit.hypothesis.clone() };
         let mut near = fit.clone();
         near.x.truncate(fit.x.len() - starts);
         let fitted = others.refit(&hypothesis, &near, &[])?;
@@ -76,9 +77,8 @@ fn errors(values: &[crate::fit::predict::Value], record: &Record, from_row: usiz
     (0..record.links())
         .map(|link| {
             let left = values.iter().filter(|v| v.link == link && v.row >= from_row);
-            let squares: Vec<f64> = left
-                .filter_map(|v| Some((record.theta_rad[link][v.row]? - v.predicted_rad).powi(2)))
-                .collect();
+            let squares: Vec<f64> =
+                left.filter_map(|v| Some((record.theta_rad[link][v.row]? - v.predicted_rad).powi(2))).collect();
             (!squares.is_empty()).then(|| (squares.iter().sum::<f64>() / squares.len() as f64).sqrt())
         })
         .collect()

@@ -47,7 +47,12 @@ pub struct Filter<'a> {
 
 impl<'a> Filter<'a> {
     /// For a recording of a fit.
-    pub fn new(fit: &Refit<'_>, record: usize, (around, variance): (&'a Surroundings, f64), place: Place) -> Option<Self> {
+    pub fn new(
+        fit: &Refit<'_>,
+        record: usize,
+        (around, variance): (&'a Surroundings, f64),
+        place: Place,
+    ) -> Option<Self> {
         let problem = &fit.problem;
         let (model, _) = problem.model(record, &fit.x[..problem.free.len()]).ok()?;
         let memory_s = 1.0 / model.pace_rad_s();

@@ -72,9 +72,8 @@ pub fn added_torque_n_m(fit: &Refit<'_>) -> f64 {
         let values: Vec<f64> = added.iter().map(|p| fit.value(*p).unwrap_or(0.0)).collect();
         along(fit, record, &added, |_, torques, _| {
             let n = torques.first().map_or(0, |t| t.len());
-            let total: f64 = (0..n)
-                .map(|i| torques.iter().zip(&values).map(|(t, v)| t[i] * v).sum::<f64>().powi(2))
-                .sum();
+            let total: f64 =
+                (0..n).map(|i| torques.iter().zip(&values).map(|(t, v)| t[i] * v).sum::<f64>().powi(2)).sum();
             square += total;
             count += 1;
         });
@@ -93,9 +92,11 @@ pub fn energy_shares(fit: &Refit<'_>) -> [f64; 3] {
         (Parameter::AirQuadratic, Place::Air),
     ];
     let mut work_j = [0.0; 3];
-    let values: Option<Vec<f64>> = fit.problem.model(0, &fit.x[..fit.problem.free.len()]).ok().map(|(model, _)| {
-        losses.iter().map(|(p, _)| model.value(*p).unwrap_or(0.0)).collect()
-    });
+    let values: Option<Vec<f64>> = fit
+        .problem
+        .model(0, &fit.x[..fit.problem.free.len()])
+        .ok()
+        .map(|(model, _)| losses.iter().map(|(p, _)| model.value(*p).unwrap_or(0.0)).collect());
     let Some(values) = values else { return work_j };
     let parameters: Vec<Parameter> = losses.iter().map(|l| l.0).collect();
     for record in 0..fit.problem.records.len() {
@@ -138,7 +139,8 @@ pub fn residuals(fit: &Refit<'_>, record: usize) -> Option<Residuals> {
             values[value.link].push(Residual { t_s: data.t_s[value.row], measured_rad, predicted_rad, rate_rad_s });
         }
     }
-    let rms = |of: &Vec<Residual>| (of.iter().map(|r| r.left_rad().powi(2)).sum::<f64>() / of.len().max(1) as f64).sqrt();
+    let rms =
+        |of: &Vec<Residual>| (of.iter().map(|r| r.left_rad().powi(2)).sum::<f64>() / of.len().max(1) as f64).sqrt();
     Some(Residuals { rmse_rad: values.iter().map(rms).collect(), noise_rad: problem.noise_rad[record].clone(), values })
 }
 

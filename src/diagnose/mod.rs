@@ -31,8 +31,8 @@ use crate::fit::{Belief, Problem, Record, base_parameters};
 use crate::model::{ForwardModel, Parameter};
 use crate::progress::Progress;
 
-pub use cause::{Cause, Place};
 pub use adequacy::Detectable;
+pub use cause::{Cause, Place};
 pub use heldout::HeldOut;
 pub use latent::Latent;
 pub use locate::Departure;
@@ -185,8 +185,7 @@ pub fn diagnose<'a>(
     let records = &prepared.records;
     let marks = records.first().map_or(0, Record::links);
     let (base, beliefs) = base_of(experiment, marks)?;
-    let causes: Vec<Cause> =
-        Cause::ALL.into_iter().filter(|c| c.may_be_missing(experiment, &base, marks)).collect();
+    let causes: Vec<Cause> = Cause::ALL.into_iter().filter(|c| c.may_be_missing(experiment, &base, marks)).collect();
     let mut ground = Ground {
         records,
         experiment,
@@ -200,12 +199,11 @@ pub fn diagnose<'a>(
         detail: "no motion near the start values follows the recording; check [specimen] and [model]".into(),
     };
     let nothing = Hypothesis::default();
-    let null = ground.descend(&nothing, ground.problem(&nothing)?, prepared.x.clone(), refit::MOST_STEPS).ok_or_else(refused)?;
-    let null = if ground.refine_noise(&null) {
-        ground.again(&null, refit::MOST_STEPS).ok_or_else(refused)?
-    } else {
-        null
-    };
+    let null = ground
+        .descend(&nothing, ground.problem(&nothing)?, prepared.x.clone(), refit::MOST_STEPS)
+        .ok_or_else(refused)?;
+    let null =
+        if ground.refine_noise(&null) { ground.again(&null, refit::MOST_STEPS).ok_or_else(refused)? } else { null };
     let fits = selection::fits(&mut ground, null, &causes, progress);
     let (weighed, unknown, unknowns) = verdict::weigh(fits, ground.values(), causes.len(), |fit, variance| {
         (locate::unknowns(fit, variance), locate::added_torque_n_m(fit))

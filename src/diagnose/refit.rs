@@ -160,13 +160,12 @@ impl<'a> Ground<'a> {
             let inherited = near.value(*parameter);
             *value = given.or(inherited).unwrap_or(*value);
         }
-        if let (Some(k), Some(place)) =
-            (near.value(Parameter::JointStiffness), problem.free.iter().position(|p| *p == Parameter::BendingStiffness))
-        {
-            if near.value(Parameter::BendingStiffness).is_none() {
-                let lengths_m = self.experiment.specimen.lengths_m();
-                x[place] = k * lengths_m.iter().sum::<f64>() / lengths_m.len() as f64;
-            }
+        // a strip that bends everywhere begins as stiff as the joint it replaces
+        let bending = problem.free.iter().position(|p| *p == Parameter::BendingStiffness);
+        let begins = bending.filter(|_| near.value(Parameter::BendingStiffness).is_none());
+        if let (Some(k), Some(place)) = (near.value(Parameter::JointStiffness), begins) {
+            let lengths_m = self.experiment.specimen.lengths_m();
+            x[place] = k * lengths_m.iter().sum::<f64>() / lengths_m.len() as f64;
         }
         let lower = problem.lower();
         x.iter_mut().zip(&lower).for_each(|(x, low)| *x = x.max(*low));
@@ -227,7 +226,13 @@ impl<'a> Ground<'a> {
     }
 
     /// Descends from given variables.
-    pub fn descend(&self, hypothesis: &Hypothesis, problem: Problem<'a>, x: Vec<f64>, most_steps: usize) -> Option<Refit<'a>> {
+    pub fn descend(
+        &self,
+        hypothesis: &Hypothesis,
+        problem: Problem<'a>,
+        x: Vec<f64>,
+        most_steps: usize,
+    ) -> Option<Refit<'a>> {
         let lower = problem.lower();
         let descent = Descent { most_steps, enough: 0.02, damping: FIRST_DAMPING, ..Descent::default() };
         let outcome = descent.run(x, &lower, |x| problem.blocks(x))?;
@@ -304,8 +309,7 @@ impl<'a> Refit<'a> {
     pub fn covariance(&self, of: &[Parameter]) -> DMatrix<f64> {
         let places: Vec<usize> = of.iter().filter_map(|p| self.place(*p)).collect();
         let lower = self.problem.lower();
-        let loose: Vec<usize> =
-            (0..self.x.len()).filter(|i| places.contains(i) || self.x[*i] > lower[*i]).collect();
+        let loose: Vec<usize> = (0..self.x.len()).filter(|i| places.contains(i) || self.x[*i] > lower[*i]).collect();
         let scale = |i: usize| self.normal[(i, i)].max(1e-300).sqrt();
         let count = loose.len();
         let mut unit = DMatrix::from_fn(count, count, |a, b| {

@@ -93,8 +93,7 @@ impl<'g, 'a> Screen<'g, 'a> {
 
     /// The score of each effect that says anything; effects of the fit's own hypothesis are left out.
     pub fn scores(&self, causes: &[Cause]) -> Vec<Score> {
-        let further: Vec<Cause> =
-            causes.iter().copied().filter(|c| !self.fit.hypothesis.causes.contains(c)).collect();
+        let further: Vec<Cause> = causes.iter().copied().filter(|c| !self.fit.hypothesis.causes.contains(c)).collect();
         let smooth: Vec<Cause> = further
             .iter()
             .copied()

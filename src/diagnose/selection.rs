@@ -143,9 +143,11 @@ fn single<'a>(
 
 /// The joint's hysteresis where it makes up a part of what the base model takes for the spring.
 fn softened<'a>(ground: &Ground<'a>, null: &Refit<'a>) -> Option<Refit<'a>> {
-    let spring = [Parameter::JointStiffness, Parameter::BendingStiffness].into_iter().find(|p| null.value(*p).is_some())?;
+    let spring =
+        [Parameter::JointStiffness, Parameter::BendingStiffness].into_iter().find(|p| null.value(*p).is_some())?;
     let hypothesis = Hypothesis::default().and(Cause::JointHysteretic, None);
-    let stiffness = null.problem.model(0, &null.x[..null.problem.free.len()]).ok()?.0.value(Parameter::JointStiffness)?;
+    let stiffness =
+        null.problem.model(0, &null.x[..null.problem.free.len()]).ok()?.0.value(Parameter::JointStiffness)?;
     let starts = YIELD_SHARES.iter().flat_map(|yields| SPRING_SHARES.iter().map(move |share| (*yields, *share)));
     let start = |(yields, share): (f64, f64)| {
         let yield_rad = yields * ground.largest_bend_rad();
@@ -155,9 +157,9 @@ fn softened<'a>(ground: &Ground<'a>, null: &Refit<'a>) -> Option<Refit<'a>> {
             (Parameter::HysteresisYield, yield_rad),
         ]
     };
-    let best = starts.map(start).min_by(|a, b| {
-        ground.cost_at(&hypothesis, null, a).total_cmp(&ground.cost_at(&hypothesis, null, b))
-    })?;
+    let best = starts
+        .map(start)
+        .min_by(|a, b| ground.cost_at(&hypothesis, null, a).total_cmp(&ground.cost_at(&hypothesis, null, b)))?;
     ground.refit(&hypothesis, null, &best)
 }
 

@@ -136,7 +136,8 @@ fn widened(problem: &Problem<'_>, outcome: &Outcome, inverse: &DMatrix<f64>, whi
     for (record, block) in outcome.blocks.iter().enumerate() {
         let data = &problem.records[record];
         let step_s = (data.t_s[data.len() - 1] - data.t_s[0]) / (data.len() - 1).max(1) as f64;
-        let pace_rad_s = problem.model(record, &outcome.x[..problem.free.len()]).map_or(9.0, |(model, _)| model.pace_rad_s());
+        let pace_rad_s =
+            problem.model(record, &outcome.x[..problem.free.len()]).map_or(9.0, |(model, _)| model.pace_rad_s());
         // a swing and a half
         let lags = (1.5 * std::f64::consts::TAU / pace_rad_s / step_s).ceil() as usize;
         // the angles of one instant belong together

@@ -73,7 +73,7 @@ impl TwoRods {
             ..Effects::default()
         };
         let release_rad = vec![theta_1, theta_2];
-        let model = Model { k_eq_n_m_per_rad: k, c_eq_n_m_s_per_rad: c, release_rad, effects };
+        let model = Model { k_eq_n_m_per_rad: k, c_eq_n_m_s_per_rad: c, release_rad, effects, ..Model::default() };
         let specimen = Specimen { mass_kg: 2.0 * MASS_KG, link_lengths_m: vec![LENGTH_M; 2], ..Specimen::default() };
         let mut experiment = Experiment { specimen, model, ..Experiment::default() };
         experiment.rig.gravity_m_s2 = GRAVITY_M_S2;
