@@ -153,6 +153,8 @@ fn softened<'a>(ground: &Ground<'a>, null: &Refit<'a>) -> Option<Refit<'a>> {
         let yield_rad = yields * ground.largest_bend_rad();
         vec![
             (spring, (1.0 - share) * null.value(spring).unwrap_or(0.0)),
+            // what it loses the base model took for the damper's
+            (Parameter::JointDamping, (1.0 - share) * null.value(Parameter::JointDamping).unwrap_or(0.0)),
             (Parameter::HysteresisTorque, share * stiffness * yield_rad),
             (Parameter::HysteresisYield, yield_rad),
         ]
