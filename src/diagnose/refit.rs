@@ -19,7 +19,7 @@ const OUT_OF_STEP: f64 = 0.35;
 /// Steps of the integration for each second of the recording before a motion is given up.
 const STEPS_EACH_SECOND: f64 = 300.0;
 /// The corners of a hysteresis cost many steps: its motion need not be as exact.
-const CORNERS: f64 = 20.0;
+const CORNERS: f64 = 3.0;
 /// Rods between two marks while bending all along the strip is only a candidate.
 const CANDIDATE_PIECES: usize = 3;
 /// Losses imitate each other closely: only a weakly damped step goes along the valley between them.

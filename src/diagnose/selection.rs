@@ -111,8 +111,8 @@ fn single<'a>(
     }
     let values = ground.values() as f64;
     let unexplained = null.left_share() > MUCH_LEFT || null.chi2 > values + SOMETHING_LEFT * (2.0 * values).sqrt();
-    if cause == Cause::RestCurl && unexplained {
-        // a base model that has given its spring up says nothing about where that spring rests
+    if matches!(cause, Cause::RestCurl | Cause::JointHysteretic) && unexplained {
+        // a base model that has given its spring or its second mode up is no place to start from
         tries.push(ground.refit_anew(&Hypothesis::default().and(cause, None), &[]));
     }
     match (cause, score) {
