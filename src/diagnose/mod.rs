@@ -3,12 +3,18 @@
 //! | file | holds |
 //! |---|---|
 //! | [`cause`] | the table of effects |
-//! | [`refit`] | the base model with some of them, fitted |
+//! | [`noise`] | the noise, from where the motion has no power |
+//! | [`refit`] | the base model with some effects, fitted |
 //! | [`screen`] | which would lower the residuals |
 //! | [`selection`] | which are fitted in full |
 //! | [`evidence`] | how probable each is |
 //! | [`surroundings`] | what a small torque would have done |
 //! | [`latent`] | the unknown torque |
+//! | [`locate`] | place, time, amplitude, phase, energy |
+//! | [`verdict`] | the answer, its class, what would decide |
+//! | [`heldout`] | the proof |
+//! | [`mod@adequacy`] | is the base model enough? |
+//! | [`plan`] | the same before an experiment |
 
 pub mod adequacy;
 pub mod cause;
