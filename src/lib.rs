@@ -14,6 +14,7 @@
 //! | model | [`model`] | specimen and effects → the motion at every instant, with its derivatives |
 //! | identify | [`identify`] | angles → frequencies, damping and their intervals, without the motion |
 //! | fit | [`fit`] | angles and model → parameters, residuals, verdict |
+//! | diagnose | [`diagnose`] | angles and model → what the model lacks, how probable, and the proof |
 //! | paper | [`paper`] | the published tables, recomputed |
 //! | synth | [`synth`] | exact swings, rendered recordings with known truth |
 

@@ -11,10 +11,8 @@ use super::table::{Table, number, paragraph};
 use crate::diagnose::{self, Cause, Detectable, Diagnosis, Place, Refit, Status, Weighed, locate};
 use crate::error::{Error, Result};
 use crate::experiment::Experiment;
-use crate::fit::Record;
 use crate::model::{ForwardModel, Parameter};
 use crate::output::OutputFile;
-use crate::series::AngleSeries;
 
 /// Longest planned recording.
 const MOST_ROWS: f64 = 1e6;
@@ -86,17 +84,7 @@ impl DiagnoseArgs {
             return self.plan(&experiment);
         }
         let marks = ForwardModel::of(&experiment)?.chain().groups().len();
-        let records = (self.angles.iter())
-            .map(|path| {
-                let series = AngleSeries::read(path)?;
-                let kept = series.slice(series.rows(self.from, self.until));
-                if kept.len() < crate::series::FEWEST_ROWS {
-                    let message = format!("{} rows between --from and --until; widen them", kept.len());
-                    return Err(Error::Table { path: path.clone(), line: None, message });
-                }
-                Record::of(&kept, marks)
-            })
-            .collect::<Result<Vec<Record>>>()?;
+        let records = super::recordings(&self.angles, marks, (self.from, self.until))?;
         let json = self.json.as_deref().map(OutputFile::create).transpose()?;
         let figure = self.figure.as_deref().map(OutputFile::create).transpose()?;
         let bar = Bar::new(self.quiet);

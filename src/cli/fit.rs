@@ -11,7 +11,6 @@ use crate::experiment::Experiment;
 use crate::fit::{self, Fit, Record, Verdict};
 use crate::model::{ForwardModel, Parameter};
 use crate::output::OutputFile;
-use crate::series::AngleSeries;
 
 /// Fit the forward model to recordings: parameters, simulated against measured, does it reproduce the decay.
 #[derive(Debug, clap::Args)]
@@ -58,18 +57,7 @@ impl FitArgs {
         let experiment = Experiment::read(&self.config)?;
         let model = ForwardModel::of(&experiment)?;
         let marks = model.chain().groups().len();
-        let records = (self.angles.iter())
-            .map(|path| {
-                let series = AngleSeries::read(path)?;
-                let rows = series.rows(self.from, self.until);
-                let kept = series.slice(rows);
-                if kept.len() < crate::series::FEWEST_ROWS {
-                    let message = format!("{} rows between --from and --until; widen them", kept.len());
-                    return Err(Error::Table { path: path.clone(), line: None, message });
-                }
-                Record::of(&kept, marks)
-            })
-            .collect::<Result<Vec<Record>>>()?;
+        let records = super::recordings(&self.angles, marks, (self.from, self.until))?;
         let free = free_parameters(&experiment, marks, &self.free, &self.fix)?;
         let json = self.json.as_deref().map(OutputFile::create).transpose()?;
         let window_s = std::f64::consts::TAU / model.pace_rad_s();

@@ -14,13 +14,16 @@ mod table;
 mod track;
 
 use std::io::Write;
+use std::path::PathBuf;
 use std::process::ExitCode;
 
 use clap::{Parser, Subcommand};
 
 pub use bar::Bar;
 
+use crate::fit::Record;
 use crate::output::OutputFile;
+use crate::series::AngleSeries;
 
 /// Measures vibration from video.
 #[derive(Debug, Parser)]
@@ -82,6 +85,20 @@ fn exit(outcome: crate::Result<()>) -> ExitCode {
             ExitCode::from(2)
         }
     }
+}
+
+/// The tables of some recordings, from one stamp until another.
+fn recordings(paths: &[PathBuf], marks: usize, (from_s, until_s): (f64, f64)) -> crate::Result<Vec<Record>> {
+    let read = |path: &PathBuf| {
+        let series = AngleSeries::read(path)?;
+        let kept = series.slice(series.rows(from_s, until_s));
+        if kept.len() < crate::series::FEWEST_ROWS {
+            let message = format!("{} rows between --from and --until; widen them", kept.len());
+            return Err(crate::Error::Table { path: path.clone(), line: None, message });
+        }
+        Record::of(&kept, marks)
+    };
+    paths.iter().map(read).collect()
 }
 
 /// Prints a report; with a file for JSON writes it there, and prints nothing where that file is standard output.

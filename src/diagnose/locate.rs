@@ -6,7 +6,7 @@ use super::latent::{Filter, Latent, likeliest};
 use super::refit::Refit;
 use super::surroundings::{Surroundings, motion_at};
 use super::{Cause, Place, noise};
-use crate::fit::{Residual, Residuals, Verdict};
+use crate::fit::{Residuals, Verdict, residuals_of};
 use crate::model::observe::chord_angles_rad;
 use crate::model::{Parameter, Partials};
 
@@ -130,18 +130,7 @@ fn along(fit: &Refit<'_>, record: usize, parameters: &[Parameter], mut visit: im
 
 /// What a fit leaves of a recording.
 pub fn residuals(fit: &Refit<'_>, record: usize) -> Option<Residuals> {
-    let problem = &fit.problem;
-    let data = &problem.records[record];
-    let mut values = vec![Vec::new(); data.links()];
-    for value in problem.predict(record, &fit.x, false).ok()?.values {
-        if let Some(measured_rad) = data.theta_rad[value.link][value.row] {
-            let (predicted_rad, rate_rad_s) = (value.predicted_rad, value.rate_rad_s);
-            values[value.link].push(Residual { t_s: data.t_s[value.row], measured_rad, predicted_rad, rate_rad_s });
-        }
-    }
-    let rms =
-        |of: &Vec<Residual>| (of.iter().map(|r| r.left_rad().powi(2)).sum::<f64>() / of.len().max(1) as f64).sqrt();
-    Some(Residuals { rmse_rad: values.iter().map(rms).collect(), noise_rad: problem.noise_rad[record].clone(), values })
+    residuals_of(&fit.problem, &fit.x, record).ok()
 }
 
 /// Whether a torque acts with the position or with the velocity.

@@ -10,9 +10,9 @@
 
 use nalgebra::{DMatrix, DVector};
 
+use super::Cause;
 use super::refit::{Ground, Hypothesis, Refit};
 use super::surroundings::Surroundings;
-use super::{Cause, Place};
 use crate::model::Parameter;
 
 /// Of a column less than this is left by the projection: nothing can be said about it.
@@ -222,8 +222,7 @@ impl<'g, 'a> Screen<'g, 'a> {
         let (_, record, at_s) = best?;
         let (first, rates) = &of_record[record];
         let mut column = DMatrix::zeros(self.projection.residual.len().max(values), 1);
-        for (i, (t_s, rate)) in rates.iter().enumerate().filter(|(_, (t_s, _))| *t_s >= at_s) {
-            let _ = t_s;
+        for (i, (_, rate)) in rates.iter().enumerate().filter(|(_, (t_s, _))| *t_s >= at_s) {
             column[(first + i, 0)] = *rate;
         }
         self.score(Cause::DroppedFrames, column, &[Parameter::DroppedFrames], Some((record, at_s)))
@@ -296,10 +295,5 @@ impl Score {
     /// The fit's hypothesis with this effect.
     pub fn hypothesis(&self, of: &Hypothesis) -> Hypothesis {
         of.and(self.cause, self.dropped)
-    }
-
-    /// Where the effect acts.
-    pub fn place(&self) -> Place {
-        self.cause.place()
     }
 }

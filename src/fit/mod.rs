@@ -203,22 +203,23 @@ fn apart(own: &[(usize, f64)], i: usize) -> f64 {
 }
 
 fn residuals(problem: &Problem<'_>, x: &[f64], noise_rad: &[Vec<f64>]) -> Result<Vec<Residuals>> {
-    (0..problem.records.len())
-        .map(|index| {
-            let record = &problem.records[index];
-            let mut values = vec![Vec::new(); record.links()];
-            for value in problem.predict(index, x, false)?.values {
-                if let Some(measured_rad) = record.theta_rad[value.link][value.row] {
-                    let t_s = record.t_s[value.row];
-                    let (predicted_rad, rate_rad_s) = (value.predicted_rad, value.rate_rad_s);
-                    values[value.link].push(Residual { t_s, measured_rad, predicted_rad, rate_rad_s });
-                }
-            }
-            let rms = |of: &Vec<Residual>| {
-                (of.iter().map(|r| r.left_rad().powi(2)).sum::<f64>() / of.len().max(1) as f64).sqrt()
-            };
-            let rmse_rad = values.iter().map(rms).collect();
-            Ok(Residuals { rmse_rad, values, noise_rad: noise_rad[index].clone() })
-        })
-        .collect()
+    let of = |record| residuals_of(problem, x, record).map(|r| Residuals { noise_rad: noise_rad[record].clone(), ..r });
+    (0..problem.records.len()).map(of).collect()
+}
+
+/// What is left of one recording, beside the problem's own noise.
+pub(crate) fn residuals_of(problem: &Problem<'_>, x: &[f64], index: usize) -> Result<Residuals> {
+    let record = &problem.records[index];
+    let mut values = vec![Vec::new(); record.links()];
+    for value in problem.predict(index, x, false)?.values {
+        if let Some(measured_rad) = record.theta_rad[value.link][value.row] {
+            let t_s = record.t_s[value.row];
+            let (predicted_rad, rate_rad_s) = (value.predicted_rad, value.rate_rad_s);
+            values[value.link].push(Residual { t_s, measured_rad, predicted_rad, rate_rad_s });
+        }
+    }
+    let rms =
+        |of: &Vec<Residual>| (of.iter().map(|r| r.left_rad().powi(2)).sum::<f64>() / of.len().max(1) as f64).sqrt();
+    let rmse_rad = values.iter().map(rms).collect();
+    Ok(Residuals { rmse_rad, values, noise_rad: problem.noise_rad[index].clone() })
 }
