@@ -8,7 +8,7 @@ use serde_json::{Map, Value, json};
 use super::Bar;
 use super::figure::Figure;
 use super::table::{Table, number, paragraph};
-use crate::diagnose::{self, Cause, Detectable, Diagnosis, Place, Refit, Status, Weighed, locate};
+use crate::diagnose::{self, Cause, Detectable, Diagnosis, Phase, Place, Refit, Status, Weighed, locate};
 use crate::error::{Error, Result};
 use crate::experiment::Experiment;
 use crate::model::{ForwardModel, Parameter};
@@ -264,11 +264,11 @@ impl Report<'_> {
         }
     }
 
-    fn phase(&self) -> Option<locate::Phase> {
+    fn phase(&self) -> Option<Phase> {
         match self.diagnosis.verdict.status {
             Status::Adequate => None,
             Status::Unknown => self.diagnosis.departure.goes_with,
-            _ => self.diagnosis.main_effect().and_then(locate::Phase::of),
+            _ => self.diagnosis.main_effect().and_then(Phase::of),
         }
     }
 
@@ -328,9 +328,13 @@ impl Report<'_> {
                 "energy_share": shares,
                 "time_s": departure.time_s,
                 "amplitude_rad": departure.amplitude_rad,
-                "phase": self.phase().map(locate::Phase::id),
+                "phase": self.phase().map(Phase::id),
                 "frequency_hz": departure.frequency_hz,
                 "statement": self.where_statement(),
+                "missing_torque": diagnosis.missing_torque.as_ref().map(|m| json!({
+                    "place": m.place.id(), "rms_n_m": m.rms, "phase": m.phase.map(Phase::id),
+                    "frequency_hz": m.frequency_hz, "energy_share": m.energy_share,
+                })),
                 "named_torque_n_m": diagnosis.added_torque_n_m,
                 "unknown": diagnosis.unknowns.iter().map(|u| json!({"place": u.place.id(), "size": u.size, "log_likelihood_gain": u.gain, "tried": u.tried})).collect::<Vec<_>>(),
             },

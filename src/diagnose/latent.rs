@@ -7,6 +7,14 @@
 //!
 //! The initial state and the base parameters are free as in the fit itself (their prior is wide), so that u holds only what they cannot absorb.
 //! `ln L(σ) − ln L(0)` says how much the recording asks for it.
+//!
+//! Its course given the whole recording is that of Bryson and Frazier's smoother, which inverts no covariance: λ and Λ go backwards over each
+//! seen value (ν its innovation, S that one's variance, K the gain) and each step Φ,
+//!
+//! ```text
+//! λ ← (1 − KH)ᵀλ − Hᵀν/S      Λ ← (1 − KH)ᵀΛ(1 − KH) + HᵀH/S      then λ ← Φᵀλ, Λ ← ΦᵀΛΦ
+//! z = z⁻ − P⁻λ                cov z = P⁻ − P⁻ΛP⁻                   (⁻: predicted from the rows before)
+//! ```
 
 use nalgebra::{DMatrix, DVector};
 
@@ -31,6 +39,22 @@ pub struct Latent {
     pub gain: f64,
     /// (size, gain) of every size tried, in order of size.
     pub tried: Vec<(f64, f64)>,
+}
+
+/// What the filter comes by.
+enum Stage<'s> {
+    /// A row, before anything of it is seen: state and covariance.
+    Row(&'s DVector<f64>, &'s DMatrix<f64>),
+    /// A value of a mark: how it depends on the state, the innovation, its variance, and P⁻Hᵀ.
+    Value { slopes: &'s DVector<f64>, innovation: f64, variance: f64, gain: &'s DVector<f64> },
+}
+
+/// A seen value, kept for the way back: H, ν, S, P⁻Hᵀ.
+struct Seen {
+    slopes: DVector<f64>,
+    innovation: f64,
+    variance: f64,
+    gain: DVector<f64>,
 }
 
 /// The filter for one recording and place.
@@ -73,22 +97,64 @@ impl<'a> Filter<'a> {
     /// ln L up to a constant, for a standard deviation of the unknown.
     pub fn log_likelihood(&self, size: f64) -> f64 {
         let mut log_likelihood = 0.0;
-        self.run(size, &mut |_, innovation, variance| {
-            log_likelihood -= 0.5 * (innovation * innovation / variance + variance.ln());
+        self.run(size, &mut |stage| {
+            if let Stage::Value { innovation, variance, .. } = stage {
+                log_likelihood -= 0.5 * (innovation * innovation / variance + variance.ln());
+            }
         });
         log_likelihood
     }
 
-    /// Runs the filter; `hear` gets every row's state after it, and each innovation with its variance.
-    fn run(&self, size: f64, hear: &mut dyn FnMut(usize, f64, f64)) {
+    /// The unknown at every row given the whole recording, each with its standard deviation.
+    pub fn course(&self, size: f64) -> Vec<(f64, f64)> {
+        let (input, total) = (self.around.state(), self.wide.len());
+        // of every row: u as predicted, its column of P⁻, what was seen
+        let mut rows: Vec<(f64, DVector<f64>, Vec<Seen>)> = Vec::with_capacity(self.around.rows.len());
+        self.run(size, &mut |stage| match stage {
+            Stage::Row(z, p) => rows.push((z[input], p.column(input).into_owned(), Vec::new())),
+            Stage::Value { slopes, innovation, variance, gain } => {
+                let seen = Seen { slopes: slopes.clone(), innovation, variance, gain: gain.clone() };
+                if let Some((_, _, of_row)) = rows.last_mut() {
+                    of_row.push(seen);
+                }
+            }
+        });
+        let mut pull = DVector::<f64>::zeros(total);
+        let mut weight = DMatrix::<f64>::zeros(total, total);
+        let mut course = Vec::with_capacity(rows.len());
+        for (k, (predicted, column, seen)) in rows.iter().enumerate().rev() {
+            for Seen { slopes, innovation, variance, gain } in seen.iter().rev() {
+                let along = (gain.dot(&pull) + innovation) / variance;
+                pull.axpy(-along, slopes, 1.0);
+                let across = &weight * gain / *variance;
+                let whole = gain.dot(&across) / variance + 1.0 / variance;
+                weight -= &across * slopes.transpose() + slopes * across.transpose();
+                weight.ger(whole, slopes, slopes, 1.0);
+            }
+            let variance = column[input] - column.dot(&(&weight * column));
+            course.push((predicted - column.dot(&pull), variance.max(0.0).sqrt()));
+            if k > 0 {
+                let transition = &self.transitions[k - 1];
+                pull = transition.tr_mul(&pull);
+                weight = transition.tr_mul(&(weight * transition));
+            }
+        }
+        course.reverse();
+        course
+    }
+
+    /// Runs the filter; `hear` gets all that it comes by.
+    fn run(&self, size: f64, hear: &mut dyn FnMut(Stage<'_>)) {
         let (n, total) = (self.around.links, self.wide.len());
         let input = self.around.state();
-        let offsets = usize::from(self.place == Place::Camera);
         let mut z = DVector::<f64>::zeros(total);
         let mut p = DMatrix::from_fn(total, total, |i, j| if i == j { self.wide[i] * self.wide[i] } else { 0.0 });
         p[(input, input)] = size * size;
         let mut moved = DMatrix::zeros(total, total);
-        let mut gain = DVector::zeros(total);
+        let (mut slopes, mut gain) = (DVector::zeros(total), DVector::zeros(total));
+        if self.place == Place::Camera {
+            slopes[input] = 1.0;
+        }
         for k in 0..self.around.rows.len() {
             if k > 0 {
                 let transition = &self.transitions[k - 1];
@@ -98,25 +164,15 @@ impl<'a> Filter<'a> {
                 let fade = (self.around.t_s[k] - self.around.t_s[k - 1]) / self.memory_s;
                 p[(input, input)] += size * size * (1.0 - (-2.0 * fade).exp());
             }
+            hear(Stage::Row(&z, &p));
             let row = &self.around.rows[k];
             for (mark, left) in row.left_rad.iter().enumerate() {
                 let Some(left) = left else { continue };
-                let mut expected = offsets as f64 * z[input];
-                for i in 0..n {
-                    expected += row.observed[(mark, i)] * z[i];
-                }
-                for a in 0..total {
-                    gain[a] = offsets as f64 * p[(a, input)];
-                    for i in 0..n {
-                        gain[a] += row.observed[(mark, i)] * p[(a, i)];
-                    }
-                }
-                let mut variance = self.variance * row.sd_rad[mark].powi(2) + offsets as f64 * gain[input];
-                for i in 0..n {
-                    variance += row.observed[(mark, i)] * gain[i];
-                }
-                let innovation = left - expected;
-                hear(k, innovation, variance);
+                (0..n).for_each(|i| slopes[i] = row.observed[(mark, i)]);
+                p.mul_to(&slopes, &mut gain);
+                let variance = self.variance * row.sd_rad[mark].powi(2) + slopes.dot(&gain);
+                let innovation = left - slopes.dot(&z);
+                hear(Stage::Value { slopes: &slopes, innovation, variance, gain: &gain });
                 z.axpy(innovation / variance, &gain, 1.0);
                 p.ger(-1.0 / variance, &gain, &gain, 1.0);
             }

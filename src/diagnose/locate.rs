@@ -1,14 +1,14 @@
-//! Where a model differs from a recording: place, time, amplitude, phase, frequency, and the share of each place in the dissipated energy.
+//! Where a model differs from a recording: place, time, amplitude, phase, frequency.
 
 use rayon::prelude::*;
 
 use super::latent::{Filter, Latent, likeliest};
 use super::refit::Refit;
-use super::surroundings::{Surroundings, motion_at};
+use super::surroundings::Surroundings;
+use super::torque::Phase;
 use super::{Cause, Place, noise};
 use crate::fit::{Residuals, Verdict, residuals_of};
 use crate::model::observe::chord_angles_rad;
-use crate::model::{Parameter, Partials};
 
 /// Power of the motion at a frequency, over its largest, from which on a torque of that frequency is in step with it.
 const IN_STEP: f64 = 3e-4;
@@ -63,94 +63,12 @@ pub fn is_in_step(null: &Refit<'_>, frequency_hz: f64) -> bool {
     })
 }
 
-/// Root mean square of the torque that the added effects exert, on all links together (N·m).
-pub fn added_torque_n_m(fit: &Refit<'_>) -> f64 {
-    let mut square = 0.0;
-    let mut count = 0usize;
-    for record in 0..fit.problem.records.len() {
-        let added: Vec<Parameter> = fit.added();
-        let values: Vec<f64> = added.iter().map(|p| fit.value(*p).unwrap_or(0.0)).collect();
-        along(fit, record, &added, |_, torques, _| {
-            let n = torques.first().map_or(0, |t| t.len());
-            let total: f64 =
-                (0..n).map(|i| torques.iter().zip(&values).map(|(t, v)| t[i] * v).sum::<f64>().powi(2)).sum();
-            square += total;
-            count += 1;
-        });
-    }
-    (square / count.max(1) as f64).sqrt()
-}
-
-/// Share of each place of losses in the energy that a fitted model dissipates (hinge, joint, air).
-pub fn energy_shares(fit: &Refit<'_>) -> [f64; 3] {
-    let losses = [
-        (Parameter::HingeViscous, Place::Hinge),
-        (Parameter::HingeCoulomb, Place::Hinge),
-        (Parameter::JointDamping, Place::Joint),
-        (Parameter::HysteresisTorque, Place::Joint),
-        (Parameter::AirLinear, Place::Air),
-        (Parameter::AirQuadratic, Place::Air),
-    ];
-    let mut work_j = [0.0; 3];
-    let values: Option<Vec<f64>> = fit
-        .problem
-        .model(0, &fit.x[..fit.problem.free.len()])
-        .ok()
-        .map(|(model, _)| losses.iter().map(|(p, _)| model.value(*p).unwrap_or(0.0)).collect());
-    let Some(values) = values else { return work_j };
-    let parameters: Vec<Parameter> = losses.iter().map(|l| l.0).collect();
-    for record in 0..fit.problem.records.len() {
-        along(fit, record, &parameters, |step_s, torques, rate| {
-            for (k, (_, place)) in losses.iter().enumerate() {
-                let power: f64 = torques[k].iter().zip(rate).map(|(q, omega)| q * omega).sum::<f64>() * values[k];
-                work_j[Place::OF_LOSSES.iter().position(|p| p == place).unwrap_or(0)] -= power * step_s;
-            }
-        });
-    }
-    let total: f64 = work_j.iter().map(|w| w.max(0.0)).sum();
-    if total > 0.0 { work_j.map(|w| w.max(0.0) / total) } else { [0.0; 3] }
-}
-
-/// Walks along a fitted motion: length of the interval, torques for one unit of each parameter, and the rates.
-fn along(fit: &Refit<'_>, record: usize, parameters: &[Parameter], mut visit: impl FnMut(f64, &[Vec<f64>], &[f64])) {
-    let Some((model, swing, times_s)) = fit.motion(record) else { return };
-    let (n, m) = (model.chain().count(), model.rates());
-    let mut partials = Partials::zero(n, m);
-    let mut torques = vec![vec![0.0; m]; parameters.len()];
-    for pair in times_s.windows(2) {
-        let Some(motion) = motion_at(&model, &swing, 0.5 * (pair[0] + pair[1])) else { continue };
-        model.partials(&motion, &mut partials);
-        for (torque, parameter) in torques.iter_mut().zip(parameters) {
-            model.sensitivity(*parameter, &motion, &partials, torque);
-        }
-        let of_links: Vec<Vec<f64>> = torques.iter().map(|t| t[..n].to_vec()).collect();
-        visit(pair[1] - pair[0], &of_links, &motion.rate[..n]);
-    }
-}
-
 /// What a fit leaves of a recording.
 pub fn residuals(fit: &Refit<'_>, record: usize) -> Option<Residuals> {
     residuals_of(&fit.problem, &fit.x, record).ok()
 }
 
-/// Whether a torque acts with the position or with the velocity.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Phase {
-    /// It stores energy.
-    Position,
-    /// It takes energy away.
-    Velocity,
-}
-
 impl Phase {
-    /// The name in files.
-    pub fn id(self) -> &'static str {
-        match self {
-            Self::Position => "position",
-            Self::Velocity => "velocity",
-        }
-    }
-
     /// Of an effect.
     pub fn of(cause: Cause) -> Option<Self> {
         match cause {

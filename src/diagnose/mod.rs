@@ -5,12 +5,15 @@
 //! | [`cause`] | the table of effects |
 //! | [`noise`] | the noise, from where the motion has no power |
 //! | [`refit`] | the base model with some effects, fitted |
+//! | [`hysteresis`] | where its fit starts, and in which variables |
 //! | [`screen`] | which would lower the residuals |
 //! | [`selection`] | which are fitted in full |
 //! | [`evidence`] | how probable each is |
 //! | [`surroundings`] | what a small torque would have done |
 //! | [`latent`] | the unknown torque |
-//! | [`locate`] | place, time, amplitude, phase, energy |
+//! | [`torque`] | its course |
+//! | [`energy`] | the work of the laws |
+//! | [`locate`] | place, time, amplitude, phase |
 //! | [`verdict`] | the answer, its class, what would decide |
 //! | [`heldout`] | the proof |
 //! | [`mod@adequacy`] | is the base model enough? |
@@ -18,8 +21,10 @@
 
 pub mod adequacy;
 pub mod cause;
+pub mod energy;
 pub mod evidence;
 pub mod heldout;
+pub mod hysteresis;
 pub mod latent;
 pub mod locate;
 pub mod noise;
@@ -28,6 +33,7 @@ pub mod refit;
 pub mod screen;
 pub mod selection;
 pub mod surroundings;
+pub mod torque;
 pub mod verdict;
 
 use crate::error::{Error, Result};
@@ -44,6 +50,7 @@ pub use latent::Latent;
 pub use locate::Departure;
 pub use plan::{Plan, planned};
 pub use refit::{Ground, Hypothesis, Refit};
+pub use torque::{MissingTorque, Phase};
 pub use verdict::{Status, Verdict, Weighed};
 
 /// A length or an inertia of a rig is known to this share.
@@ -64,6 +71,8 @@ pub struct Diagnosis<'a> {
     pub verdict: Verdict,
     /// Where and when the base model departs.
     pub departure: Departure,
+    /// The torque that the base model lacks, at the place where it explains most.
+    pub missing_torque: Option<MissingTorque>,
     /// Share of hinge, joint and air in the energy lost, by the likeliest model.
     pub energy_shares: [f64; 3],
     /// The prediction of what was not fitted.
@@ -208,11 +217,12 @@ pub fn diagnose<'a>(
     let null = ground
         .descend(&nothing, ground.problem(&nothing)?, prepared.x.clone(), refit::MOST_STEPS)
         .ok_or_else(refused)?;
+    let null = selection::from_weaker_dampers(&ground, null);
     let null =
         if ground.refine_noise(&null) { ground.again(&null, refit::MOST_STEPS).ok_or_else(refused)? } else { null };
     let fits = selection::fits(&mut ground, null, &causes, progress);
     let (weighed, unknown, unknowns) = verdict::weigh(fits, ground.values(), causes.len(), |fit, variance| {
-        (locate::unknowns(fit, variance), locate::added_torque_n_m(fit))
+        (locate::unknowns(fit, variance), energy::added_torque_n_m(fit))
     });
     let verdict = Verdict::of(&weighed, unknown, marks);
     let mut diagnosis = Diagnosis {
@@ -221,6 +231,7 @@ pub fn diagnose<'a>(
         added_torque_n_m: 0.0,
         verdict,
         departure: Departure::default(),
+        missing_torque: None,
         energy_shares: [0.0; 3],
         held_out: None,
         detectable: Vec::new(),
@@ -229,8 +240,9 @@ pub fn diagnose<'a>(
         colour: ground.colour.clone(),
     };
     diagnosis.departure = locate::departure(diagnosis.null());
-    diagnosis.added_torque_n_m = locate::added_torque_n_m(&diagnosis.weighed[0].fit);
-    diagnosis.energy_shares = locate::energy_shares(&diagnosis.weighed[0].fit);
+    diagnosis.missing_torque = torque::beside(diagnosis.null());
+    diagnosis.added_torque_n_m = energy::added_torque_n_m(&diagnosis.weighed[0].fit);
+    diagnosis.energy_shares = energy::energy_shares(&diagnosis.weighed[0].fit);
     diagnosis.held_out = heldout::held_out(&ground, diagnosis.null(), diagnosis.named(), options.predict_from_s);
     let adequacy = adequacy::adequacy(&ground, diagnosis.null(), &causes, options.bootstraps, progress);
     (diagnosis.p_value, diagnosis.detectable) = (adequacy.p_value, adequacy.detectable);

@@ -2,6 +2,7 @@
 
 use nalgebra::{DMatrix, DVector};
 
+use super::hysteresis::Straightened;
 use super::{Cause, noise};
 use crate::error::Result;
 use crate::experiment::{Experiment, Hysteresis};
@@ -194,8 +195,10 @@ impl<'a> Ground<'a> {
         self.descend(&fit.hypothesis, problem, fit.x.clone(), steps)
     }
 
-    /// Takes the noise from what a fit leaves where the motion has no power; whether that changes anything that counts.
+    /// Takes the noise from what a fit leaves where the motion has no power, if that changes anything that counts, and says so: all fits that are to be
+    /// compared must then be made anew.
     pub fn refine_noise(&mut self, by: &Refit<'_>) -> bool {
+        let (mut noise_rad, mut colour) = (self.noise_rad.clone(), self.colour.clone());
         let mut changed = false;
         for record in 0..self.records.len() {
             let Ok(prediction) = by.problem.predict(record, &by.x, false) else { return false };
@@ -210,7 +213,7 @@ impl<'a> Ground<'a> {
                     let measured_rad = data.theta_rad[link][value.row].unwrap_or(value.predicted_rad);
                     left[value.row] = (measured_rad - value.predicted_rad) / data.relative_sd[link][value.row];
                 }
-                let (known_rad, known_rho) = (&mut self.noise_rad[record][link], &mut self.colour[record][link]);
+                let (known_rad, known_rho) = (&mut noise_rad[record][link], &mut colour[record][link]);
                 let whole = noise::of_all(&left);
                 let noise = match noise::off_the_lines(&left, &motion) {
                     Some(noise) => noise,
@@ -221,6 +224,9 @@ impl<'a> Ground<'a> {
                 changed |= (noise.sd / *known_rad - 1.0).abs() > 0.03 || (noise.rho - *known_rho).abs() > 0.03;
                 (*known_rad, *known_rho) = (noise.sd, noise.rho);
             }
+        }
+        if changed {
+            (self.noise_rad, self.colour) = (noise_rad, colour);
         }
         changed
     }
@@ -235,7 +241,14 @@ impl<'a> Ground<'a> {
     ) -> Option<Refit<'a>> {
         let lower = problem.lower();
         let descent = Descent { most_steps, enough: 0.02, damping: FIRST_DAMPING, ..Descent::default() };
-        let outcome = descent.run(x, &lower, |x| problem.blocks(x))?;
+        let outcome = match Straightened::of(&problem) {
+            None => descent.run(x, &lower, |x| problem.blocks(x))?,
+            Some(valley) => valley.bend(descent.run(valley.straight(x), &lower, |x| {
+                let mut blocks = problem.blocks(&valley.bent(x))?;
+                valley.straighten(&mut blocks, x);
+                Some(blocks)
+            })?),
+        };
         Some(Refit::of(hypothesis.clone(), problem, outcome))
     }
 
@@ -349,18 +362,20 @@ impl<'a> Refit<'a> {
 
     /// What is left of the worst recording, as a part of the swing: root mean squares of both.
     pub fn left_share(&self) -> f64 {
-        let of = |record: usize| {
-            let Ok(prediction) = self.problem.predict(record, &self.x, false) else { return f64::INFINITY };
-            let data = &self.problem.records[record];
-            let (mut left, mut whole) = (0.0, 0.0);
-            for value in &prediction.values {
-                let measured_rad = data.theta_rad[value.link][value.row].unwrap_or(value.predicted_rad);
-                left += (measured_rad - value.predicted_rad).powi(2);
-                whole += measured_rad * measured_rad;
-            }
-            (left / whole.max(1e-300)).sqrt()
-        };
-        (0..self.problem.records.len()).map(of).fold(0.0, f64::max)
+        (0..self.problem.records.len()).map(|record| self.left_share_of(record)).fold(0.0, f64::max)
+    }
+
+    /// The same of one recording.
+    pub fn left_share_of(&self, record: usize) -> f64 {
+        let Ok(prediction) = self.problem.predict(record, &self.x, false) else { return f64::INFINITY };
+        let data = &self.problem.records[record];
+        let (mut left, mut whole) = (0.0, 0.0);
+        for value in &prediction.values {
+            let measured_rad = data.theta_rad[value.link][value.row].unwrap_or(value.predicted_rad);
+            left += (measured_rad - value.predicted_rad).powi(2);
+            whole += measured_rad * measured_rad;
+        }
+        (left / whole.max(1e-300)).sqrt()
     }
 
     /// Residuals and their derivatives with all variables, both over the noise; `None` where the motion cannot be integrated.

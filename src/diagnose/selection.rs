@@ -2,9 +2,9 @@
 
 use rayon::prelude::*;
 
-use super::Cause;
 use super::refit::{self, Ground, Hypothesis, Refit};
 use super::screen::{Score, Screen};
+use super::{Cause, hysteresis};
 use crate::model::Parameter;
 use crate::progress::Progress;
 
@@ -16,17 +16,22 @@ const SOMETHING_LEFT: f64 = 4.0;
 const PROMISING: f64 = 3.0;
 /// A base model that leaves this part of the swing lacks something, whatever the noise.
 const MUCH_LEFT: f64 = 0.05;
+/// Dampers to start the base model from, over the one it found.
+const WEAKER: [f64; 2] = [0.1, 0.01];
+/// An effect explains much where it leaves less than this part of the base model's χ², and leads elsewhere where a base parameter differs by
+/// more than this part.
+const EXPLAINS: f64 = 0.5;
+const ELSEWHERE: f64 = 0.3;
 /// A fit whose χ² is this many times the best one's (and this much more) is not made any better.
 const HOPELESS: f64 = 10.0;
 /// A fit that is worse by this than one that only adds an effect may be in a false minimum.
 const STRAGGLES: f64 = 9.0;
 /// Of these, the ones beside which a moving support is looked for.
 const SCANNED: usize = 3;
-/// Starts of a hysteresis: yield angles as parts of the largest bend, and its part of the spring.
-const YIELD_SHARES: [f64; 3] = [0.05, 0.2, 0.6];
-const SPRING_SHARES: [f64; 2] = [0.4, 0.9];
 /// Pairs fitted in full.
 const MOST_PAIRS: usize = 20;
+/// A dear pair must lower the best χ² by this.
+const WORTH: f64 = 9.0;
 /// Pairs fitted even where they promise little.
 const FEWEST_PAIRS: usize = 6;
 
@@ -43,6 +48,7 @@ pub fn fits<'a>(ground: &mut Ground<'a>, null: Refit<'a>, causes: &[Cause], prog
     let singles: Vec<Refit<'a>> = singles.collect();
     let mut all = vec![null];
     all.extend(singles);
+    let all = from_the_best_single(ground, all);
     let mut all = with_refined_noise(ground, all);
     let (null, singles) = (&all[0], &all[1..]);
     let pairs = promising(ground, null, singles, causes);
@@ -56,6 +62,47 @@ pub fn fits<'a>(ground: &mut Ground<'a>, null: Refit<'a>, causes: &[Cause], prog
     all.extend(pairs);
     let all = with_refined_noise(ground, all);
     without_stragglers(ground, all)
+}
+
+/// The base model anew from weaker dampers, where it leaves much: what it lacks can have driven its own damper so high that a mode is gone, and no
+/// descent leads back.
+pub fn from_weaker_dampers<'a>(ground: &Ground<'a>, null: Refit<'a>) -> Refit<'a> {
+    let damper = Parameter::JointDamping;
+    let Some(strong) = null.value(damper).filter(|_| null.left_share() > MUCH_LEFT) else { return null };
+    let weaker = WEAKER.iter().filter_map(|part| ground.refit(&null.hypothesis, &null, &[(damper, part * strong)]));
+    let best = weaker.min_by(|a, b| a.chi2.total_cmp(&b.chi2));
+    match best {
+        Some(best) if best.chi2 < null.chi2 => best,
+        _ => null,
+    }
+}
+
+/// Where one effect explains most of what the base model leaves, with another spring or damper than the base model's own fit has, the others too
+/// are fitted from there.
+fn from_the_best_single<'a>(ground: &Ground<'a>, fits: Vec<Refit<'a>>) -> Vec<Refit<'a>> {
+    let null = &fits[0];
+    let Some(best) = fits.iter().min_by(|a, b| a.chi2.total_cmp(&b.chi2)).filter(|b| b.chi2 < EXPLAINS * null.chi2)
+    else {
+        return fits;
+    };
+    let moved = |parameter: &Parameter| {
+        let (before, after) = (null.value(*parameter).unwrap_or(0.0), best.value(*parameter).unwrap_or(0.0));
+        (after - before).abs() > ELSEWHERE * before.abs()
+    };
+    if !ground.base.iter().any(moved) {
+        return fits;
+    }
+    let again = |fit: &Refit<'a>| {
+        let dear =
+            fit.hypothesis.causes.iter().any(|c| matches!(c, Cause::JointHysteretic | Cause::DistributedFlexibility));
+        if dear || std::ptr::eq(fit, best) {
+            return None;
+        }
+        let own: Vec<(Parameter, f64)> = fit.added().iter().filter_map(|p| Some((*p, fit.value(*p)?))).collect();
+        ground.refit(&fit.hypothesis, best, &own).filter(|again| again.chi2 < fit.chi2)
+    };
+    let again: Vec<Option<Refit<'a>>> = fits.par_iter().map(again).collect();
+    fits.into_iter().zip(again).map(|(fit, again)| again.unwrap_or(fit)).collect()
 }
 
 /// Where a pair has found a better minimum of a simpler hypothesis, one of its effects being next to nothing, that hypothesis starts anew from it.
@@ -107,7 +154,7 @@ fn single<'a>(
 ) -> Option<Refit<'a>> {
     let mut tries = Vec::new();
     if cause == Cause::JointHysteretic {
-        tries.push(softened(ground, null));
+        tries.push(hysteresis::softened(ground, null));
     }
     let values = ground.values() as f64;
     let unexplained = null.left_share() > MUCH_LEFT || null.chi2 > values + SOMETHING_LEFT * (2.0 * values).sqrt();
@@ -139,30 +186,6 @@ fn single<'a>(
         (_, None) => {}
     }
     tries.into_iter().flatten().min_by(|a, b| a.chi2.total_cmp(&b.chi2))
-}
-
-/// The joint's hysteresis where it makes up a part of what the base model takes for the spring.
-fn softened<'a>(ground: &Ground<'a>, null: &Refit<'a>) -> Option<Refit<'a>> {
-    let spring =
-        [Parameter::JointStiffness, Parameter::BendingStiffness].into_iter().find(|p| null.value(*p).is_some())?;
-    let hypothesis = Hypothesis::default().and(Cause::JointHysteretic, None);
-    let stiffness =
-        null.problem.model(0, &null.x[..null.problem.free.len()]).ok()?.0.value(Parameter::JointStiffness)?;
-    let starts = YIELD_SHARES.iter().flat_map(|yields| SPRING_SHARES.iter().map(move |share| (*yields, *share)));
-    let start = |(yields, share): (f64, f64)| {
-        let yield_rad = yields * ground.largest_bend_rad();
-        vec![
-            (spring, (1.0 - share) * null.value(spring).unwrap_or(0.0)),
-            // what it loses the base model took for the damper's
-            (Parameter::JointDamping, (1.0 - share) * null.value(Parameter::JointDamping).unwrap_or(0.0)),
-            (Parameter::HysteresisTorque, share * stiffness * yield_rad),
-            (Parameter::HysteresisYield, yield_rad),
-        ]
-    };
-    let best = starts
-        .map(start)
-        .min_by(|a, b| ground.cost_at(&hypothesis, null, a).total_cmp(&ground.cost_at(&hypothesis, null, b)))?;
-    ground.refit(&hypothesis, null, &best)
 }
 
 /// Whether an effect can put the base model out of step by its frequency.
@@ -215,6 +238,12 @@ fn promising<'s, 'a>(
             }
         }
     }
+    // a hysteresis is dear: only where it promises what a further effect must gain
+    let alone = singles.iter().map(|s| s.chi2).fold(null.chi2, f64::min);
+    let is_dear = |pair: &(f64, &Refit<'a>, Score)| {
+        pair.2.cause == Cause::JointHysteretic || pair.1.hypothesis.causes.contains(&Cause::JointHysteretic)
+    };
+    pairs.retain(|pair| !is_dear(pair) || pair.0 < alone - WORTH);
     pairs.sort_by(|a, b| a.0.total_cmp(&b.0));
     pairs.truncate(MOST_PAIRS);
     let least = pairs.first().map_or(0.0, |p| p.0);

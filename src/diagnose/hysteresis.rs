@@ -1,0 +1,98 @@
+//! The joint's hysteresis needs starts and variables of its own.
+//!
+//! Before it yields, a hysteresis is a spring of stiffness T_h/Δ_y beside the joint's K, and their sum is what a recording tells best. In (K, T_h, Δ_y)
+//! the valley of equal sums is bent, and a descent creeps along it; in (K, T_h/Δ_y, Δ_y) it is straight.
+
+use super::Cause;
+use super::refit::{Ground, Hypothesis, Refit};
+use crate::fit::Problem;
+use crate::fit::descent::{Block, Outcome};
+use crate::model::Parameter;
+
+/// Starts: yield angles as parts of the largest bend, and the hysteresis' part of the spring.
+const YIELD_SHARES: [f64; 3] = [0.05, 0.2, 0.6];
+const SPRING_SHARES: [f64; 2] = [0.4, 0.9];
+
+/// Where T_h and Δ_y stand among a problem's variables.
+#[derive(Debug, Clone, Copy)]
+pub struct Straightened {
+    torque: usize,
+    yields: usize,
+}
+
+impl Straightened {
+    /// Of a problem with a hysteresis.
+    pub fn of(problem: &Problem<'_>) -> Option<Self> {
+        let place = |parameter| problem.free.iter().position(|p| *p == parameter);
+        Some(Self { torque: place(Parameter::HysteresisTorque)?, yields: place(Parameter::HysteresisYield)? })
+    }
+
+    /// T_h → T_h/Δ_y.
+    pub fn straight(self, mut x: Vec<f64>) -> Vec<f64> {
+        x[self.torque] /= x[self.yields];
+        x
+    }
+
+    /// T_h/Δ_y → T_h.
+    pub fn bent(self, x: &[f64]) -> Vec<f64> {
+        let mut x = x.to_vec();
+        x[self.torque] *= x[self.yields];
+        x
+    }
+
+    /// Derivatives with (T_h, Δ_y) to those with (k, Δ_y), k = T_h/Δ_y: ∂/∂k = Δ_y ∂/∂T_h, and at constant k ∂/∂Δ_y gains k ∂/∂T_h.
+    pub fn straighten(self, blocks: &mut [Block], straight: &[f64]) {
+        let (stiffness, yield_rad) = (straight[self.torque], straight[self.yields]);
+        for block in blocks {
+            let place = |variable| block.columns.iter().position(|c| *c == variable);
+            let (Some(torque), Some(yields)) = (place(self.torque), place(self.yields)) else { continue };
+            let with_torque = block.slopes.column(torque).into_owned();
+            block.slopes.column_mut(yields).axpy(stiffness, &with_torque, 1.0);
+            block.slopes.column_mut(torque).scale_mut(yield_rad);
+        }
+    }
+
+    /// The end of a descent in (T_h, Δ_y) again: x and JᵀJ.
+    pub fn bend(self, mut outcome: Outcome) -> Outcome {
+        let (stiffness, yield_rad) = (outcome.x[self.torque], outcome.x[self.yields]);
+        let (torque, yields) = (self.torque, self.yields);
+        let normal = &mut outcome.normal;
+        // k = T/Δ: ∂/∂T = (1/Δ) ∂/∂k, and at constant T ∂/∂Δ loses (k/Δ) ∂/∂k; rows, then columns
+        for row in 0..normal.nrows() {
+            let with_stiffness = normal[(row, torque)];
+            normal[(row, torque)] = with_stiffness / yield_rad;
+            normal[(row, yields)] -= stiffness / yield_rad * with_stiffness;
+        }
+        for column in 0..normal.ncols() {
+            let with_stiffness = normal[(torque, column)];
+            normal[(torque, column)] = with_stiffness / yield_rad;
+            normal[(yields, column)] -= stiffness / yield_rad * with_stiffness;
+        }
+        outcome.x = self.bent(&outcome.x);
+        outcome
+    }
+}
+
+/// The hysteresis alone, where it makes up a part of what the base model takes for the spring: from the best of several such starts.
+pub fn softened<'a>(ground: &Ground<'a>, null: &Refit<'a>) -> Option<Refit<'a>> {
+    let spring =
+        [Parameter::JointStiffness, Parameter::BendingStiffness].into_iter().find(|p| null.value(*p).is_some())?;
+    let hypothesis = Hypothesis::default().and(Cause::JointHysteretic, None);
+    let stiffness =
+        null.problem.model(0, &null.x[..null.problem.free.len()]).ok()?.0.value(Parameter::JointStiffness)?;
+    let starts = YIELD_SHARES.iter().flat_map(|yields| SPRING_SHARES.iter().map(move |share| (*yields, *share)));
+    let start = |(yields, share): (f64, f64)| {
+        let yield_rad = yields * ground.largest_bend_rad();
+        vec![
+            (spring, (1.0 - share) * null.value(spring).unwrap_or(0.0)),
+            // what it loses the base model took for the damper's
+            (Parameter::JointDamping, (1.0 - share) * null.value(Parameter::JointDamping).unwrap_or(0.0)),
+            (Parameter::HysteresisTorque, share * stiffness * yield_rad),
+            (Parameter::HysteresisYield, yield_rad),
+        ]
+    };
+    let best = starts
+        .map(start)
+        .min_by(|a, b| ground.cost_at(&hypothesis, null, a).total_cmp(&ground.cost_at(&hypothesis, null, b)))?;
+    ground.refit(&hypothesis, null, &best)
+}

@@ -1,0 +1,117 @@
+//! The course of the torque that a model lacks, at the place where it explains most: what to add to the fitted motion, row by row, for the
+//! recording to follow.
+
+use super::latent::{Filter, Latent};
+use super::refit::Refit;
+use super::surroundings::Surroundings;
+use super::{Place, energy, locate, noise};
+
+/// A torque that works less than this part of what it could, with the angle or with its rate, has no phase.
+const NO_PHASE: f64 = 0.3;
+
+/// The torque that a model lacks, through one recording.
+#[derive(Debug, Clone)]
+pub struct MissingTorque {
+    /// Where it acts.
+    pub place: Place,
+    /// The recording.
+    pub record: usize,
+    /// Stamps.
+    pub t_s: Vec<f64>,
+    /// At each of them, with its standard deviation (N·m; of the camera an angle in rad).
+    pub course: Vec<(f64, f64)>,
+    /// Root mean square of the course.
+    pub rms: f64,
+    /// Whether it goes with the angle at its place or with the rate.
+    pub phase: Option<Phase>,
+    /// Its strongest frequency.
+    pub frequency_hz: Option<f64>,
+    /// What it takes from the swing, as a share of all that is dissipated.
+    pub energy_share: Option<f64>,
+}
+
+/// Whether a torque acts with the position or with the velocity.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Phase {
+    /// It stores energy.
+    Position,
+    /// It takes energy away, or gives it.
+    Velocity,
+}
+
+impl Phase {
+    /// The name in files.
+    pub fn id(self) -> &'static str {
+        match self {
+            Self::Position => "position",
+            Self::Velocity => "velocity",
+        }
+    }
+}
+
+/// The torque that a fit lacks in the recording that it reproduces worst, at the place where it explains most; none beside a fit that has lost
+/// step, for it is the small departures that are linear.
+pub fn beside(fit: &Refit<'_>) -> Option<MissingTorque> {
+    if fit.is_out_of_step() {
+        return None;
+    }
+    let worst = |record: &usize| fit.left_share_of(*record);
+    let record = (0..fit.problem.records.len()).max_by(|a, b| worst(a).total_cmp(&worst(b)))?;
+    let unknowns = locate::unknowns(fit, 1.0);
+    let likeliest = unknowns.first().filter(|u| u.gain > 0.0)?;
+    MissingTorque::of(fit, record, likeliest, 1.0)
+}
+
+impl MissingTorque {
+    /// Beside a fit, in one of its recordings; `variance` scales that of the noise.
+    pub fn of(fit: &Refit<'_>, record: usize, unknown: &Latent, variance: f64) -> Option<Self> {
+        let around = Surroundings::of(fit, record)?;
+        let course = Filter::new(fit, record, (&around, variance), unknown.place)?.course(unknown.size);
+        let rms = (course.iter().map(|c| c.0 * c.0).sum::<f64>() / course.len().max(1) as f64).sqrt();
+        let torque: Vec<f64> = course.iter().map(|c| c.0).collect();
+        let span_s = around.t_s.last()? - around.t_s.first()?;
+        let power = noise::spectrum(&torque);
+        let strongest = (1..power.len()).max_by(|a, b| power[*a].total_cmp(&power[*b]));
+        let mut missing = Self {
+            place: unknown.place,
+            record,
+            rms,
+            phase: None,
+            frequency_hz: strongest.map(|k| k as f64 / span_s),
+            energy_share: None,
+            t_s: around.t_s.clone(),
+            course,
+        };
+        if unknown.place != Place::Camera {
+            missing.work(fit, &around);
+        }
+        Some(missing)
+    }
+
+    /// What it does with the angle and the rate that are conjugate to it.
+    fn work(&mut self, fit: &Refit<'_>, around: &Surroundings) {
+        let Ok((model, _)) = fit.problem.model(self.record, &fit.x[..fit.problem.free.len()]) else { return };
+        let (mut torque, mut angle, mut rate, mut with_angle, mut with_rate, mut taken_j) =
+            (0.0, 0.0, 0.0, 0.0, 0.0, 0.0);
+        for (k, row) in around.rows.iter().enumerate() {
+            let pattern = around.pattern(model.chain(), self.place, k);
+            let along = |values: &[f64]| pattern.iter().zip(values).map(|(p, v)| p * v).sum::<f64>();
+            let (u, q, v) = (self.course[k].0, along(&row.theta_rad), along(&row.rate[..around.links]));
+            torque += u * u;
+            angle += q * q;
+            rate += v * v;
+            with_angle += u * q;
+            with_rate += u * v;
+            if k > 0 {
+                taken_j -= u * v * (around.t_s[k] - around.t_s[k - 1]);
+            }
+        }
+        let part = |work: f64, of: f64| (work / (torque * of).sqrt().max(1e-300)).abs();
+        let (angle, rate) = (part(with_angle, angle), part(with_rate, rate));
+        if angle.max(rate) > NO_PHASE {
+            self.phase = Some(if angle > rate { Phase::Position } else { Phase::Velocity });
+        }
+        let known_j: f64 = energy::dissipated_j(fit, self.record).iter().sum();
+        self.energy_share = (known_j + taken_j > 0.0).then(|| taken_j / (known_j + taken_j));
+    }
+}
