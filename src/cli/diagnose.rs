@@ -8,7 +8,7 @@ use serde_json::{Map, Value, json};
 use super::Bar;
 use super::figure::Figure;
 use super::table::{Table, number, paragraph};
-use crate::diagnose::{self, Cause, Detectable, Diagnosis, Phase, Place, Refit, Status, Weighed, locate};
+use crate::diagnose::{self, Cause, Detectable, Diagnosis, MissingTorque, Phase, Place, Refit, Status, Weighed, locate};
 use crate::error::{Error, Result};
 use crate::experiment::Experiment;
 use crate::model::{ForwardModel, Parameter};
@@ -291,6 +291,9 @@ impl Report<'_> {
                 "; the base model departs from {from_s:.2} s to {until_s:.2} s, at amplitudes of {least:.3} to {most:.3} rad"
             );
         }
+        if let Some(torque) = self.diagnosis.missing_torque.as_ref().filter(|t| t.place != Place::Camera) {
+            let _ = write!(statement, ". {}", words_of_torque(torque));
+        }
         let shares = self.diagnosis.energy_shares;
         if shares.iter().sum::<f64>() > 0.0 {
             let _ = write!(
@@ -332,7 +335,7 @@ impl Report<'_> {
                 "frequency_hz": departure.frequency_hz,
                 "statement": self.where_statement(),
                 "missing_torque": diagnosis.missing_torque.as_ref().map(|m| json!({
-                    "place": m.place.id(), "rms_n_m": m.rms, "phase": m.phase.map(Phase::id),
+                    "place": m.place.id(), "rms": m.rms, "unit": if m.place == Place::Camera { "rad" } else { "N m" }, "phase": m.phase.map(Phase::id),
                     "frequency_hz": m.frequency_hz, "energy_share": m.energy_share,
                 })),
                 "named_torque_n_m": diagnosis.added_torque_n_m,
@@ -359,6 +362,23 @@ impl Report<'_> {
             "detectable": limits_json(&diagnosis.detectable),
         })
     }
+}
+
+/// What the smoothed torque says by itself.
+fn words_of_torque(torque: &MissingTorque) -> String {
+    let place = match torque.place {
+        Place::Hinge => "at the hinge",
+        Place::Joint => "in the joint",
+        Place::Air | Place::Camera => "along the strip",
+    };
+    let mut words = format!("A torque without a law would do {place}, of {} N m rms", number(torque.rms, 2));
+    if let Some(hz) = torque.frequency_hz {
+        let _ = write!(words, ", strongest at {hz:.2} Hz");
+    }
+    if let Some(share) = torque.energy_share {
+        let _ = write!(words, ", that takes {:.0} % of the energy lost", 1e2 * share);
+    }
+    words
 }
 
 fn names(causes: &[Cause], none: &str) -> String {

@@ -1,7 +1,8 @@
 //! `freeswing diagnose --figure`: before and after on one page.
 //!
-//! Above, the end of the swing as measured and by both models; below, what each model leaves of each angle. A single recording is fitted up to
-//! the border of the held-out proof, and the rest of both curves is prediction.
+//! Above, the end of the swing as measured and by both models; in the middle, what each model leaves of each angle. A single recording is fitted
+//! up to the border of the held-out proof, and the rest of both curves is prediction. Below, the torque that the base model lacks, against the angle
+//! it works on and against that one's rate: the shape of a law before it has a name.
 
 use std::f64::consts::TAU;
 use std::fmt::Write;
@@ -9,7 +10,7 @@ use std::ops::Range;
 
 use super::svg::{Panel, line, text};
 use super::table::number;
-use crate::diagnose::{Cause, Diagnosis, Ground, Prepared, Refit, locate};
+use crate::diagnose::{Cause, Diagnosis, Ground, MissingTorque, Place, Prepared, Refit, locate};
 use crate::error::{Error, Result};
 use crate::experiment::Experiment;
 use crate::fit::{Residual, Residuals};
@@ -25,10 +26,14 @@ const AFTER_PX: Range<f64> = 540.0..940.0;
 /// Upper and lower edge of the upper panel and of all lower ones, px.
 const UPPER_PX: Range<f64> = 122.0..314.0;
 const LOWER_PX: Range<f64> = 410.0..664.0;
+/// Upper and lower edge of the torque's panels, px.
+const TORQUE_PX: Range<f64> = 760.0..944.0;
+/// Height of the page without and with the torque.
+const HEIGHT_PX: [u32; 2] = [720, 1000];
 /// Between two lower panels, for the heading of the second.
 const GAP_PX: f64 = 34.0;
 
-const HEAD: &str = r##"<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 960 720" width="960" height="720" font-family="Helvetica, Arial, 'DejaVu Sans', sans-serif" font-size="14" fill="#222">
+const HEAD: &str = r##"<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 960 HEIGHT" width="960" height="HEIGHT" font-family="Helvetica, Arial, 'DejaVu Sans', sans-serif" font-size="14" fill="#222">
 <style>
 .title { font-size: 22px; font-weight: bold } .heading { font-size: 14px } .number { font-size: 13px; fill: #555 } .note { font-size: 13px; fill: #555 }
 .middle { text-anchor: middle } .end { text-anchor: end }
@@ -37,9 +42,10 @@ const HEAD: &str = r##"<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 960 
 .border { stroke: #96690a; stroke-width: 1.5; stroke-dasharray: 6 4 }
 .measured, .left-before, .left-after { fill: none; stroke-linecap: round }
 .measured { stroke: #333; stroke-width: 4.5 } .left-before { stroke: #d1495b; stroke-width: 2.6 } .left-after { stroke: #0b6cab; stroke-width: 2.6 }
+.torque { fill: none; stroke-linecap: round; stroke: #5b4b8a; stroke-width: 3 }
 .before, .after { fill: none; stroke-width: 2 } .before { stroke: #d1495b } .after { stroke: #0b6cab }
 </style>
-<rect width="960" height="720" fill="#fff"/>
+<rect width="960" height="HEIGHT" fill="#fff"/>
 "##;
 
 /// Both models beside the first recording.
@@ -55,6 +61,8 @@ pub struct Figure<'a> {
     pub border_s: Option<f64>,
     /// Period of the swing.
     pub swing_s: f64,
+    /// What the base model lacks, of the model and not of the camera.
+    pub torque: Option<MissingTorque>,
 }
 
 impl<'a> Figure<'a> {
@@ -93,15 +101,19 @@ impl<'a> Figure<'a> {
             after: (!causes.is_empty()).then_some((causes, after)),
             border_s,
             swing_s: TAU / model.pace_rad_s(),
+            torque: diagnosis.missing_torque.clone().filter(|t| !t.works_on.is_empty()),
         })
     }
 
     /// The page.
     pub fn svg(&self) -> String {
-        let mut svg = HEAD.to_owned();
+        let mut svg = HEAD.replace("HEIGHT", &HEIGHT_PX[usize::from(self.torque.is_some())].to_string());
         self.legend(&mut svg);
         self.swing(&mut svg);
         self.left(&mut svg);
+        if let Some(torque) = &self.torque {
+            law(&mut svg, torque);
+        }
         svg.push_str("</svg>\n");
         svg
     }
@@ -246,6 +258,45 @@ fn predicted(ground: &Ground<'_>, fit: &Refit<'_>, border_s: f64) -> Option<Resi
     let x = ground.on(&early).refit(&fit.hypothesis, fit, &[])?.x;
     let problem = ground.problem(&fit.hypothesis).ok()?;
     locate::residuals(&Refit { problem, x, ..fit.clone() }, 0)
+}
+
+/// The torque against what it works on, and against its rate.
+fn law(svg: &mut String, torque: &MissingTorque) {
+    let largest = 1.08 * torque.course.iter().fold(1e-30f64, |a, c| a.max(c.0.abs()));
+    let (scale, unit) = match largest {
+        l if l < 1e-6 => (1e9, "nN·m"),
+        l if l < 1e-3 => (1e6, "µN·m"),
+        _ => (1e3, "mN·m"),
+    };
+    let works_on = match torque.place {
+        Place::Hinge => "θ1",
+        Place::Joint => "the bend θ1 − θ2",
+        Place::Air | Place::Camera => "the angle of the whole strip",
+    };
+    type Side = fn(&(f64, f64)) -> f64;
+    let sides: [(Range<f64>, Side, &str); 2] =
+        [(BEFORE_PX, |on| on.0, "rad"), (AFTER_PX, |on| on.1, "rad/s")];
+    for (x_px, side, x_unit) in sides {
+        let reach = 1.05 * torque.works_on.iter().fold(1e-30f64, |a, on| a.max(side(on).abs()));
+        let y = -scale * largest..scale * largest;
+        let panel = Panel { x_px: x_px.clone(), y_px: TORQUE_PX, x: -reach..reach, y };
+        panel.axes(svg, true);
+        let dots: Vec<(f64, f64)> =
+            torque.works_on.iter().zip(&torque.course).map(|(on, course)| (side(on), scale * course.0)).collect();
+        panel.dots(svg, "torque", &dots);
+        panel.outline(svg);
+        let whose = if x_unit == "rad" { works_on.to_owned() } else { format!("rate of {works_on}") };
+        text(svg, "heading end", [x_px.end, TORQUE_PX.end + 38.0], &format!("{whose} ({x_unit})"));
+        if x_px.start == BEFORE_PX.start {
+            let at = match torque.place {
+                Place::Hinge => "at the hinge",
+                Place::Joint => "in the joint",
+                Place::Air | Place::Camera => "from the air",
+            };
+            text(svg, "heading", [x_px.start, TORQUE_PX.start - 8.0], &format!("Torque that the base model lacks {at}"));
+            upright(svg, &panel, &format!("torque ({unit})"));
+        }
+    }
 }
 
 /// A label along the left edge.

@@ -21,6 +21,7 @@ use nalgebra::{DMatrix, DVector};
 use super::Place;
 use super::refit::Refit;
 use super::surroundings::Surroundings;
+use crate::model::Parameter;
 
 /// Standard deviations of the fitted state and parameters at which their prior stands.
 const WIDE: f64 = 300.0;
@@ -65,8 +66,19 @@ pub struct Filter<'a> {
     place: Place,
     transitions: Vec<DMatrix<f64>>,
     memory_s: f64,
-    /// Standard deviations of the state at the first row, and of the parameters.
+    /// State at the first row, and parameters; with their standard deviations.
+    begin: Vec<f64>,
     wide: Vec<f64>,
+}
+
+/// What the unknown has to account for.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Beyond {
+    /// Only what the fit leaves: its own parameters and effects are free.
+    TheFit,
+    /// All that the base model lacks: the effects that the fit adds to it are taken away again, and their torque is the unknown's to exert. The fitted motion
+    /// is only where the balance is linear.
+    TheBaseModel,
 }
 
 impl<'a> Filter<'a> {
@@ -76,6 +88,7 @@ impl<'a> Filter<'a> {
         record: usize,
         (around, variance): (&'a Surroundings, f64),
         place: Place,
+        beyond: Beyond,
     ) -> Option<Self> {
         let problem = &fit.problem;
         let (model, _) = problem.model(record, &fit.x[..problem.free.len()]).ok()?;
@@ -91,7 +104,16 @@ impl<'a> Filter<'a> {
         wide.extend(vec![0.0; around.rates - around.links]);
         wide.push(0.0);
         wide.extend((0..problem.free.len()).map(|i| WIDE * sd(i)));
-        Some(Self { around, variance, place, transitions, memory_s, wide })
+        let mut begin = vec![0.0; wide.len()];
+        if beyond == Beyond::TheBaseModel {
+            for place in fit.added().iter().filter_map(|p| fit.place(*p)) {
+                let is_linear = !matches!(problem.free[place], Parameter::HysteresisYield | Parameter::SupportFrequency);
+                let variable = around.state() + 1 + place;
+                begin[variable] = if is_linear { -fit.x[place] } else { 0.0 };
+                wide[variable] = 0.0;
+            }
+        }
+        Some(Self { around, variance, place, transitions, memory_s, begin, wide })
     }
 
     /// ln L up to a constant, for a standard deviation of the unknown.
@@ -147,7 +169,7 @@ impl<'a> Filter<'a> {
     fn run(&self, size: f64, hear: &mut dyn FnMut(Stage<'_>)) {
         let (n, total) = (self.around.links, self.wide.len());
         let input = self.around.state();
-        let mut z = DVector::<f64>::zeros(total);
+        let mut z = DVector::from_column_slice(&self.begin);
         let mut p = DMatrix::from_fn(total, total, |i, j| if i == j { self.wide[i] * self.wide[i] } else { 0.0 });
         p[(input, input)] = size * size;
         let mut moved = DMatrix::zeros(total, total);

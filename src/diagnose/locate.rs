@@ -2,7 +2,7 @@
 
 use rayon::prelude::*;
 
-use super::latent::{Filter, Latent, likeliest};
+use super::latent::{Beyond, Filter, Latent, likeliest};
 use super::refit::Refit;
 use super::surroundings::Surroundings;
 use super::torque::Phase;
@@ -16,7 +16,7 @@ const IN_STEP: f64 = 3e-4;
 const PLACES: [Place; 4] = [Place::Hinge, Place::Joint, Place::Air, Place::Camera];
 
 /// The unknown at each place around a fit, likeliest first; `variance` scales that of the noise.
-pub fn unknowns(fit: &Refit<'_>, variance: f64) -> Vec<Latent> {
+pub fn unknowns(fit: &Refit<'_>, variance: f64, beyond: Beyond) -> Vec<Latent> {
     let records = 0..fit.problem.records.len();
     let around: Option<Vec<Surroundings>> = records.map(|record| Surroundings::of(fit, record)).collect();
     let Some(around) = around else { return Vec::new() };
@@ -26,7 +26,7 @@ pub fn unknowns(fit: &Refit<'_>, variance: f64) -> Vec<Latent> {
         .into_par_iter()
         .filter_map(|place| {
             let filters: Option<Vec<Filter<'_>>> =
-                around.iter().enumerate().map(|(record, a)| Filter::new(fit, record, (a, variance), place)).collect();
+                around.iter().enumerate().map(|(record, a)| Filter::new(fit, record, (a, variance), place, beyond)).collect();
             Some(likeliest(&filters?, place, typical(fit, place)))
         })
         .collect();

@@ -46,7 +46,7 @@ use crate::progress::Progress;
 pub use adequacy::Detectable;
 pub use cause::{Cause, Place};
 pub use heldout::HeldOut;
-pub use latent::Latent;
+pub use latent::{Beyond, Latent};
 pub use locate::Departure;
 pub use plan::{Plan, planned};
 pub use refit::{Ground, Hypothesis, Refit};
@@ -222,7 +222,7 @@ pub fn diagnose<'a>(
         if ground.refine_noise(&null) { ground.again(&null, refit::MOST_STEPS).ok_or_else(refused)? } else { null };
     let fits = selection::fits(&mut ground, null, &causes, progress);
     let (weighed, unknown, unknowns) = verdict::weigh(fits, ground.values(), causes.len(), |fit, variance| {
-        (locate::unknowns(fit, variance), energy::added_torque_n_m(fit))
+        (locate::unknowns(fit, variance, Beyond::TheFit), energy::added_torque_n_m(fit))
     });
     let verdict = Verdict::of(&weighed, unknown, marks);
     let mut diagnosis = Diagnosis {
@@ -240,7 +240,7 @@ pub fn diagnose<'a>(
         colour: ground.colour.clone(),
     };
     diagnosis.departure = locate::departure(diagnosis.null());
-    diagnosis.missing_torque = torque::beside(diagnosis.null());
+    diagnosis.missing_torque = torque::missing(&diagnosis.weighed[0].fit, diagnosis.null());
     diagnosis.added_torque_n_m = energy::added_torque_n_m(&diagnosis.weighed[0].fit);
     diagnosis.energy_shares = energy::energy_shares(&diagnosis.weighed[0].fit);
     diagnosis.held_out = heldout::held_out(&ground, diagnosis.null(), diagnosis.named(), options.predict_from_s);

@@ -1,7 +1,7 @@
 //! The course of the torque that a model lacks, at the place where it explains most: what to add to the fitted motion, row by row, for the
 //! recording to follow.
 
-use super::latent::{Filter, Latent};
+use super::latent::{Beyond, Filter, Latent};
 use super::refit::Refit;
 use super::surroundings::Surroundings;
 use super::{Place, energy, locate, noise};
@@ -20,13 +20,15 @@ pub struct MissingTorque {
     pub t_s: Vec<f64>,
     /// At each of them, with its standard deviation (N·m; of the camera an angle in rad).
     pub course: Vec<(f64, f64)>,
+    /// The angle that it works on (the hinge's, the bend of the joint, that of the whole strip), and its rate (rad, rad/s).
+    pub works_on: Vec<(f64, f64)>,
     /// Root mean square of the course.
     pub rms: f64,
     /// Whether it goes with the angle at its place or with the rate.
     pub phase: Option<Phase>,
     /// Its strongest frequency.
     pub frequency_hz: Option<f64>,
-    /// What it takes from the swing, as a share of all that is dissipated.
+    /// What it takes from the swing, as a share of all that the fit dissipates.
     pub energy_share: Option<f64>,
 }
 
@@ -49,24 +51,23 @@ impl Phase {
     }
 }
 
-/// The torque that a fit lacks in the recording that it reproduces worst, at the place where it explains most; none beside a fit that has lost
-/// step, for it is the small departures that are linear.
-pub fn beside(fit: &Refit<'_>) -> Option<MissingTorque> {
-    if fit.is_out_of_step() {
-        return None;
-    }
-    let worst = |record: &usize| fit.left_share_of(*record);
+/// The torque that the base model lacks, at the place where it explains most, in the recording that the base model reproduces worst; `fit` is the
+/// likeliest one of the table, whose motion follows the recordings.
+pub fn missing(fit: &Refit<'_>, null: &Refit<'_>) -> Option<MissingTorque> {
+    let values = fit.problem.records.iter().map(|r| r.values(0..r.len())).sum::<usize>() as f64;
+    let variance = (fit.chi2 / values).max(1.0);
+    let worst = |record: &usize| null.left_share_of(*record);
     let record = (0..fit.problem.records.len()).max_by(|a, b| worst(a).total_cmp(&worst(b)))?;
-    let unknowns = locate::unknowns(fit, 1.0);
+    let unknowns = locate::unknowns(fit, variance, Beyond::TheBaseModel);
     let likeliest = unknowns.first().filter(|u| u.gain > 0.0)?;
-    MissingTorque::of(fit, record, likeliest, 1.0)
+    MissingTorque::of(fit, record, likeliest, variance)
 }
 
 impl MissingTorque {
     /// Beside a fit, in one of its recordings; `variance` scales that of the noise.
     pub fn of(fit: &Refit<'_>, record: usize, unknown: &Latent, variance: f64) -> Option<Self> {
         let around = Surroundings::of(fit, record)?;
-        let course = Filter::new(fit, record, (&around, variance), unknown.place)?.course(unknown.size);
+        let course = Filter::new(fit, record, (&around, variance), unknown.place, Beyond::TheBaseModel)?.course(unknown.size);
         let rms = (course.iter().map(|c| c.0 * c.0).sum::<f64>() / course.len().max(1) as f64).sqrt();
         let torque: Vec<f64> = course.iter().map(|c| c.0).collect();
         let span_s = around.t_s.last()? - around.t_s.first()?;
@@ -79,6 +80,7 @@ impl MissingTorque {
             phase: None,
             frequency_hz: strongest.map(|k| k as f64 / span_s),
             energy_share: None,
+            works_on: Vec::new(),
             t_s: around.t_s.clone(),
             course,
         };
@@ -97,6 +99,7 @@ impl MissingTorque {
             let pattern = around.pattern(model.chain(), self.place, k);
             let along = |values: &[f64]| pattern.iter().zip(values).map(|(p, v)| p * v).sum::<f64>();
             let (u, q, v) = (self.course[k].0, along(&row.theta_rad), along(&row.rate[..around.links]));
+            self.works_on.push((q, v));
             torque += u * u;
             angle += q * q;
             rate += v * v;
@@ -111,7 +114,7 @@ impl MissingTorque {
         if angle.max(rate) > NO_PHASE {
             self.phase = Some(if angle > rate { Phase::Position } else { Phase::Velocity });
         }
-        let known_j: f64 = energy::dissipated_j(fit, self.record).iter().sum();
-        self.energy_share = (known_j + taken_j > 0.0).then(|| taken_j / (known_j + taken_j));
+        let lost_j: f64 = energy::dissipated_j(fit, self.record).iter().sum();
+        self.energy_share = (lost_j > 0.0).then(|| taken_j / lost_j);
     }
 }

@@ -46,8 +46,8 @@ impl Status {
 pub struct Weighed<'a> {
     /// Fitted.
     pub fit: Refit<'a>,
-    /// ln Z.
-    pub ln_evidence: f64,
+    /// ln of evidence and prior.
+    pub ln_posterior: f64,
     /// Posterior.
     pub probability: f64,
     /// Posterior where nothing outside the table is at work.
@@ -83,9 +83,8 @@ pub fn weigh<'a>(
 ) -> (Vec<Weighed<'a>>, f64, Vec<Latent>) {
     let least = fits.iter().map(|f| f.chi2).fold(f64::INFINITY, f64::min);
     let variance = (least / values as f64).max(1.0);
-    let ln: Vec<f64> = fits.iter().map(|f| evidence::ln_evidence(f, variance)).collect();
-    let mut posterior: Vec<f64> =
-        fits.iter().zip(&ln).map(|(f, ln)| ln + evidence::ln_prior(&f.hypothesis, candidates)).collect();
+    let ln = |f: &Refit<'_>| evidence::ln_evidence(f, variance) + evidence::ln_prior(&f.hypothesis, candidates);
+    let mut posterior: Vec<f64> = fits.iter().map(ln).collect();
     let best = (0..fits.len()).max_by(|a, b| posterior[*a].total_cmp(&posterior[*b])).unwrap_or(0);
     let (latents, added_n_m) = remainder(&fits[best], fits[best].chi2 / values as f64);
     posterior.push(posterior[best] + evidence::PRIOR_UNKNOWN.ln() + unknown_gain(&latents, added_n_m));
@@ -100,12 +99,11 @@ pub fn weigh<'a>(
             unknown += std::mem::take(probability);
         }
     }
-    let mut weighed: Vec<Weighed<'a>> = (fits.into_iter().zip(ln).zip(probability.into_iter().zip(if_named)))
-        .map(|((fit, ln_evidence), (probability, if_named))| Weighed { fit, ln_evidence, probability, if_named })
+    let mut weighed: Vec<Weighed<'a>> = (fits.into_iter().zip(posterior).zip(probability.into_iter().zip(if_named)))
+        .map(|((fit, ln_posterior), (probability, if_named))| Weighed { fit, ln_posterior, probability, if_named })
         .collect();
-    // where the unknown takes all, their order among themselves still counts
-    let order = |w: &Weighed<'_>| (w.probability, w.if_named);
-    weighed.sort_by(|a, b| order(b).partial_cmp(&order(a)).unwrap_or(std::cmp::Ordering::Equal));
+    // where the unknown takes all, or next to all, their order among themselves still counts
+    weighed.sort_by(|a, b| (b.probability.total_cmp(&a.probability)).then(b.ln_posterior.total_cmp(&a.ln_posterior)));
     (weighed, unknown, latents)
 }
 
