@@ -8,7 +8,9 @@ use serde_json::{Map, Value, json};
 use super::Bar;
 use super::figure::Figure;
 use super::table::{Table, number, paragraph};
-use crate::diagnose::{self, Cause, Detectable, Diagnosis, MissingTorque, Phase, Place, Refit, Status, Weighed, locate};
+use crate::diagnose::{
+    self, Cause, Detectable, Diagnosis, MissingTorque, Phase, Place, Refit, Status, Weighed, locate, verdict,
+};
 use crate::error::{Error, Result};
 use crate::experiment::Experiment;
 use crate::model::{ForwardModel, Parameter};
@@ -245,13 +247,29 @@ impl Report<'_> {
                     "Something is missing that is not in the table of effects ({percent:.0} %): no named law, nor two of them, leaves only noise{nearest}."
                 )
             }
-            Status::Identified => format!("Missing: {} ({percent:.0} %).", words(&verdict.effects)),
+            Status::Identified => format!("Missing: {} ({percent:.0} %).{}", words(&verdict.effects), self.more()),
             Status::Ambiguous => format!(
-                "Missing: most likely {} ({percent:.0} %), but the recording does not tell it from others: {}.",
+                "Missing: most likely {} ({percent:.0} %), but the recording does not tell it from others: {}.{}",
                 words(&verdict.effects),
                 names(&verdict.class, ""),
+                self.more()
             ),
         }
+    }
+
+    /// What names that leave far more than noise do not explain.
+    fn more(&self) -> String {
+        let fit = self.diagnosis.named();
+        if !verdict::is_beyond_noise(fit) {
+            return String::new();
+        }
+        let values: usize = fit.problem.records.iter().map(|r| r.values(0..r.len())).sum();
+        format!(
+            " That is their share among the laws of the table: they explain {:.1} % of what the base model leaves, but what is left is still {:.0} times the \
+             noise, and something that is not in the table is missing, too.",
+            1e2 * self.diagnosis.explained(),
+            (fit.chi2 / values as f64).sqrt()
+        )
     }
 
     fn place(&self) -> Option<Place> {

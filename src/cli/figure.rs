@@ -274,8 +274,7 @@ fn law(svg: &mut String, torque: &MissingTorque) {
         Place::Air | Place::Camera => "the angle of the whole strip",
     };
     type Side = fn(&(f64, f64)) -> f64;
-    let sides: [(Range<f64>, Side, &str); 2] =
-        [(BEFORE_PX, |on| on.0, "rad"), (AFTER_PX, |on| on.1, "rad/s")];
+    let sides: [(Range<f64>, Side, &str); 2] = [(BEFORE_PX, |on| on.0, "rad"), (AFTER_PX, |on| on.1, "rad/s")];
     for (x_px, side, x_unit) in sides {
         let reach = 1.05 * torque.works_on.iter().fold(1e-30f64, |a, on| a.max(side(on).abs()));
         let y = -scale * largest..scale * largest;
@@ -293,7 +292,12 @@ fn law(svg: &mut String, torque: &MissingTorque) {
                 Place::Joint => "in the joint",
                 Place::Air | Place::Camera => "from the air",
             };
-            text(svg, "heading", [x_px.start, TORQUE_PX.start - 8.0], &format!("Torque that the base model lacks {at}"));
+            text(
+                svg,
+                "heading",
+                [x_px.start, TORQUE_PX.start - 8.0],
+                &format!("Torque that the base model lacks {at}"),
+            );
             upright(svg, &panel, &format!("torque ({unit})"));
         }
     }

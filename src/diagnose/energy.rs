@@ -15,12 +15,16 @@ const LOSSES: [(Parameter, Place); 6] = [
     (Parameter::AirQuadratic, Place::Air),
 ];
 
-/// Root mean square of the torque that the added effects exert, on all links together (N·m).
+/// Root mean square of the torque that the laws added to the base model exert, on all links together (N·m). A support that moves is no law: its
+/// motion is what it is.
 pub fn added_torque_n_m(fit: &Refit<'_>) -> f64 {
     let mut square = 0.0;
     let mut count = 0usize;
     for record in 0..fit.problem.records.len() {
-        let added: Vec<Parameter> = fit.added();
+        let is_law = |p: &Parameter| {
+            !matches!(p, Parameter::SupportSine | Parameter::SupportCosine | Parameter::SupportFrequency)
+        };
+        let added: Vec<Parameter> = fit.added().into_iter().filter(is_law).collect();
         let values: Vec<f64> = added.iter().map(|p| fit.value(*p).unwrap_or(0.0)).collect();
         along(fit, record, &added, |_, torques, _| {
             let n = torques.first().map_or(0, |t| t.len());

@@ -21,6 +21,14 @@ pub struct HeldOut {
     pub augmented_rad: Vec<f64>,
 }
 
+impl HeldOut {
+    /// What the names leave, as a part of what the base model leaves: root mean squares of all angles.
+    pub fn leaves(&self) -> f64 {
+        let square = |of: &[f64]| of.iter().map(|r| r * r).sum::<f64>();
+        (square(&self.augmented_rad) / square(&self.baseline_rad).max(1e-300)).sqrt()
+    }
+}
+
 /// Predicts the last third of a single recording from the first two; of several, the last recording from the others, of which only the
 /// start is then fitted. `from_s` moves the border of a single one.
 pub fn held_out(ground: &Ground<'_>, null: &Refit<'_>, best: &Refit<'_>, from_s: Option<f64>) -> Option<HeldOut> {

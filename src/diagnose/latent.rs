@@ -107,7 +107,8 @@ impl<'a> Filter<'a> {
         let mut begin = vec![0.0; wide.len()];
         if beyond == Beyond::TheBaseModel {
             for place in fit.added().iter().filter_map(|p| fit.place(*p)) {
-                let is_linear = !matches!(problem.free[place], Parameter::HysteresisYield | Parameter::SupportFrequency);
+                let is_linear =
+                    !matches!(problem.free[place], Parameter::HysteresisYield | Parameter::SupportFrequency);
                 let variable = around.state() + 1 + place;
                 begin[variable] = if is_linear { -fit.x[place] } else { 0.0 };
                 wide[variable] = 0.0;

@@ -25,8 +25,11 @@ pub fn unknowns(fit: &Refit<'_>, variance: f64, beyond: Beyond) -> Vec<Latent> {
         .collect::<Vec<_>>()
         .into_par_iter()
         .filter_map(|place| {
-            let filters: Option<Vec<Filter<'_>>> =
-                around.iter().enumerate().map(|(record, a)| Filter::new(fit, record, (a, variance), place, beyond)).collect();
+            let filters: Option<Vec<Filter<'_>>> = around
+                .iter()
+                .enumerate()
+                .map(|(record, a)| Filter::new(fit, record, (a, variance), place, beyond))
+                .collect();
             Some(likeliest(&filters?, place, typical(fit, place)))
         })
         .collect();

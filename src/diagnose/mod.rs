@@ -224,27 +224,22 @@ pub fn diagnose<'a>(
     let (weighed, unknown, unknowns) = verdict::weigh(fits, ground.values(), causes.len(), |fit, variance| {
         (locate::unknowns(fit, variance, Beyond::TheFit), energy::added_torque_n_m(fit))
     });
-    let verdict = Verdict::of(&weighed, unknown, marks);
-    let mut diagnosis = Diagnosis {
-        weighed,
-        unknowns,
-        added_torque_n_m: 0.0,
-        verdict,
-        departure: Departure::default(),
-        missing_torque: None,
-        energy_shares: [0.0; 3],
-        held_out: None,
-        detectable: Vec::new(),
-        p_value: 1.0,
+    let null = weighed.iter().find(|w| w.fit.hypothesis.causes.is_empty()).map_or(&weighed[0].fit, |w| &w.fit);
+    let best = &weighed[0].fit;
+    let held_out = heldout::held_out(&ground, null, best, options.predict_from_s);
+    let adequacy = adequacy::adequacy(&ground, null, &causes, options.bootstraps, progress);
+    Ok(Diagnosis {
+        verdict: Verdict::of(&weighed, unknown, marks, held_out.as_ref()),
+        departure: locate::departure(null),
+        missing_torque: torque::missing(best, null),
+        added_torque_n_m: energy::added_torque_n_m(best),
+        energy_shares: energy::energy_shares(best),
+        p_value: adequacy.p_value,
+        detectable: adequacy.detectable,
+        held_out,
         noise_rad: ground.noise_rad.clone(),
         colour: ground.colour.clone(),
-    };
-    diagnosis.departure = locate::departure(diagnosis.null());
-    diagnosis.missing_torque = torque::missing(&diagnosis.weighed[0].fit, diagnosis.null());
-    diagnosis.added_torque_n_m = energy::added_torque_n_m(&diagnosis.weighed[0].fit);
-    diagnosis.energy_shares = energy::energy_shares(&diagnosis.weighed[0].fit);
-    diagnosis.held_out = heldout::held_out(&ground, diagnosis.null(), diagnosis.named(), options.predict_from_s);
-    let adequacy = adequacy::adequacy(&ground, diagnosis.null(), &causes, options.bootstraps, progress);
-    (diagnosis.p_value, diagnosis.detectable) = (adequacy.p_value, adequacy.detectable);
-    Ok(diagnosis)
+        unknowns,
+        weighed,
+    })
 }

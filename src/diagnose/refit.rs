@@ -25,8 +25,9 @@ const CORNERS: f64 = 3.0;
 const CANDIDATE_PIECES: usize = 3;
 /// Losses imitate each other closely: only a weakly damped step goes along the valley between them.
 const FIRST_DAMPING: f64 = 1e-8;
-/// Steps of a first descent, and of one that is worth it.
-const FEW_STEPS: usize = 12;
+/// Steps of a dear hypothesis before it is known to be worth any, of a first descent, and of one that is worth it.
+const FIRST_STEPS: usize = 4;
+pub(super) const FEW_STEPS: usize = 12;
 pub(super) const MOST_STEPS: usize = 30;
 
 /// What every fit of one diagnosis shares.
@@ -140,6 +141,12 @@ impl<'a> Ground<'a> {
         }
         let x = if problem.cost(&x) < problem.cost(&careful) { x } else { careful };
         self.descend(hypothesis, problem, x, FEW_STEPS)
+    }
+
+    /// The first steps of a refit.
+    pub fn begin(&self, hypothesis: &Hypothesis, near: &Refit<'_>) -> Option<Refit<'a>> {
+        let (problem, x) = self.start(hypothesis, near, &[])?;
+        self.descend(hypothesis, problem, x, FIRST_STEPS)
     }
 
     /// Σr² where a refit would start.

@@ -16,6 +16,8 @@ const SOMETHING_LEFT: f64 = 4.0;
 const PROMISING: f64 = 3.0;
 /// A base model that leaves this part of the swing lacks something, whatever the noise.
 const MUCH_LEFT: f64 = 0.05;
+/// A dear hypothesis goes on where its first steps lead below this multiple of the base model's χ².
+const HOPEFUL: f64 = 1.2;
 /// Dampers to start the base model from, over the one it found.
 const WEAKER: [f64; 2] = [0.1, 0.01];
 /// An effect explains much where it leaves less than this part of the base model's χ², and leads elsewhere where a base parameter differs by
@@ -166,9 +168,11 @@ fn single<'a>(
         (Cause::DistributedFlexibility, _) => {
             // many links are dear: only where there is something to explain
             if unexplained {
-                tries.push(ground.refit(&Hypothesis::default().and(cause, None), null, &[]));
-                if tries.iter().flatten().all(Refit::is_out_of_step) {
-                    tries.push(ground.refit_anew(&Hypothesis::default().and(cause, None), &[]));
+                let hypothesis = Hypothesis::default().and(cause, None);
+                let begun = ground.begin(&hypothesis, null).filter(|b| b.chi2 < HOPEFUL * null.chi2);
+                tries.push(begun.and_then(|begun| ground.again(&begun, refit::FEW_STEPS)));
+                if out_of_step && tries.iter().flatten().all(Refit::is_out_of_step) {
+                    tries.push(ground.refit_anew(&hypothesis, &[]));
                 }
             }
         }

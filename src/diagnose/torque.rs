@@ -67,7 +67,8 @@ impl MissingTorque {
     /// Beside a fit, in one of its recordings; `variance` scales that of the noise.
     pub fn of(fit: &Refit<'_>, record: usize, unknown: &Latent, variance: f64) -> Option<Self> {
         let around = Surroundings::of(fit, record)?;
-        let course = Filter::new(fit, record, (&around, variance), unknown.place, Beyond::TheBaseModel)?.course(unknown.size);
+        let course =
+            Filter::new(fit, record, (&around, variance), unknown.place, Beyond::TheBaseModel)?.course(unknown.size);
         let rms = (course.iter().map(|c| c.0 * c.0).sum::<f64>() / course.len().max(1) as f64).sqrt();
         let torque: Vec<f64> = course.iter().map(|c| c.0).collect();
         let span_s = around.t_s.last()? - around.t_s.first()?;

@@ -1,9 +1,10 @@
 //! The verdict: adequate, identified, ambiguous or unknown; what cannot be told apart; and the measurement that would tell.
 
 use super::evidence::{self, normalised};
+use super::heldout::HeldOut;
 use super::latent::Latent;
 use super::refit::Refit;
-use super::{Cause, Place, locate};
+use super::{Cause, Place, locate, noise};
 use crate::model::Parameter;
 
 /// A verdict stands alone when it is at least this probable.
@@ -11,7 +12,13 @@ const ALONE: f64 = 0.8;
 /// A hypothesis this much less probable than the best named one is told from it.
 const TOLD_APART: f64 = 0.05;
 /// A named law may be wrong by this part of its own torque before something unknown is suspected beside it.
-const LAW_SHARE: f64 = 0.005;
+const LAW_SHARE: f64 = 0.002;
+/// A support in step with the swing can be what it seems to be, or stand for a torque that is not known: even odds.
+const IN_STEP: f64 = 0.5;
+/// Where the best of the table leaves this many times the noise, noise is no yardstick for the model any more…
+const BEYOND_NOISE: f64 = 10.0;
+/// … and the best are named if they leave at most this part of what the base model leaves of what was not fitted.
+const PROVEN: f64 = 0.5;
 
 /// Probabilities below this change nothing.
 const NEGLIGIBLE: f64 = 1e-4;
@@ -81,8 +88,7 @@ pub fn weigh<'a>(
     candidates: usize,
     remainder: impl Fn(&Refit<'a>, f64) -> (Vec<Latent>, f64),
 ) -> (Vec<Weighed<'a>>, f64, Vec<Latent>) {
-    let least = fits.iter().map(|f| f.chi2).fold(f64::INFINITY, f64::min);
-    let variance = (least / values as f64).max(1.0);
+    let variance = fits.iter().min_by(|a, b| a.chi2.total_cmp(&b.chi2)).map_or(1.0, |best| correlated(best, values));
     let ln = |f: &Refit<'_>| evidence::ln_evidence(f, variance) + evidence::ln_prior(&f.hypothesis, candidates);
     let mut posterior: Vec<f64> = fits.iter().map(ln).collect();
     let best = (0..fits.len()).max_by(|a, b| posterior[*a].total_cmp(&posterior[*b])).unwrap_or(0);
@@ -91,12 +97,13 @@ pub fn weigh<'a>(
     let if_named = normalised(&posterior[..fits.len()]);
     let mut probability = normalised(&posterior);
     let mut unknown = probability.pop().unwrap_or(0.0);
-    // a support in step with the swing is a stand-in for what is not known
+    // a support in step with the swing may be a stand-in for what is not known
     let null = fits.iter().position(|f| f.hypothesis.causes.is_empty());
     for (fit, probability) in fits.iter().zip(&mut probability).filter(|(_, p)| **p > NEGLIGIBLE) {
         let hz = fit.value(Parameter::SupportFrequency);
         if hz.zip(null).is_some_and(|(hz, null)| locate::is_in_step(&fits[null], hz)) {
-            unknown += std::mem::take(probability);
+            unknown += (1.0 - IN_STEP) * *probability;
+            *probability *= IN_STEP;
         }
     }
     let mut weighed: Vec<Weighed<'a>> = (fits.into_iter().zip(posterior).zip(probability.into_iter().zip(if_named)))
@@ -105,6 +112,15 @@ pub fn weigh<'a>(
     // where the unknown takes all, or next to all, their order among themselves still counts
     weighed.sort_by(|a, b| (b.probability.total_cmp(&a.probability)).then(b.ln_posterior.total_cmp(&a.ln_posterior)));
     (weighed, unknown, latents)
+}
+
+/// Variance of what a fit leaves, over the noise's, of which as many values as there are count: what is left beyond the noise goes on from row to row,
+/// and counts for fewer, (1 + ρ)/(1 − ρ) rows for one.
+fn correlated(fit: &Refit<'_>, values: usize) -> f64 {
+    let excess = (fit.chi2 / values as f64 - 1.0).max(0.0);
+    let Some((left, _)) = fit.linearised().filter(|_| excess > 0.0) else { return 1.0 };
+    let rho = noise::of_all(left.as_slice()).rho.clamp(0.0, 0.99);
+    1.0 + excess * (1.0 + rho) / (1.0 - rho)
 }
 
 /// How much likelier an unknown of any size makes the recordings than one that a law's own error allows.
@@ -120,8 +136,8 @@ fn unknown_gain(latents: &[Latent], added_n_m: f64) -> f64 {
 }
 
 impl Verdict {
-    /// From the probabilities.
-    pub fn of(weighed: &[Weighed<'_>], unknown: f64, marks: usize) -> Self {
+    /// From the probabilities, and the proof of the likeliest.
+    pub fn of(weighed: &[Weighed<'_>], unknown: f64, marks: usize, proof: Option<&HeldOut>) -> Self {
         let adequate: f64 = weighed.iter().filter(|w| w.fit.hypothesis.causes.is_empty()).map(|w| w.probability).sum();
         let named = 1.0 - adequate - unknown;
         let nothing = |status, probability| Self {
@@ -134,15 +150,25 @@ impl Verdict {
             to_decide: None,
         };
         if unknown > adequate && unknown > named {
-            return nothing(Status::Unknown, unknown);
+            let proven = proof.is_some_and(|proof| proof.leaves() <= PROVEN) && is_beyond_noise(&weighed[0].fit);
+            return if proven {
+                Self::naming(weighed, |w| w.if_named, unknown, marks)
+            } else {
+                nothing(Status::Unknown, unknown)
+            };
         }
         if adequate >= named {
             return nothing(Status::Adequate, adequate);
         }
+        Self::naming(weighed, |w| w.probability, unknown, marks)
+    }
+
+    /// The likeliest names and their class.
+    fn naming(weighed: &[Weighed<'_>], probability: impl Fn(&Weighed<'_>) -> f64, unknown: f64, marks: usize) -> Self {
         let named: Vec<&Weighed<'_>> = weighed.iter().filter(|w| !w.fit.hypothesis.causes.is_empty()).collect();
         let best = named[0];
         let mut class: Vec<Cause> = best.fit.hypothesis.causes.clone();
-        for other in named.iter().filter(|w| w.probability > TOLD_APART * best.probability) {
+        for other in named.iter().filter(|w| probability(w) > TOLD_APART * probability(best)) {
             for cause in &other.fit.hypothesis.causes {
                 if !class.contains(cause) {
                     class.push(*cause);
@@ -150,15 +176,21 @@ impl Verdict {
             }
         }
         let effects = best.fit.hypothesis.causes.clone();
-        let status = if best.probability >= ALONE { Status::Identified } else { Status::Ambiguous };
+        let status = if probability(best) >= ALONE { Status::Identified } else { Status::Ambiguous };
         if status == Status::Identified {
             class.clone_from(&effects);
         }
         let to_decide = to_decide(&effects, &class, marks);
         let within = |w: &&&Weighed<'_>| w.fit.hypothesis.causes.iter().all(|c| class.contains(c));
-        let class_probability = named.iter().filter(within).map(|w| w.probability).sum();
-        Self { status, effects, class, probability: best.probability, class_probability, unknown, to_decide }
+        let class_probability = named.iter().filter(within).map(|w| probability(w)).sum();
+        Self { status, effects, class, probability: probability(best), class_probability, unknown, to_decide }
     }
+}
+
+/// Whether a fit with names leaves so much that the noise does not matter.
+pub fn is_beyond_noise(fit: &Refit<'_>) -> bool {
+    let values: usize = fit.problem.records.iter().map(|r| r.values(0..r.len())).sum();
+    !fit.hypothesis.causes.is_empty() && fit.chi2 > BEYOND_NOISE.powi(2) * values as f64
 }
 
 /// What to measure to split a class.
