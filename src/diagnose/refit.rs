@@ -27,6 +27,8 @@ const CANDIDATE_PIECES: usize = 3;
 const FIRST_DAMPING: f64 = 1e-8;
 /// Steps of a dear hypothesis before it is known to be worth any, of a first descent, and of one that is worth it.
 const FIRST_STEPS: usize = 4;
+/// Fall of χ² that makes more steps worth it.
+const LED_SOMEWHERE: f64 = 4.0;
 pub(super) const FEW_STEPS: usize = 12;
 pub(super) const MOST_STEPS: usize = 30;
 
@@ -140,7 +142,13 @@ impl<'a> Ground<'a> {
             }
         }
         let x = if problem.cost(&x) < problem.cost(&careful) { x } else { careful };
-        self.descend(hypothesis, problem, x, FEW_STEPS)
+        if !hypothesis.causes.contains(&Cause::JointHysteretic) {
+            return self.descend(hypothesis, problem, x, FEW_STEPS);
+        }
+        // a hysteresis is dear: it goes on only where its first steps have led somewhere
+        let begun = self.descend(hypothesis, problem, x, FIRST_STEPS)?;
+        let goes_on = !begun.converged && begun.chi2 < near.chi2 - LED_SOMEWHERE;
+        if goes_on { self.again(&begun, FEW_STEPS) } else { Some(begun) }
     }
 
     /// The first steps of a refit.
@@ -181,8 +189,14 @@ impl<'a> Ground<'a> {
         Some((problem, x))
     }
 
-    /// Fits a hypothesis from the start values of the experiment, by multiple shooting first: for a base model whose motion is out of step.
-    pub fn refit_anew(&self, hypothesis: &Hypothesis, start: &[(Parameter, f64)]) -> Option<Refit<'a>> {
+    /// Fits a hypothesis from the start values of the experiment, by multiple shooting first: for a base model whose motion is out of step. Where
+    /// the first steps do not lead below another fit, there are no more.
+    pub fn refit_anew(
+        &self,
+        hypothesis: &Hypothesis,
+        start: &[(Parameter, f64)],
+        than: &Refit<'_>,
+    ) -> Option<Refit<'a>> {
         let mut problem = self.problem(hypothesis).ok()?;
         for (parameter, value) in start {
             set(&mut problem.experiment, *parameter, *value);
@@ -191,7 +205,9 @@ impl<'a> Ground<'a> {
         let x = multiple_shooting(&mut problem).ok()?.x;
         problem.noise_rad.clone_from(&self.noise_rad);
         problem.accuracy = accuracy;
-        self.descend(hypothesis, problem, x, FEW_STEPS)
+        let begun = self.descend(hypothesis, problem, x, FIRST_STEPS)?;
+        let goes_on = !begun.converged && begun.chi2 < than.chi2;
+        if goes_on { self.again(&begun, FEW_STEPS) } else { Some(begun) }
     }
 
     /// The same hypothesis with the noise as it is known now.

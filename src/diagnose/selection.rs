@@ -28,6 +28,9 @@ const ELSEWHERE: f64 = 0.3;
 const HOPELESS: f64 = 10.0;
 /// A fit that is worse by this than one that only adds an effect may be in a false minimum.
 const STRAGGLES: f64 = 9.0;
+/// Fits that leave this many times the best one's χ² are no seeds, and no pair is promised less than this part of its seed's χ².
+const FAR: f64 = 100.0;
+const AFAR: f64 = 0.01;
 /// Of these, the ones beside which a moving support is looked for.
 const SCANNED: usize = 3;
 /// Pairs fitted in full.
@@ -42,7 +45,7 @@ pub fn fits<'a>(ground: &mut Ground<'a>, null: Refit<'a>, causes: &[Cause], prog
     let scores = Screen::at(ground, &null).map(|s| s.scores(&cheap(ground, causes))).unwrap_or_default();
     let out_of_step = null.is_out_of_step();
     progress.begin("effects", Some(causes.len() as u64));
-    let singles = causes.par_iter().filter_map(|cause| {
+    let singles = causes.par_iter().with_max_len(1).filter_map(|cause| {
         let fit = single(ground, &null, *cause, scores.iter().find(|s| s.cause == *cause), out_of_step);
         progress.advance(1);
         fit
@@ -55,7 +58,7 @@ pub fn fits<'a>(ground: &mut Ground<'a>, null: Refit<'a>, causes: &[Cause], prog
     let (null, singles) = (&all[0], &all[1..]);
     let pairs = promising(ground, null, singles, causes);
     progress.begin("pairs", Some(pairs.len() as u64));
-    let pairs = pairs.par_iter().filter_map(|(seed, score)| {
+    let pairs = pairs.par_iter().with_max_len(1).filter_map(|(seed, score)| {
         let fit = ground.refit(&score.hypothesis(&seed.hypothesis), seed, &score.start);
         progress.advance(1);
         fit
@@ -71,7 +74,10 @@ pub fn fits<'a>(ground: &mut Ground<'a>, null: Refit<'a>, causes: &[Cause], prog
 pub fn from_weaker_dampers<'a>(ground: &Ground<'a>, null: Refit<'a>) -> Refit<'a> {
     let damper = Parameter::JointDamping;
     let Some(strong) = null.value(damper).filter(|_| null.left_share() > MUCH_LEFT) else { return null };
-    let weaker = WEAKER.iter().filter_map(|part| ground.refit(&null.hypothesis, &null, &[(damper, part * strong)]));
+    let weaker = WEAKER
+        .par_iter()
+        .with_max_len(1)
+        .filter_map(|part| ground.refit(&null.hypothesis, &null, &[(damper, part * strong)]));
     let best = weaker.min_by(|a, b| a.chi2.total_cmp(&b.chi2));
     match best {
         Some(best) if best.chi2 < null.chi2 => best,
@@ -100,17 +106,33 @@ fn from_the_best_single<'a>(ground: &Ground<'a>, fits: Vec<Refit<'a>>) -> Vec<Re
         if dear || std::ptr::eq(fit, best) {
             return None;
         }
-        let own: Vec<(Parameter, f64)> = fit.added().iter().filter_map(|p| Some((*p, fit.value(*p)?))).collect();
-        ground.refit(&fit.hypothesis, best, &own).filter(|again| again.chi2 < fit.chi2)
+        elsewhere(ground, fit, &fit.hypothesis, best)
     };
-    let again: Vec<Option<Refit<'a>>> = fits.par_iter().map(again).collect();
+    let again: Vec<Option<Refit<'a>>> = fits.par_iter().with_max_len(1).map(again).collect();
     fits.into_iter().zip(again).map(|(fit, again)| again.unwrap_or(fit)).collect()
+}
+
+/// A fit anew from where another one is, with its own coefficients, if that is a better place to begin from than where it ended.
+fn elsewhere<'a>(
+    ground: &Ground<'a>,
+    fit: &Refit<'a>,
+    hypothesis: &Hypothesis,
+    place: &Refit<'a>,
+) -> Option<Refit<'a>> {
+    let added = fit.added();
+    let own: Vec<(Parameter, f64)> =
+        added.iter().filter(|p| place.value(**p).is_none()).filter_map(|p| Some((*p, fit.value(*p)?))).collect();
+    if !(ground.cost_at(hypothesis, place, &own) < fit.chi2) {
+        return None;
+    }
+    ground.refit(hypothesis, place, &own).filter(|again| again.chi2 < fit.chi2 - 1.0)
 }
 
 /// Where a pair has found a better minimum of a simpler hypothesis, one of its effects being next to nothing, that hypothesis starts anew from it.
 fn without_stragglers<'a>(ground: &Ground<'a>, mut fits: Vec<Refit<'a>>) -> Vec<Refit<'a>> {
     let better: Vec<Option<Refit<'a>>> = fits
         .par_iter()
+        .with_max_len(1)
         .map(|fit| {
             let richer = |other: &&Refit<'a>| {
                 let (few, many) = (&fit.hypothesis.causes, &other.hypothesis.causes);
@@ -118,7 +140,7 @@ fn without_stragglers<'a>(ground: &Ground<'a>, mut fits: Vec<Refit<'a>>) -> Vec<
             };
             let best = fits.iter().filter(richer).min_by(|a, b| a.chi2.total_cmp(&b.chi2))?;
             let hypothesis = Hypothesis { dropped: best.hypothesis.dropped, ..fit.hypothesis.clone() };
-            ground.refit(&hypothesis, best, &[]).filter(|again| again.chi2 < fit.chi2 - 1.0)
+            elsewhere(ground, fit, &hypothesis, best)
         })
         .collect();
     for (fit, better) in fits.iter_mut().zip(better) {
@@ -134,16 +156,18 @@ fn with_refined_noise<'a>(ground: &mut Ground<'a>, fits: Vec<Refit<'a>>) -> Vec<
     let best = fits.iter().min_by(|a, b| a.chi2.total_cmp(&b.chi2));
     let changed = best.is_some_and(|best| ground.refine_noise(best));
     let ground = &*ground;
-    let least = best.map_or(0.0, |best| best.chi2);
+    let (least, null) = (best.map_or(0.0, |best| best.chi2), fits[0].chi2);
     let again = |fit: Refit<'a>| {
-        let worth = fit.hypothesis.causes.is_empty() || fit.chi2 < HOPELESS * (least + HOPELESS);
+        let dear = fit.hypothesis.causes.contains(&Cause::JointHysteretic);
+        let worth = fit.hypothesis.causes.is_empty()
+            || fit.chi2 < HOPELESS * (least + HOPELESS) && !(dear && fit.chi2 > null - WORTH);
         match (changed, worth) {
             (true, _) => ground.again(&fit, if worth { refit::MOST_STEPS } else { 0 }).unwrap_or(fit),
             (false, true) if !fit.converged => ground.again(&fit, refit::MOST_STEPS).unwrap_or(fit),
             _ => fit,
         }
     };
-    fits.into_par_iter().map(again).collect()
+    fits.into_par_iter().with_max_len(1).map(again).collect()
 }
 
 /// One effect, from every start that may lead to its minimum.
@@ -155,14 +179,14 @@ fn single<'a>(
     out_of_step: bool,
 ) -> Option<Refit<'a>> {
     let mut tries = Vec::new();
-    if cause == Cause::JointHysteretic {
-        tries.push(hysteresis::softened(ground, null));
-    }
     let values = ground.values() as f64;
     let unexplained = null.left_share() > MUCH_LEFT || null.chi2 > values + SOMETHING_LEFT * (2.0 * values).sqrt();
+    if cause == Cause::JointHysteretic && unexplained {
+        tries.push(hysteresis::softened(ground, null));
+    }
     if matches!(cause, Cause::RestCurl | Cause::JointHysteretic) && unexplained {
         // a base model that has given its spring or its second mode up is no place to start from
-        tries.push(ground.refit_anew(&Hypothesis::default().and(cause, None), &[]));
+        tries.push(ground.refit_anew(&Hypothesis::default().and(cause, None), &[], null));
     }
     match (cause, score) {
         (Cause::DistributedFlexibility, _) => {
@@ -172,7 +196,7 @@ fn single<'a>(
                 let begun = ground.begin(&hypothesis, null).filter(|b| b.chi2 < HOPEFUL * null.chi2);
                 tries.push(begun.and_then(|begun| ground.again(&begun, refit::FEW_STEPS)));
                 if out_of_step && tries.iter().flatten().all(Refit::is_out_of_step) {
-                    tries.push(ground.refit_anew(&hypothesis, &[]));
+                    tries.push(ground.refit_anew(&hypothesis, &[], null));
                 }
             }
         }
@@ -183,7 +207,7 @@ fn single<'a>(
             // a base model may have damped away what a better one keeps: short stretches remember it
             let slow = unexplained && is_loss(cause) && near.as_ref().is_none_or(|n| !n.converged);
             if lost || slow {
-                tries.push(ground.refit_anew(&hypothesis, &score.start));
+                tries.push(ground.refit_anew(&hypothesis, &score.start, null));
             }
             tries.push(near);
         }
@@ -219,8 +243,11 @@ fn promising<'s, 'a>(
     let mut seeds: Vec<&Refit<'a>> = singles.iter().filter(|s| s.chi2 < null.chi2 - 4.0).collect();
     seeds.sort_by(|a, b| a.chi2.total_cmp(&b.chi2));
     seeds.truncate(SEEDS);
+    let least = seeds.first().map_or(0.0, |s| s.chi2);
+    seeds.retain(|s| s.chi2 < FAR * least);
     let scored: Vec<(&Refit<'a>, Vec<Score>)> = seeds
         .par_iter()
+        .with_max_len(1)
         .enumerate()
         .filter_map(|(rank, seed)| {
             // every frequency of a moving support is dear
@@ -232,7 +259,8 @@ fn promising<'s, 'a>(
     let mut pairs: Vec<(f64, &Refit<'a>, Score)> = Vec::new();
     for (seed, scores) in scored {
         for score in scores.into_iter().filter(|s| s.gain > 4.0) {
-            let promised = seed.chi2 - score.gain;
+            // a promise from afar is worth little
+            let promised = (seed.chi2 - score.gain).max(AFAR * seed.chi2);
             let hypothesis = score.hypothesis(&seed.hypothesis);
             let same = pairs.iter_mut().find(|p| p.2.hypothesis(&p.1.hypothesis).causes == hypothesis.causes);
             match same {
