@@ -4,13 +4,14 @@
 //!
 //! ```text
 //! ln Z = −½χ²/s² + ½ ln det 2πΣ − Σ ln(|β| ln R)      Σ: covariance of the coefficients, everything else being free
+//! s² = 1 + (v − 1)(1 + ρ)/(1 − ρ)                     v = max(1, χ²/N) of the best hypothesis, ρ its correlation from row to row
 //! ```
 //!
-//! s² = max(1, χ²/N of the best hypothesis) allows for noise that was estimated too low. A support's frequency, a joint's yield angle and the instant
+//! Σ is scaled by v. What the best hypothesis leaves beyond the noise goes on from row to row, so that fewer values count than there are. A support's frequency, a joint's yield angle and the instant
 //! of missing frames count as any value within their range.
 
 use super::refit::{Hypothesis, Refit};
-use super::{Cause, Place};
+use super::{Cause, Place, noise};
 use crate::model::Parameter;
 
 /// ln R: sizes over four decades.
@@ -20,6 +21,10 @@ const YIELDS: f64 = 3.4;
 /// Coefficients of less than this many standard deviations are not told from zero.
 const TOLD_FROM_ZERO: f64 = 1.5;
 
+/// From this variance on, over the noise's, a fall of χ² by this many variances counts instead.
+const MUCH_LEFT: f64 = 4.0;
+const NEEDED: f64 = 9.0;
+
 /// Prior probabilities before anything is measured.
 const PRIOR_NULL: f64 = 0.25;
 const PRIOR_ONE: f64 = 0.40;
@@ -28,6 +33,28 @@ const PRIOR_TWO: f64 = 0.25;
 const CAMERA_FIRST: f64 = 2.0;
 /// Of physics outside the table.
 pub const PRIOR_UNKNOWN: f64 = 0.10;
+
+/// How much the best hypothesis leaves, over the variance of the noise.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Scatter {
+    /// v, of one value.
+    pub of_values: f64,
+    /// s², of as many values as there are.
+    pub of_all: f64,
+}
+
+impl Scatter {
+    /// Nothing but noise.
+    pub const NOISE: Self = Self { of_values: 1.0, of_all: 1.0 };
+
+    /// Of a fit to so many values.
+    pub fn of(fit: &Refit<'_>, values: usize) -> Self {
+        let excess = fit.chi2 / values as f64 - 1.0;
+        let Some((left, _)) = (excess > 0.0).then(|| fit.linearised()).flatten() else { return Self::NOISE };
+        let rho = noise::of_all(left.as_slice()).rho.clamp(0.0, 0.99);
+        Self { of_values: 1.0 + excess, of_all: 1.0 + excess * (1.0 + rho) / (1.0 - rho) }
+    }
+}
 
 /// ln of the prior probability of a hypothesis, of `candidates` effects.
 pub fn ln_prior(hypothesis: &Hypothesis, candidates: usize) -> f64 {
@@ -42,14 +69,15 @@ pub fn ln_prior(hypothesis: &Hypothesis, candidates: usize) -> f64 {
         }
 }
 
-/// ln Z of a fitted hypothesis; −∞ where a coefficient is not told from zero.
-pub fn ln_evidence(fit: &Refit<'_>, variance: f64) -> f64 {
-    let likelihood = -0.5 * fit.chi2 / variance;
+/// ln Z of a fitted hypothesis; −∞ where a coefficient is not told from zero. `least_without` is the least χ² of all hypotheses that lack an effect of
+/// it: where far more than noise is left, it says better than the tangent whether that effect is needed.
+pub fn ln_evidence(fit: &Refit<'_>, scatter: Scatter, least_without: impl Fn(Cause) -> f64) -> f64 {
+    let likelihood = -0.5 * fit.chi2 / scatter.of_all;
     let added: Vec<Parameter> = fit.added().into_iter().filter(|p| *p != Parameter::BendingStiffness).collect();
     if added.is_empty() {
         return likelihood;
     }
-    let covariance = fit.covariance(&added) * variance;
+    let covariance = fit.covariance(&added) * scatter.of_values;
     let mut ln_volume = 0.5 * (covariance.clone() * std::f64::consts::TAU).determinant().max(1e-300).ln();
     let of = |parameter: Parameter| {
         let i = added.iter().position(|p| *p == parameter).unwrap_or(0);
@@ -64,7 +92,9 @@ pub fn ln_evidence(fit: &Refit<'_>, variance: f64) -> f64 {
             }
             one => of(one.parameters()[0]),
         };
-        if !(value.abs() > TOLD_FROM_ZERO * sd) {
+        let fall = (least_without(*cause) - fit.chi2) / scatter.of_all;
+        let needed = scatter.of_values > MUCH_LEFT && fall > NEEDED;
+        if !(needed || value.abs() > TOLD_FROM_ZERO * sd) {
             return f64::NEG_INFINITY;
         }
         ln_volume -= (value.abs() * SIZES).ln();

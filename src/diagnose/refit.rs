@@ -27,10 +27,10 @@ const CANDIDATE_PIECES: usize = 3;
 const FIRST_DAMPING: f64 = 1e-8;
 /// Steps of a dear hypothesis before it is known to be worth any, of a first descent, and of one that is worth it.
 const FIRST_STEPS: usize = 4;
-/// Fall of χ² that makes more steps worth it.
-const LED_SOMEWHERE: f64 = 4.0;
 pub(super) const FEW_STEPS: usize = 12;
 pub(super) const MOST_STEPS: usize = 30;
+/// Fall of χ² that makes more steps of a dear hypothesis worth it.
+const LED_SOMEWHERE: f64 = 4.0;
 
 /// What every fit of one diagnosis shares.
 #[derive(Debug, Clone)]
@@ -142,13 +142,7 @@ impl<'a> Ground<'a> {
             }
         }
         let x = if problem.cost(&x) < problem.cost(&careful) { x } else { careful };
-        if !hypothesis.causes.contains(&Cause::JointHysteretic) {
-            return self.descend(hypothesis, problem, x, FEW_STEPS);
-        }
-        // a hysteresis is dear: it goes on only where its first steps have led somewhere
-        let begun = self.descend(hypothesis, problem, x, FIRST_STEPS)?;
-        let goes_on = !begun.converged && begun.chi2 < near.chi2 - LED_SOMEWHERE;
-        if goes_on { self.again(&begun, FEW_STEPS) } else { Some(begun) }
+        self.descend_if_worth(hypothesis, problem, x, near.chi2)
     }
 
     /// The first steps of a refit.
@@ -189,8 +183,8 @@ impl<'a> Ground<'a> {
         Some((problem, x))
     }
 
-    /// Fits a hypothesis from the start values of the experiment, by multiple shooting first: for a base model whose motion is out of step. Where
-    /// the first steps do not lead below another fit, there are no more.
+    /// Fits a hypothesis from the start values of the experiment, by multiple shooting first: for a base model whose motion is out of step, as
+    /// that of another fit is.
     pub fn refit_anew(
         &self,
         hypothesis: &Hypothesis,
@@ -205,8 +199,22 @@ impl<'a> Ground<'a> {
         let x = multiple_shooting(&mut problem).ok()?.x;
         problem.noise_rad.clone_from(&self.noise_rad);
         problem.accuracy = accuracy;
+        self.descend_if_worth(hypothesis, problem, x, than.chi2)
+    }
+
+    /// A first descent; a hysteresis is dear, and goes on only where its first steps lead below some χ².
+    fn descend_if_worth(
+        &self,
+        hypothesis: &Hypothesis,
+        problem: Problem<'a>,
+        x: Vec<f64>,
+        than: f64,
+    ) -> Option<Refit<'a>> {
+        if !hypothesis.causes.contains(&Cause::JointHysteretic) {
+            return self.descend(hypothesis, problem, x, FEW_STEPS);
+        }
         let begun = self.descend(hypothesis, problem, x, FIRST_STEPS)?;
-        let goes_on = !begun.converged && begun.chi2 < than.chi2;
+        let goes_on = !begun.converged && begun.chi2 < than - LED_SOMEWHERE;
         if goes_on { self.again(&begun, FEW_STEPS) } else { Some(begun) }
     }
 

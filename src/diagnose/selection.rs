@@ -44,9 +44,12 @@ const FEWEST_PAIRS: usize = 6;
 pub fn fits<'a>(ground: &mut Ground<'a>, null: Refit<'a>, causes: &[Cause], progress: &dyn Progress) -> Vec<Refit<'a>> {
     let scores = Screen::at(ground, &null).map(|s| s.scores(&cheap(ground, causes))).unwrap_or_default();
     let out_of_step = null.is_out_of_step();
+    // what is found by a scan gains by chance alone
+    let scanned = |cause: Cause| matches!(cause, Cause::DroppedFrames | Cause::SupportMotion);
+    let seen = scores.iter().any(|s| s.gain > WORTH && !scanned(s.cause));
     progress.begin("effects", Some(causes.len() as u64));
     let singles = causes.par_iter().with_max_len(1).filter_map(|cause| {
-        let fit = single(ground, &null, *cause, scores.iter().find(|s| s.cause == *cause), out_of_step);
+        let fit = single(ground, &null, *cause, scores.iter().find(|s| s.cause == *cause), (out_of_step, seen));
         progress.advance(1);
         fit
     });
@@ -170,18 +173,18 @@ fn with_refined_noise<'a>(ground: &mut Ground<'a>, fits: Vec<Refit<'a>>) -> Vec<
     fits.into_par_iter().with_max_len(1).map(again).collect()
 }
 
-/// One effect, from every start that may lead to its minimum.
+/// One effect, from every start that may lead to its minimum; of the base model, whether it is out of step, and whether anything was seen.
 fn single<'a>(
     ground: &Ground<'a>,
     null: &Refit<'a>,
     cause: Cause,
     score: Option<&Score>,
-    out_of_step: bool,
+    (out_of_step, seen): (bool, bool),
 ) -> Option<Refit<'a>> {
     let mut tries = Vec::new();
     let values = ground.values() as f64;
     let unexplained = null.left_share() > MUCH_LEFT || null.chi2 > values + SOMETHING_LEFT * (2.0 * values).sqrt();
-    if cause == Cause::JointHysteretic && unexplained {
+    if cause == Cause::JointHysteretic && (unexplained || seen) {
         tries.push(hysteresis::softened(ground, null));
     }
     if matches!(cause, Cause::RestCurl | Cause::JointHysteretic) && unexplained {

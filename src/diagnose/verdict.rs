@@ -1,10 +1,10 @@
 //! The verdict: adequate, identified, ambiguous or unknown; what cannot be told apart; and the measurement that would tell.
 
-use super::evidence::{self, normalised};
+use super::evidence::{self, Scatter, normalised};
 use super::heldout::HeldOut;
 use super::latent::Latent;
 use super::refit::Refit;
-use super::{Cause, Place, locate, noise};
+use super::{Cause, Place, locate};
 use crate::model::Parameter;
 
 /// A verdict stands alone when it is at least this probable.
@@ -13,8 +13,8 @@ const ALONE: f64 = 0.8;
 const TOLD_APART: f64 = 0.05;
 /// A named law may be wrong by this part of its own torque before something unknown is suspected beside it.
 const LAW_SHARE: f64 = 0.002;
-/// A support in step with the swing can be what it seems to be, or stand for a torque that is not known: even odds.
-const IN_STEP: f64 = 0.5;
+/// A support in step with the swing can be what it seems to be, or stand for a torque that is not known: the odds are about even.
+const IN_STEP: f64 = 0.6;
 /// Where the best of the table leaves this many times the noise, noise is no yardstick for the model any more…
 const BEYOND_NOISE: f64 = 10.0;
 /// … and the best are named if they leave at most this part of what the base model leaves of what was not fitted.
@@ -88,8 +88,15 @@ pub fn weigh<'a>(
     candidates: usize,
     remainder: impl Fn(&Refit<'a>, f64) -> (Vec<Latent>, f64),
 ) -> (Vec<Weighed<'a>>, f64, Vec<Latent>) {
-    let variance = fits.iter().min_by(|a, b| a.chi2.total_cmp(&b.chi2)).map_or(1.0, |best| correlated(best, values));
-    let ln = |f: &Refit<'_>| evidence::ln_evidence(f, variance) + evidence::ln_prior(&f.hypothesis, candidates);
+    let least = fits.iter().min_by(|a, b| a.chi2.total_cmp(&b.chi2));
+    let scatter = least.map_or(Scatter::NOISE, |best| Scatter::of(best, values));
+    let least_without = |cause: Cause| {
+        let others = fits.iter().filter(|f| !f.hypothesis.causes.contains(&cause));
+        others.map(|f| f.chi2).fold(f64::INFINITY, f64::min)
+    };
+    let ln = |f: &Refit<'_>| {
+        evidence::ln_evidence(f, scatter, least_without) + evidence::ln_prior(&f.hypothesis, candidates)
+    };
     let mut posterior: Vec<f64> = fits.iter().map(ln).collect();
     let best = (0..fits.len()).max_by(|a, b| posterior[*a].total_cmp(&posterior[*b])).unwrap_or(0);
     let (latents, added_n_m) = remainder(&fits[best], fits[best].chi2 / values as f64);
@@ -112,15 +119,6 @@ pub fn weigh<'a>(
     // where the unknown takes all, or next to all, their order among themselves still counts
     weighed.sort_by(|a, b| (b.probability.total_cmp(&a.probability)).then(b.ln_posterior.total_cmp(&a.ln_posterior)));
     (weighed, unknown, latents)
-}
-
-/// Variance of what a fit leaves, over the noise's, of which as many values as there are count: what is left beyond the noise goes on from row to row,
-/// and counts for fewer, (1 + ρ)/(1 − ρ) rows for one.
-fn correlated(fit: &Refit<'_>, values: usize) -> f64 {
-    let excess = (fit.chi2 / values as f64 - 1.0).max(0.0);
-    let Some((left, _)) = fit.linearised().filter(|_| excess > 0.0) else { return 1.0 };
-    let rho = noise::of_all(left.as_slice()).rho.clamp(0.0, 0.99);
-    1.0 + excess * (1.0 + rho) / (1.0 - rho)
 }
 
 /// How much likelier an unknown of any size makes the recordings than one that a law's own error allows.
