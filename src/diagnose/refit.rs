@@ -19,8 +19,6 @@ const YIELD_SHARE: f64 = 0.2;
 const OUT_OF_STEP: f64 = 0.35;
 /// Steps of the integration for each second of the recording before a motion is given up.
 const STEPS_EACH_SECOND: f64 = 300.0;
-/// The corners of a hysteresis cost many steps: its motion need not be as exact.
-const CORNERS: f64 = 3.0;
 /// Rods between two marks while bending all along the strip is only a candidate.
 const CANDIDATE_PIECES: usize = 3;
 /// Losses imitate each other closely: only a weakly damped step goes along the valley between them.
@@ -29,8 +27,6 @@ const FIRST_DAMPING: f64 = 1e-8;
 const FIRST_STEPS: usize = 4;
 pub(super) const FEW_STEPS: usize = 12;
 pub(super) const MOST_STEPS: usize = 30;
-/// Fall of χ² that makes more steps of a dear hypothesis worth it.
-const LED_SOMEWHERE: f64 = 4.0;
 
 /// What every fit of one diagnosis shares.
 #[derive(Debug, Clone)]
@@ -120,9 +116,6 @@ impl<'a> Ground<'a> {
         problem.beliefs = beliefs;
         problem.accuracy.step_error_rad = self.step_error_rad;
         problem.accuracy.most_steps = 1000 + (STEPS_EACH_SECOND * self.longest_s()) as usize;
-        if hypothesis.causes.contains(&Cause::JointHysteretic) {
-            problem.accuracy.step_error_rad *= CORNERS;
-        }
         if let Some((record, at_s)) = hypothesis.dropped {
             problem.dropped_at_s[record] = at_s;
         }
@@ -142,7 +135,7 @@ impl<'a> Ground<'a> {
             }
         }
         let x = if problem.cost(&x) < problem.cost(&careful) { x } else { careful };
-        self.descend_if_worth(hypothesis, problem, x, near.chi2)
+        self.descend(hypothesis, problem, x, FEW_STEPS)
     }
 
     /// The first steps of a refit.
@@ -183,14 +176,8 @@ impl<'a> Ground<'a> {
         Some((problem, x))
     }
 
-    /// Fits a hypothesis from the start values of the experiment, by multiple shooting first: for a base model whose motion is out of step, as
-    /// that of another fit is.
-    pub fn refit_anew(
-        &self,
-        hypothesis: &Hypothesis,
-        start: &[(Parameter, f64)],
-        than: &Refit<'_>,
-    ) -> Option<Refit<'a>> {
+    /// Fits a hypothesis from the start values of the experiment, by multiple shooting first: for a base model whose motion is out of step.
+    pub fn refit_anew(&self, hypothesis: &Hypothesis, start: &[(Parameter, f64)]) -> Option<Refit<'a>> {
         let mut problem = self.problem(hypothesis).ok()?;
         for (parameter, value) in start {
             set(&mut problem.experiment, *parameter, *value);
@@ -199,23 +186,7 @@ impl<'a> Ground<'a> {
         let x = multiple_shooting(&mut problem).ok()?.x;
         problem.noise_rad.clone_from(&self.noise_rad);
         problem.accuracy = accuracy;
-        self.descend_if_worth(hypothesis, problem, x, than.chi2)
-    }
-
-    /// A first descent; a hysteresis is dear, and goes on only where its first steps lead below some χ².
-    fn descend_if_worth(
-        &self,
-        hypothesis: &Hypothesis,
-        problem: Problem<'a>,
-        x: Vec<f64>,
-        than: f64,
-    ) -> Option<Refit<'a>> {
-        if !hypothesis.causes.contains(&Cause::JointHysteretic) {
-            return self.descend(hypothesis, problem, x, FEW_STEPS);
-        }
-        let begun = self.descend(hypothesis, problem, x, FIRST_STEPS)?;
-        let goes_on = !begun.converged && begun.chi2 < than - LED_SOMEWHERE;
-        if goes_on { self.again(&begun, FEW_STEPS) } else { Some(begun) }
+        self.descend(hypothesis, problem, x, FEW_STEPS)
     }
 
     /// The same hypothesis with the noise as it is known now.

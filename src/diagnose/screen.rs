@@ -19,8 +19,6 @@ use crate::model::Parameter;
 const NOTHING_LEFT: f64 = 1e-5;
 /// Yield angles of the joint's hysteresis, as parts of the largest bend.
 const YIELDS: [f64; 3] = [0.03, 0.15, 0.6];
-/// The corners of a hysteresis make its motion dear, and a score is only a promise.
-const ROUGH: f64 = 30.0;
 /// Frequencies of a moving support: this fine for the length of the recording.
 const PER_RESOLUTION: f64 = 1.0;
 /// Highest frequency of a moving support, in units of the swing's.
@@ -101,7 +99,7 @@ impl<'g, 'a> Screen<'g, 'a> {
             .copied()
             .filter(|c| !matches!(c, Cause::DroppedFrames | Cause::SupportMotion | Cause::DistributedFlexibility))
             .collect();
-        // the corners of a hysteresis ask for a coarser integration, which the others must not suffer
+        // every corner of a hysteresis ends a step, which the others need not suffer
         let (kinked, smooth): (Vec<Cause>, Vec<Cause>) = smooth.into_iter().partition(|c| *c == Cause::JointHysteretic);
         let mut scores = self.of_coefficients(&smooth, None).unwrap_or_default();
         let yields_rad = YIELDS.map(|share| share * self.ground.largest_bend_rad());
@@ -128,9 +126,6 @@ impl<'g, 'a> Screen<'g, 'a> {
         let mut hypothesis = self.fit.hypothesis.clone();
         hypothesis.causes.extend(causes);
         let mut problem = self.ground.problem(&hypothesis).ok()?;
-        if yield_rad.is_some() {
-            problem.accuracy.step_error_rad *= ROUGH;
-        }
         if let (Some(law), Some(yield_rad)) = (&mut problem.experiment.model.effects.joint_hysteretic, yield_rad) {
             law.yield_rad = yield_rad;
         }

@@ -189,7 +189,7 @@ fn single<'a>(
     }
     if matches!(cause, Cause::RestCurl | Cause::JointHysteretic) && unexplained {
         // a base model that has given its spring or its second mode up is no place to start from
-        tries.push(ground.refit_anew(&Hypothesis::default().and(cause, None), &[], null));
+        tries.push(ground.refit_anew(&Hypothesis::default().and(cause, None), &[]));
     }
     match (cause, score) {
         (Cause::DistributedFlexibility, _) => {
@@ -199,7 +199,7 @@ fn single<'a>(
                 let begun = ground.begin(&hypothesis, null).filter(|b| b.chi2 < HOPEFUL * null.chi2);
                 tries.push(begun.and_then(|begun| ground.again(&begun, refit::FEW_STEPS)));
                 if out_of_step && tries.iter().flatten().all(Refit::is_out_of_step) {
-                    tries.push(ground.refit_anew(&hypothesis, &[], null));
+                    tries.push(ground.refit_anew(&hypothesis, &[]));
                 }
             }
         }
@@ -210,7 +210,7 @@ fn single<'a>(
             // a base model may have damped away what a better one keeps: short stretches remember it
             let slow = unexplained && is_loss(cause) && near.as_ref().is_none_or(|n| !n.converged);
             if lost || slow {
-                tries.push(ground.refit_anew(&hypothesis, &score.start, null));
+                tries.push(ground.refit_anew(&hypothesis, &score.start));
             }
             tries.push(near);
         }

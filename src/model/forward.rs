@@ -109,6 +109,13 @@ impl ForwardModel {
         breaks_s
     }
 
+    /// Quantities at whose zeros a law has a corner.
+    pub fn corners(&self, motion: &Motion) -> Vec<f64> {
+        let mut corners = Vec::new();
+        self.effects.iter().for_each(|e| e.add_corners(&self.chain, motion, &mut corners));
+        corners
+    }
+
     /// An instant with the pivot where it then is.
     pub fn motion(&self, t_s: f64, theta_rad: &[f64], rate: &[f64]) -> Motion {
         let mut motion = Motion::zero(self.chain.count(), self.hidden);

@@ -4,7 +4,7 @@ use nalgebra::{DMatrix, DVector};
 
 use super::collocation::{RADAU, STAGES};
 use super::step::{Slopes, Stages, Start, Step};
-use super::{ForwardModel, Hinge, Parameter};
+use super::{ForwardModel, Hinge, Motion, Parameter};
 use crate::error::{Error, Result};
 
 /// How exact a motion is to be.
@@ -44,6 +44,8 @@ pub(super) struct Place {
 
 /// No link turns this far: a softening spring without end has let go.
 const RUNAWAY_RAD: f64 = 1e4;
+/// Where the laws have more corners than this, steps do not end at each of them.
+const MOST_CORNERS: usize = 4;
 /// Points of a step where a reversal is looked for.
 const LOOKS: usize = 12;
 
@@ -78,6 +80,8 @@ struct Run<'a> {
     breaks_s: Vec<f64>,
     place: Place,
     hinge: Hinge,
+    /// Sides of the laws' corners; empty where there are none, or too many to stop at.
+    sides: Vec<f64>,
     /// Accelerations at the place.
     first: Vec<f64>,
     length_s: f64,
@@ -89,9 +93,11 @@ struct Run<'a> {
 }
 
 /// What ends a step early.
+#[derive(Clone, Copy, PartialEq)]
 enum Turn {
     Reverses,
     Lets,
+    Corner(usize),
 }
 
 impl<'a> Run<'a> {
@@ -116,6 +122,7 @@ impl<'a> Run<'a> {
             breaks_s: model.breaks_s(),
             place,
             hinge: Hinge::SlidesForward,
+            sides: Vec::new(),
             first: Vec::new(),
             length_s: 0.1 * accuracy.longest_step_s,
             last: None,
@@ -124,6 +131,7 @@ impl<'a> Run<'a> {
         };
         run.hinge = run.hinge_at_start()?;
         run.first = run.accelerations(run.hinge)?;
+        run.sides = run.sides_at_start();
         Ok(run)
     }
 
@@ -137,7 +145,7 @@ impl<'a> Run<'a> {
         }
         let mut k = self.guess(h);
         let tolerance_rad = self.accuracy.step_error_rad;
-        let start = start_of(&self.place, self.hinge);
+        let start = start_of(&self.place, self.hinge, &self.sides);
         let Some(()) = self.stages.solve(&start, h, &mut k, tolerance_rad) else {
             self.last = None;
             return self.shorten(0.3 * h).map(|()| None);
@@ -150,13 +158,13 @@ impl<'a> Run<'a> {
         self.length_s = (h * factor.clamp(0.2, 5.0)).min(self.accuracy.longest_step_s).max(self.length_s.min(h));
         let mut step = self.step(h, &k);
         let turn = self.turn_in(&step);
-        if let Some((tau, _)) = &turn {
-            step = self.end_at(step, *tau)?;
+        if let Some((tau, turn)) = turn {
+            step = self.end_at(step, tau, turn)?;
         }
         if let Some((theta, rate)) = &self.slopes {
             let k = DVector::from_column_slice(&step.stages);
             let stages = self.stages.slopes(
-                &start_of(&self.place, self.hinge),
+                &start_of(&self.place, self.hinge, &self.sides),
                 step.length_s,
                 &k,
                 &self.parameters,
@@ -177,7 +185,7 @@ impl<'a> Run<'a> {
         self.first = step.last_acceleration().to_vec();
         let jump = turn.is_some() || self.place.t_s == target_s;
         if let Some((_, turn)) = turn {
-            self.change_hinge(&turn)?;
+            self.change(turn)?;
         } else if self.place.t_s == target_s && target_s < until_s {
             self.first = self.accelerations(self.hinge)?;
         }
@@ -257,34 +265,70 @@ impl<'a> Run<'a> {
         Ok(if hold_n_m.abs() <= friction_n_m { Hinge::Sticks } else { Hinge::sliding(hold_n_m) })
     }
 
-    /// Where in the step the hinge reverses, or is let go.
+    /// Where in the step the hinge first reverses or is let go, or a law comes to a corner.
     fn turn_in(&self, step: &Step) -> Option<(f64, Turn)> {
-        let friction_n_m = self.model.friction_n_m()?;
-        // positive as long as the hinge goes on as it is
-        let goes_on = |tau: f64| match self.hinge {
-            Hinge::Sticks => {
-                let mut motion =
-                    self.model.motion(step.from_s + tau * step.length_s, &step.theta_rad(tau), &step.rate(tau));
-                motion.hinge = Hinge::Sticks;
-                motion.acceleration = step.acceleration(tau);
-                friction_n_m - self.model.hold_n_m(&motion).abs()
-            }
-            slides => slides.sign() * step.one_rate(0, tau),
-        };
-        let turn = |tau| (tau, if self.hinge == Hinge::Sticks { Turn::Lets } else { Turn::Reverses });
+        let turns = if self.hinge == Hinge::Sticks { Turn::Lets } else { Turn::Reverses };
+        let hinge = self.model.friction_n_m().map(|_| turns);
+        let mut instant = Motion::zero(self.place.theta_rad.len(), self.place.rate.len() - self.place.theta_rad.len());
         let mut inside = 0.0;
         for look in 1..=LOOKS {
             let tau = look as f64 / LOOKS as f64;
-            if goes_on(tau) < 0.0 {
-                return Some(turn(root(inside, tau, goes_on)));
+            let hinge = hinge.filter(|turn| self.hinge_goes_on(step, tau, *turn) < 0.0);
+            let hinge = hinge.map(|turn| (root(inside, tau, |tau| self.hinge_goes_on(step, tau, turn)), turn));
+            let corners = self.before_corners(step, tau, &mut instant);
+            let corners = corners.iter().enumerate().filter(|(_, before)| **before < 0.0).map(|(which, _)| {
+                let before = |tau| self.before_corners(step, tau, &mut instant.clone())[which];
+                (root(inside, tau, before), Turn::Corner(which))
+            });
+            if let Some(first) = hinge.into_iter().chain(corners).min_by(|a, b| a.0.total_cmp(&b.0)) {
+                return Some(first);
             }
             inside = tau;
         }
         None
     }
 
-    /// The same step, ended where the hinge turns.
-    fn end_at(&mut self, step: Step, tau: f64) -> Result<Step> {
+    /// Positive as long as the hinge goes on as it is.
+    fn hinge_goes_on(&self, step: &Step, tau: f64, turn: Turn) -> f64 {
+        if turn == Turn::Reverses {
+            return self.hinge.sign() * step.one_rate(0, tau);
+        }
+        let mut motion = self.model.motion(step.from_s + tau * step.length_s, &step.theta_rad(tau), &step.rate(tau));
+        motion.hinge = Hinge::Sticks;
+        motion.acceleration = step.acceleration(tau);
+        self.model.friction_n_m().unwrap_or(0.0) - self.model.hold_n_m(&motion).abs()
+    }
+
+    /// Of every corner a quantity that is positive up to there; only the rates of `instant` count.
+    fn before_corners(&self, step: &Step, tau: f64, instant: &mut Motion) -> Vec<f64> {
+        if self.sides.is_empty() {
+            return Vec::new();
+        }
+        instant.rate = step.rate(tau);
+        self.model.corners(instant).iter().zip(&self.sides).map(|(corner, side)| corner * side).collect()
+    }
+
+    /// The sides of the corners at the outset; at a corner itself the one to which the motion goes: in pairs of a rate and of what has followed it.
+    fn sides_at_start(&self) -> Vec<f64> {
+        let mut motion = self.model.motion(self.place.t_s, &self.place.theta_rad, &self.place.rate);
+        let now = self.model.corners(&motion);
+        if now.is_empty() || now.len() > MOST_CORNERS {
+            return Vec::new();
+        }
+        for (rate, change) in motion.rate.iter_mut().zip(&self.first) {
+            *rate += 1e-9 * change;
+        }
+        let next = self.model.corners(&motion);
+        let mut sides: Vec<f64> = now.iter().zip(&next).map(|(a, b)| if *a == 0.0 { *b } else { *a }).collect();
+        for pair in sides.chunks_exact_mut(2) {
+            pair[0] = pair[0].signum();
+            pair[1] = if pair[1] == 0.0 { pair[0] } else { pair[1].signum() };
+        }
+        sides
+    }
+
+    /// The same step, ended where something turns.
+    fn end_at(&mut self, step: Step, tau: f64, turn: Turn) -> Result<Step> {
         let mut step = step;
         let mut end = tau;
         // the polynomial's root first; a second pass lands on the reversal of the shorter step itself
@@ -298,11 +342,12 @@ impl<'a> Run<'a> {
             for (stage, node) in RADAU.nodes.iter().enumerate() {
                 k.rows_mut(stage * m, m).copy_from_slice(&step.acceleration(node * end));
             }
-            let start = start_of(&self.place, self.hinge);
+            let start = start_of(&self.place, self.hinge, &self.sides);
             let tolerance_rad = self.accuracy.step_error_rad;
             self.stages.solve(&start, length_s, &mut k, tolerance_rad).ok_or_else(|| self.stuck("no reversal"))?;
             step = self.step(length_s, &k);
-            if self.hinge == Hinge::Sticks {
+            // a corner only bends the force: to have ended close by is enough
+            if turn != Turn::Reverses {
                 break;
             }
             let correction_s = step.one_rate(0, 1.0) / step.last_acceleration()[0];
@@ -314,14 +359,24 @@ impl<'a> Run<'a> {
         Ok(step)
     }
 
-    fn change_hinge(&mut self, turn: &Turn) -> Result<()> {
+    fn change(&mut self, turn: Turn) -> Result<()> {
+        match turn {
+            Turn::Corner(which) => {
+                self.sides[which] = -self.sides[which];
+                Ok(())
+            }
+            Turn::Reverses | Turn::Lets => self.change_hinge(turn),
+        }
+    }
+
+    fn change_hinge(&mut self, turn: Turn) -> Result<()> {
         let before = std::mem::take(&mut self.first);
         match turn {
             Turn::Lets => {
                 self.hinge = Hinge::sliding(self.hold_n_m()?);
                 self.first = self.accelerations(self.hinge)?;
             }
-            Turn::Reverses => {
+            Turn::Reverses | Turn::Corner(_) => {
                 let back = Hinge::sliding(-self.hinge.sign());
                 self.place.rate[0] = 0.0;
                 let slid = self.accelerations(back)?;
@@ -356,8 +411,8 @@ impl<'a> Run<'a> {
     }
 }
 
-fn start_of(place: &Place, hinge: Hinge) -> Start<'_> {
-    Start { from_s: place.t_s, theta_rad: &place.theta_rad, rate: &place.rate, hinge }
+fn start_of<'p>(place: &'p Place, hinge: Hinge, sides: &'p [f64]) -> Start<'p> {
+    Start { from_s: place.t_s, theta_rad: &place.theta_rad, rate: &place.rate, hinge, sides }
 }
 
 fn step_of_no_length(step: Step) -> Step {

@@ -24,6 +24,9 @@ pub struct Motion {
     pub pivot_m_s2: f64,
     /// What a dry hinge does.
     pub hinge: Hinge,
+    /// On which side of its corners a law is (±1 for each of [`ForwardModel::corners`](super::ForwardModel::corners)), while a step is sought that
+    /// ends at the next corner; empty where the laws go by the instant itself.
+    pub sides: Vec<f64>,
 }
 
 /// The state of dry friction at the hinge.
@@ -66,6 +69,7 @@ impl Motion {
             pivot_m_s: 0.0,
             pivot_m_s2: 0.0,
             hinge: Hinge::SlidesForward,
+            sides: Vec::new(),
         }
     }
 

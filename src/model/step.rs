@@ -151,6 +151,8 @@ pub struct Start<'a> {
     pub rate: &'a [f64],
     /// What the dry hinge does.
     pub hinge: Hinge,
+    /// On which side of their corners the laws are.
+    pub sides: &'a [f64],
 }
 
 impl<'a> Stages<'a> {
@@ -332,6 +334,8 @@ impl<'a> Stages<'a> {
             }
         }
         motion.hinge = start.hinge;
+        motion.sides.clear();
+        motion.sides.extend_from_slice(start.sides);
         self.model.set_time(motion, start.from_s + h * RADAU.nodes[stage]);
     }
 }

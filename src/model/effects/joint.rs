@@ -114,10 +114,15 @@ pub struct Hysteresis {
 }
 
 impl Hysteresis {
-    /// ż Δ_y, and its slopes with Δ̇ and with z.
-    fn flow(rate: f64, z: f64) -> (f64, f64, f64) {
-        let value = rate - 0.5 * rate.abs() * z - 0.5 * rate * z.abs();
-        (value, 1.0 - 0.5 * rate.signum() * z - 0.5 * z.abs(), -0.5 * rate.abs() - 0.5 * rate * z.signum())
+    /// ż Δ_y, and its slopes with Δ̇ and with z: Δ̇ [1 − ½(sgn Δ̇ + sgn z) z].
+    fn flow(motion: &Motion, bend: &Bend, z: f64) -> (f64, f64, f64) {
+        let rate = bend.rate_rad_s;
+        let signs = match motion.sides.get(2 * bend.upper..2 * bend.upper + 2) {
+            Some(sides) => sides[0] + sides[1],
+            None => rate.signum() + z.signum(),
+        };
+        let open = 1.0 - 0.5 * signs * z;
+        (rate * open, open, -0.5 * signs * rate)
     }
 }
 
@@ -131,7 +136,7 @@ impl Effect for Hysteresis {
         for bend in bends(chain, motion) {
             let row = n + bend.upper;
             bend.add_torque(self.torque_n_m * motion.rate[row], q);
-            q[row] += Self::flow(bend.rate_rad_s, motion.rate[row]).0 / self.yield_rad - motion.acceleration[row];
+            q[row] += Self::flow(motion, &bend, motion.rate[row]).0 / self.yield_rad - motion.acceleration[row];
         }
     }
 
@@ -139,7 +144,7 @@ impl Effect for Hysteresis {
         let n = chain.count();
         for bend in bends(chain, motion) {
             let row = n + bend.upper;
-            let (_, with_rate, with_z) = Self::flow(bend.rate_rad_s, motion.rate[row]);
+            let (_, with_rate, with_z) = Self::flow(motion, &bend, motion.rate[row]);
             partials.rate[(bend.upper, row)] += self.torque_n_m;
             partials.rate[(bend.upper + 1, row)] -= self.torque_n_m;
             partials.rate[(row, bend.upper)] -= bend.ratio * with_rate / self.yield_rad;
@@ -168,11 +173,17 @@ impl Effect for Hysteresis {
             match parameter {
                 Parameter::HysteresisTorque => bend.add_torque(motion.rate[row], q),
                 Parameter::HysteresisYield => {
-                    q[row] -= Self::flow(bend.rate_rad_s, motion.rate[row]).0 / self.yield_rad.powi(2);
+                    q[row] -= Self::flow(motion, &bend, motion.rate[row]).0 / self.yield_rad.powi(2);
                 }
                 _ => {}
             }
         }
+    }
+
+    /// Δ̇ and z of every joint.
+    fn add_corners(&self, chain: &Chain, motion: &Motion, corners: &mut Vec<f64>) {
+        let n = chain.count();
+        bends(chain, motion).for_each(|bend| corners.extend([bend.rate_rad_s, motion.rate[n + bend.upper]]));
     }
 
     /// ½T_hΔ_y z²/σ: what the spring T_h/Δ_y of small motions stores.
