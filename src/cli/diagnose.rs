@@ -27,7 +27,7 @@ const WRITTEN: usize = 25;
 #[derive(Debug, clap::Args)]
 #[command(after_help = "\
 Examples:
-  freeswing diagnose angles.csv --config videos/kapton.toml
+  freeswing diagnose kapton.csv --config videos/kapton.base.toml --figure diagnosis.svg
   freeswing diagnose small.csv large.csv --config experiment.toml --json diagnosis.json
   freeswing diagnose --detectable --config experiment.toml --duration 60 --rate 30 --noise-rad 3e-4
 
@@ -177,11 +177,15 @@ impl Report<'_> {
             text.push_str(&paragraph("", &format!("To decide: {advice}.")));
         }
         text.push('\n');
-        let mut table = Table::new(["the base model and", "probability", "left mrad", "coefficient", "sd", "unit"]);
+        // where the names stand although more is missing, they are weighed among themselves
+        let among = verdict::is_beyond_noise(self.diagnosis.named());
+        let probability = if among { "among these" } else { "probability" };
+        let mut table = Table::new(["the base model and", probability, "left mrad", "coefficient", "sd", "unit"]);
         for weighed in self.diagnosis.weighed.iter().take(LISTED) {
             let left = rmse_rad(&weighed.fit).iter().map(|r| number(1e3 * r, 3)).collect::<Vec<_>>().join(" ");
+            let probability = if among { weighed.if_named } else { weighed.probability };
             let mut first =
-                [names(&weighed.fit.hypothesis.causes, "nothing else"), number(weighed.probability.max(0.0), 3), left];
+                [names(&weighed.fit.hypothesis.causes, "nothing else"), number(probability.max(0.0), 3), left];
             for (parameter, value, sd) in coefficients(&weighed.fit) {
                 let [name, probability, left] = std::mem::take(&mut first);
                 table.row([name, probability, left, number(value, 4), number(sd, 2), parameter.unit().to_owned()]);

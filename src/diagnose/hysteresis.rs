@@ -96,3 +96,51 @@ pub fn softened<'a>(ground: &Ground<'a>, null: &Refit<'a>) -> Option<Refit<'a>> 
         .min_by(|a, b| ground.cost_at(&hypothesis, null, a).total_cmp(&ground.cost_at(&hypothesis, null, b)))?;
     ground.refit(&hypothesis, null, &best)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::fit::Ending;
+    use nalgebra::{DMatrix, DVector};
+
+    /// What is fitted: some linear function of (T_h, Δ_y) and another variable.
+    fn slopes() -> DMatrix<f64> {
+        DMatrix::from_row_slice(4, 3, &[1.0, 3.0, -2.0, 0.5, -1.0, 4.0, 2.0, 0.3, 1.0, -1.0, 2.0, 0.7])
+    }
+
+    #[test]
+    fn there_and_back_the_normal_matrix_is_the_same() {
+        let valley = Straightened { torque: 0, yields: 2 };
+        let x = vec![3e-6, 7.0, 0.05];
+        let straight = valley.straight(x.clone());
+        assert!((straight[0] - 6e-5).abs() < 1e-18);
+        let residual = DVector::zeros(4);
+        let mut blocks = vec![Block { columns: vec![0, 1, 2], residual, slopes: slopes(), robust: true }];
+        valley.straighten(&mut blocks, &straight);
+        let normal = blocks[0].slopes.tr_mul(&blocks[0].slopes);
+        let outcome =
+            Outcome { x: straight, cost: 0.0, blocks: Vec::new(), normal, steps: 0, ending: Ending::Converged };
+        let back = valley.bend(outcome);
+        assert!(back.x.iter().zip(&x).all(|(a, b)| (a / b - 1.0).abs() < 1e-12), "{:?}", back.x);
+        let direct = slopes().tr_mul(&slopes());
+        assert!((&back.normal - &direct).amax() < 1e-9 * direct.amax(), "{} {direct}", back.normal);
+    }
+
+    #[test]
+    fn derivatives_are_those_of_the_straight_variables() {
+        let valley = Straightened { torque: 0, yields: 2 };
+        let straight = [6e-5, 7.0, 0.05];
+        let value = |straight: &[f64]| slopes() * DVector::from_vec(valley.bent(straight));
+        let residual = DVector::zeros(4);
+        let mut blocks = vec![Block { columns: vec![0, 1, 2], residual, slopes: slopes(), robust: true }];
+        valley.straighten(&mut blocks, &straight);
+        for column in 0..3 {
+            let step = 1e-6 * straight[column];
+            let mut moved = straight;
+            moved[column] += step;
+            let difference = (value(&moved) - value(&straight)) / step;
+            let slope = blocks[0].slopes.column(column);
+            assert!((difference - slope).amax() < 1e-5 * slope.amax(), "{column}");
+        }
+    }
+}

@@ -187,10 +187,6 @@ fn single<'a>(
     if cause == Cause::JointHysteretic && (unexplained || seen) {
         tries.push(hysteresis::softened(ground, null));
     }
-    if matches!(cause, Cause::RestCurl | Cause::JointHysteretic) && unexplained {
-        // a base model that has given its spring or its second mode up is no place to start from
-        tries.push(ground.refit_anew(&Hypothesis::default().and(cause, None), &[]));
-    }
     match (cause, score) {
         (Cause::DistributedFlexibility, _) => {
             // many links are dear: only where there is something to explain
@@ -215,6 +211,11 @@ fn single<'a>(
             tries.push(near);
         }
         (_, None) => {}
+    }
+    let lost = tries.iter().flatten().all(|t| t.left_share() > MUCH_LEFT);
+    if matches!(cause, Cause::RestCurl | Cause::JointHysteretic) && unexplained && lost {
+        // a base model that has given its spring or its second mode up is no place to start from
+        tries.push(ground.refit_anew(&Hypothesis::default().and(cause, None), &[]));
     }
     tries.into_iter().flatten().min_by(|a, b| a.chi2.total_cmp(&b.chi2))
 }

@@ -16,7 +16,7 @@ const LAW_SHARE: f64 = 0.002;
 /// A support in step with the swing can be what it seems to be, or stand for a torque that is not known: the odds are about even.
 const IN_STEP: f64 = 0.6;
 /// Where the best of the table leaves this many times the noise, noise is no yardstick for the model any more…
-const BEYOND_NOISE: f64 = 10.0;
+const BEYOND_NOISE: f64 = 5.0;
 /// … and the best are named if they leave at most this part of what the base model leaves of what was not fitted.
 const PROVEN: f64 = 0.5;
 
