@@ -183,7 +183,8 @@ fn single<'a>(
 ) -> Option<Refit<'a>> {
     let mut tries = Vec::new();
     let values = ground.values() as f64;
-    let unexplained = null.left_share() > MUCH_LEFT || null.chi2 > values + SOMETHING_LEFT * (2.0 * values).sqrt();
+    let too_much = values + SOMETHING_LEFT * (2.0 * values).sqrt();
+    let unexplained = null.left_share() > MUCH_LEFT || null.chi2 > too_much;
     if cause == Cause::JointHysteretic && (unexplained || seen) {
         tries.push(hysteresis::softened(ground, null));
     }
@@ -212,8 +213,8 @@ fn single<'a>(
         }
         (_, None) => {}
     }
-    let lost = tries.iter().flatten().all(|t| t.left_share() > MUCH_LEFT);
-    if matches!(cause, Cause::RestCurl | Cause::JointHysteretic) && unexplained && lost {
+    let unsolved = unexplained && tries.iter().flatten().all(|t| t.chi2 > too_much);
+    if matches!(cause, Cause::RestCurl | Cause::JointHysteretic) && unsolved {
         // a base model that has given its spring or its second mode up is no place to start from
         tries.push(ground.refit_anew(&Hypothesis::default().and(cause, None), &[]));
     }
