@@ -289,7 +289,10 @@ impl Report<'_> {
     fn phase(&self) -> Option<Phase> {
         match self.diagnosis.verdict.status {
             Status::Adequate => None,
-            Status::Unknown => self.diagnosis.departure.goes_with,
+            Status::Unknown => {
+                let of_torque = self.diagnosis.missing_torque.as_ref().and_then(|t| t.phase);
+                of_torque.or(self.diagnosis.departure.goes_with)
+            }
             _ => self.diagnosis.main_effect().and_then(Phase::of),
         }
     }

@@ -10,7 +10,8 @@ use rand::rngs::StdRng;
 use rand_distr::{Distribution, StandardNormal};
 use rayon::prelude::*;
 
-use super::refit::{Ground, Refit};
+use super::ground::Ground;
+use super::refit::Refit;
 use super::screen::{Score, Screen};
 use super::{Cause, selection};
 use crate::model::Parameter;

@@ -10,7 +10,8 @@
 //! Σ is scaled by v. What the best hypothesis leaves beyond the noise goes on from row to row, so that fewer values count than there are. A support's frequency, a joint's yield angle and the instant
 //! of missing frames count as any value within their range.
 
-use super::refit::{Hypothesis, Refit};
+use super::ground::Hypothesis;
+use super::refit::Refit;
 use super::{Cause, Place, noise};
 use crate::model::Parameter;
 

@@ -1,6 +1,7 @@
 //! The proof: fit on one part, predict the other with every coefficient frozen.
 
-use super::refit::{Ground, Hypothesis, Refit};
+use super::ground::{Ground, Hypothesis};
+use super::refit::Refit;
 use crate::fit::{Belief, Record};
 
 /// Part of a recording that is fitted; the rest is predicted.

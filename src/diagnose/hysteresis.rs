@@ -4,7 +4,9 @@
 //! the valley of equal sums is bent, and a descent creeps along it; in (K, T_h/Δ_y, Δ_y) it is straight.
 
 use super::Cause;
-use super::refit::{Ground, Hypothesis, Refit};
+use super::ground::{Ground, Hypothesis};
+use super::refit::Refit;
+use super::screen::Score;
 use crate::fit::Problem;
 use crate::fit::descent::{Block, Outcome};
 use crate::model::Parameter;
@@ -73,8 +75,24 @@ impl Straightened {
     }
 }
 
-/// The hysteresis alone, where it makes up a part of what the base model takes for the spring: from the best of several such starts.
-pub fn softened<'a>(ground: &Ground<'a>, null: &Refit<'a>) -> Option<Refit<'a>> {
+/// The hysteresis alone, from every start that may lead to its minimum: where the score points, and, as far as there is something to explain, as a part of
+/// the spring, and from short stretches that do not know what the base model has given up.
+pub fn alone<'a>(
+    ground: &Ground<'a>,
+    null: &Refit<'a>,
+    score: Option<&Score>,
+    (unexplained, seen): (bool, bool),
+) -> Option<Refit<'a>> {
+    let hypothesis = Hypothesis::default().and(Cause::JointHysteretic, None);
+    let near = || score.and_then(|score| ground.refit(&hypothesis, null, &score.start));
+    let softened = || (unexplained || seen).then(|| softened(ground, null)).flatten();
+    let anew = || unexplained.then(|| ground.refit_anew(&hypothesis, &[])).flatten();
+    let (near, (softened, anew)) = rayon::join(near, || rayon::join(softened, anew));
+    [near, softened, anew].into_iter().flatten().min_by(|a, b| a.chi2.total_cmp(&b.chi2))
+}
+
+/// The hysteresis where it makes up a part of what the base model takes for the spring: from the best of several such starts.
+fn softened<'a>(ground: &Ground<'a>, null: &Refit<'a>) -> Option<Refit<'a>> {
     let spring =
         [Parameter::JointStiffness, Parameter::BendingStiffness].into_iter().find(|p| null.value(*p).is_some())?;
     let hypothesis = Hypothesis::default().and(Cause::JointHysteretic, None);

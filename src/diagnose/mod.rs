@@ -4,6 +4,7 @@
 //! |---|---|
 //! | [`cause`] | the table of effects |
 //! | [`noise`] | the noise, from where the motion has no power |
+//! | [`ground`] | what all fits share, and the ways to make one |
 //! | [`refit`] | the base model with some effects, fitted |
 //! | [`hysteresis`] | where its fit starts, and in which variables |
 //! | [`screen`] | which would lower the residuals |
@@ -23,6 +24,7 @@ pub mod adequacy;
 pub mod cause;
 pub mod energy;
 pub mod evidence;
+pub mod ground;
 pub mod heldout;
 pub mod hysteresis;
 pub mod latent;
@@ -45,11 +47,12 @@ use crate::progress::Progress;
 
 pub use adequacy::Detectable;
 pub use cause::{Cause, Place};
+pub use ground::{Ground, Hypothesis};
 pub use heldout::HeldOut;
 pub use latent::{Beyond, Latent};
 pub use locate::Departure;
 pub use plan::{Plan, planned};
-pub use refit::{Ground, Hypothesis, Refit};
+pub use refit::Refit;
 pub use torque::{MissingTorque, Phase};
 pub use verdict::{Status, Verdict, Weighed};
 
@@ -215,11 +218,11 @@ pub fn diagnose<'a>(
     };
     let nothing = Hypothesis::default();
     let null = ground
-        .descend(&nothing, ground.problem(&nothing)?, prepared.x.clone(), refit::MOST_STEPS)
+        .descend(&nothing, ground.problem(&nothing)?, prepared.x.clone(), ground::MOST_STEPS)
         .ok_or_else(refused)?;
     let null = selection::from_weaker_dampers(&ground, null);
     let null =
-        if ground.refine_noise(&null) { ground.again(&null, refit::MOST_STEPS).ok_or_else(refused)? } else { null };
+        if ground.refine_noise(&null) { ground.again(&null, ground::MOST_STEPS).ok_or_else(refused)? } else { null };
     let fits = selection::fits(&mut ground, null, &causes, progress);
     let (weighed, unknown, unknowns) = verdict::weigh(fits, ground.values(), causes.len(), |fit, variance| {
         (locate::unknowns(fit, variance, Beyond::TheFit), energy::added_torque_n_m(fit))

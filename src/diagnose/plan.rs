@@ -1,7 +1,7 @@
 //! Before an experiment: what a planned recording could show, and what it could tell apart.
 
 use super::adequacy::{Detectable, detectable};
-use super::refit::{Ground, Hypothesis};
+use super::ground::{Ground, Hypothesis};
 use super::screen::Screen;
 use super::{Cause, base_of};
 use crate::error::{Error, Result};

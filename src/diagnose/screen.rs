@@ -11,7 +11,8 @@
 use nalgebra::{DMatrix, DVector};
 
 use super::Cause;
-use super::refit::{Ground, Hypothesis, Refit};
+use super::ground::{Ground, Hypothesis};
+use super::refit::Refit;
 use super::surroundings::Surroundings;
 use crate::model::Parameter;
 

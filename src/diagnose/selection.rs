@@ -2,7 +2,8 @@
 
 use rayon::prelude::*;
 
-use super::refit::{self, Ground, Hypothesis, Refit};
+use super::ground::{self, Ground, Hypothesis};
+use super::refit::Refit;
 use super::screen::{Score, Screen};
 use super::{Cause, hysteresis};
 use crate::model::Parameter;
@@ -165,8 +166,8 @@ fn with_refined_noise<'a>(ground: &mut Ground<'a>, fits: Vec<Refit<'a>>) -> Vec<
         let worth = fit.hypothesis.causes.is_empty()
             || fit.chi2 < HOPELESS * (least + HOPELESS) && !(dear && fit.chi2 > null - WORTH);
         match (changed, worth) {
-            (true, _) => ground.again(&fit, if worth { refit::MOST_STEPS } else { 0 }).unwrap_or(fit),
-            (false, true) if !fit.converged => ground.again(&fit, refit::MOST_STEPS).unwrap_or(fit),
+            (true, _) => ground.again(&fit, if worth { ground::MOST_STEPS } else { 0 }).unwrap_or(fit),
+            (false, true) if !fit.converged => ground.again(&fit, ground::MOST_STEPS).unwrap_or(fit),
             _ => fit,
         }
     };
@@ -181,20 +182,20 @@ fn single<'a>(
     score: Option<&Score>,
     (out_of_step, seen): (bool, bool),
 ) -> Option<Refit<'a>> {
-    let mut tries = Vec::new();
     let values = ground.values() as f64;
     let too_much = values + SOMETHING_LEFT * (2.0 * values).sqrt();
     let unexplained = null.left_share() > MUCH_LEFT || null.chi2 > too_much;
-    if cause == Cause::JointHysteretic && (unexplained || seen) {
-        tries.push(hysteresis::softened(ground, null));
+    if cause == Cause::JointHysteretic {
+        return hysteresis::alone(ground, null, score, (unexplained, seen));
     }
+    let mut tries = Vec::new();
     match (cause, score) {
         (Cause::DistributedFlexibility, _) => {
             // many links are dear: only where there is something to explain
             if unexplained {
                 let hypothesis = Hypothesis::default().and(cause, None);
                 let begun = ground.begin(&hypothesis, null).filter(|b| b.chi2 < HOPEFUL * null.chi2);
-                tries.push(begun.and_then(|begun| ground.again(&begun, refit::FEW_STEPS)));
+                tries.push(begun.and_then(|begun| ground.again(&begun, ground::FEW_STEPS)));
                 if out_of_step && tries.iter().flatten().all(Refit::is_out_of_step) {
                     tries.push(ground.refit_anew(&hypothesis, &[]));
                 }
@@ -214,8 +215,8 @@ fn single<'a>(
         (_, None) => {}
     }
     let unsolved = unexplained && tries.iter().flatten().all(|t| t.chi2 > too_much);
-    if matches!(cause, Cause::RestCurl | Cause::JointHysteretic) && unsolved {
-        // a base model that has given its spring or its second mode up is no place to start from
+    if cause == Cause::RestCurl && unsolved {
+        // a base model that has given its second mode up is no place to start from
         tries.push(ground.refit_anew(&Hypothesis::default().and(cause, None), &[]));
     }
     tries.into_iter().flatten().min_by(|a, b| a.chi2.total_cmp(&b.chi2))

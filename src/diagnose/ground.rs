@@ -1,0 +1,295 @@
+//! What every fit of one diagnosis shares, and the ways to make one: near another fit, anew, again.
+
+use super::hysteresis::Straightened;
+use super::refit::Refit;
+use super::{Cause, noise};
+use crate::error::Result;
+use crate::experiment::{Experiment, Hysteresis};
+use crate::fit::descent::Descent;
+use crate::fit::shooting::multiple_shooting;
+use crate::fit::{Belief, Problem, Record};
+use crate::model::Parameter;
+use crate::model::observe::chord_angles_rad;
+
+/// A yield angle of the joint's hysteresis to start from, as a part of the largest bend.
+const YIELD_SHARE: f64 = 0.2;
+/// Steps of the integration for each second of the recording before a motion is given up.
+const STEPS_EACH_SECOND: f64 = 300.0;
+/// Rods between two marks while bending all along the strip is only a candidate.
+const CANDIDATE_PIECES: usize = 3;
+/// Losses imitate each other closely: only a weakly damped step goes along the valley between them.
+const FIRST_DAMPING: f64 = 1e-8;
+/// Steps of a dear hypothesis before it is known to be worth any, of a first descent, and of one that is worth it.
+const FIRST_STEPS: usize = 4;
+pub(super) const FEW_STEPS: usize = 12;
+pub(super) const MOST_STEPS: usize = 30;
+
+/// What every fit of one diagnosis shares.
+#[derive(Debug, Clone)]
+pub struct Ground<'a> {
+    /// The recordings.
+    pub records: &'a [Record],
+    /// Specimen, rig and start values.
+    pub experiment: &'a Experiment,
+    /// The base model's parameters.
+    pub base: Vec<Parameter>,
+    /// What is known of them.
+    pub beliefs: Vec<Belief>,
+    /// Noise of each angle, `[record][link]`.
+    pub noise_rad: Vec<Vec<f64>>,
+    /// AR(1) correlation of the noise.
+    pub colour: Vec<Vec<f64>>,
+    /// Of the integration.
+    pub step_error_rad: f64,
+}
+
+/// The base model with some effects.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Hypothesis {
+    /// The effects added.
+    pub causes: Vec<Cause>,
+    /// From which stamp on frames are missing, and in which recording.
+    pub dropped: Option<(usize, f64)>,
+}
+
+impl Hypothesis {
+    /// With one effect more.
+    #[must_use]
+    pub fn and(&self, cause: Cause, dropped: Option<(usize, f64)>) -> Self {
+        let mut causes = self.causes.clone();
+        causes.push(cause);
+        causes.sort_unstable();
+        Self { causes, dropped: if cause == Cause::DroppedFrames { dropped } else { self.dropped } }
+    }
+}
+
+impl<'a> Ground<'a> {
+    /// The problem of a hypothesis.
+    ///
+    /// # Errors
+    /// As [`Problem::new`].
+    pub fn problem(&self, hypothesis: &Hypothesis) -> Result<Problem<'a>> {
+        let mut free = self.base.clone();
+        let mut beliefs = self.beliefs.clone();
+        let mut experiment = self.experiment.clone();
+        for cause in &hypothesis.causes {
+            if *cause == Cause::DistributedFlexibility {
+                free.retain(|p| *p != Parameter::JointStiffness);
+                experiment.model.pieces = CANDIDATE_PIECES;
+                let lengths_m = experiment.specimen.lengths_m();
+                let mark_m = lengths_m.iter().sum::<f64>() / lengths_m.len() as f64;
+                experiment.model.effects.distributed_flexibility = Some(experiment.model.k_eq_n_m_per_rad * mark_m);
+            }
+            if *cause == Cause::JointHysteretic {
+                let yield_rad = YIELD_SHARE * self.largest_bend_rad();
+                beliefs.push(Belief { parameter: Parameter::HysteresisYield, value: yield_rad, sd: 2.5 * yield_rad });
+                experiment.model.effects.joint_hysteretic = Some(Hysteresis { torque_n_m: 0.0, yield_rad });
+            }
+            free.extend(cause.parameters());
+        }
+        let mut problem = Problem::new(self.records, &experiment, &free)?;
+        problem.noise_rad.clone_from(&self.noise_rad);
+        problem.colour.clone_from(&self.colour);
+        problem.beliefs = beliefs;
+        problem.accuracy.step_error_rad = self.step_error_rad;
+        problem.accuracy.most_steps = 1000 + (STEPS_EACH_SECOND * self.longest_s()) as usize;
+        if let Some((record, at_s)) = hypothesis.dropped {
+            problem.dropped_at_s[record] = at_s;
+        }
+        Ok(problem)
+    }
+
+    /// Fits a hypothesis from the parameters of another fit; `start` gives values of further ones.
+    pub fn refit(&self, hypothesis: &Hypothesis, near: &Refit<'_>, start: &[(Parameter, f64)]) -> Option<Refit<'a>> {
+        let (problem, x) = self.start(hypothesis, near, start)?;
+        // a score is linear: where it overshoots, start from nothing
+        let mut careful = x.clone();
+        for cause in &hypothesis.causes {
+            let first = cause.parameters()[0];
+            let given = start.iter().any(|(p, _)| *p == first);
+            if let Some(i) = problem.free.iter().position(|p| *p == first).filter(|_| given) {
+                careful[i] = 0.0;
+            }
+        }
+        let x = if problem.cost(&x) < problem.cost(&careful) { x } else { careful };
+        self.descend(hypothesis, problem, x, FEW_STEPS)
+    }
+
+    /// The first steps of a refit.
+    pub fn begin(&self, hypothesis: &Hypothesis, near: &Refit<'_>) -> Option<Refit<'a>> {
+        let (problem, x) = self.start(hypothesis, near, &[])?;
+        self.descend(hypothesis, problem, x, FIRST_STEPS)
+    }
+
+    /// Σr² where a refit would start.
+    pub fn cost_at(&self, hypothesis: &Hypothesis, near: &Refit<'_>, start: &[(Parameter, f64)]) -> f64 {
+        self.start(hypothesis, near, start).map_or(f64::INFINITY, |(problem, x)| problem.cost(&x))
+    }
+
+    /// The problem of a hypothesis, and its variables from another fit and some given values.
+    fn start(
+        &self,
+        hypothesis: &Hypothesis,
+        near: &Refit<'_>,
+        start: &[(Parameter, f64)],
+    ) -> Option<(Problem<'a>, Vec<f64>)> {
+        let problem = self.problem(hypothesis).ok()?;
+        let mut x = problem.start_values().ok()?;
+        for (value, parameter) in x.iter_mut().zip(&problem.free) {
+            let given = start.iter().find(|(p, _)| p == parameter).map(|(_, v)| *v);
+            let inherited = near.value(*parameter);
+            *value = given.or(inherited).unwrap_or(*value);
+        }
+        // a strip that bends everywhere begins as stiff as the joint it replaces
+        let bending = problem.free.iter().position(|p| *p == Parameter::BendingStiffness);
+        let begins = bending.filter(|_| near.value(Parameter::BendingStiffness).is_none());
+        if let (Some(k), Some(place)) = (near.value(Parameter::JointStiffness), begins) {
+            let lengths_m = self.experiment.specimen.lengths_m();
+            x[place] = k * lengths_m.iter().sum::<f64>() / lengths_m.len() as f64;
+        }
+        let lower = problem.lower();
+        x.iter_mut().zip(&lower).for_each(|(x, low)| *x = x.max(*low));
+        x.extend_from_slice(&near.x[near.problem.free.len()..]);
+        Some((problem, x))
+    }
+
+    /// Fits a hypothesis from the start values of the experiment, by multiple shooting first: for a base model whose motion is out of step.
+    pub fn refit_anew(&self, hypothesis: &Hypothesis, start: &[(Parameter, f64)]) -> Option<Refit<'a>> {
+        let mut problem = self.problem(hypothesis).ok()?;
+        for (parameter, value) in start {
+            set(&mut problem.experiment, *parameter, *value);
+        }
+        let accuracy = problem.accuracy;
+        let x = multiple_shooting(&mut problem).ok()?.x;
+        problem.noise_rad.clone_from(&self.noise_rad);
+        problem.accuracy = accuracy;
+        self.descend(hypothesis, problem, x, FEW_STEPS)
+    }
+
+    /// The same hypothesis with the noise as it is known now.
+    pub fn again(&self, fit: &Refit<'a>, steps: usize) -> Option<Refit<'a>> {
+        let mut problem = fit.problem.clone();
+        problem.noise_rad.clone_from(&self.noise_rad);
+        problem.colour.clone_from(&self.colour);
+        self.descend(&fit.hypothesis, problem, fit.x.clone(), steps)
+    }
+
+    /// Takes the noise from what a fit leaves where the motion has no power, if that changes anything that counts, and says so: all fits that are to be
+    /// compared must then be made anew.
+    pub fn refine_noise(&mut self, by: &Refit<'_>) -> bool {
+        let (mut noise_rad, mut colour) = (self.noise_rad.clone(), self.colour.clone());
+        let mut changed = false;
+        for record in 0..self.records.len() {
+            let Ok(prediction) = by.problem.predict(record, &by.x, false) else { return false };
+            let Some((model, swing, true_s)) = by.motion(record) else { return false };
+            let data = &self.records[record];
+            let chords: Vec<Vec<f64>> =
+                true_s.iter().map(|t| chord_angles_rad(model.chain(), &swing.at(*t).theta_rad)).collect();
+            for link in 0..data.links() {
+                let mut left = vec![0.0; data.len()];
+                let motion: Vec<f64> = chords.iter().map(|chord| chord[link]).collect();
+                for value in prediction.values.iter().filter(|v| v.link == link) {
+                    let measured_rad = data.theta_rad[link][value.row].unwrap_or(value.predicted_rad);
+                    left[value.row] = (measured_rad - value.predicted_rad) / data.relative_sd[link][value.row];
+                }
+                let (known_rad, known_rho) = (&mut noise_rad[record][link], &mut colour[record][link]);
+                let whole = noise::of_all(&left);
+                let noise = match noise::off_the_lines(&left, &motion) {
+                    Some(noise) => noise,
+                    // a motion with power everywhere, as one with a jump has: what is left at most
+                    None if whole.sd < *known_rad => whole,
+                    None => continue,
+                };
+                changed |= (noise.sd / *known_rad - 1.0).abs() > 0.03 || (noise.rho - *known_rho).abs() > 0.03;
+                (*known_rad, *known_rho) = (noise.sd, noise.rho);
+            }
+        }
+        if changed {
+            (self.noise_rad, self.colour) = (noise_rad, colour);
+        }
+        changed
+    }
+
+    /// Descends from given variables.
+    pub fn descend(
+        &self,
+        hypothesis: &Hypothesis,
+        problem: Problem<'a>,
+        x: Vec<f64>,
+        most_steps: usize,
+    ) -> Option<Refit<'a>> {
+        let lower = problem.lower();
+        let descent = Descent { most_steps, enough: 0.02, damping: FIRST_DAMPING, ..Descent::default() };
+        let outcome = match Straightened::of(&problem) {
+            None => descent.run(x, &lower, |x| problem.blocks(x))?,
+            Some(valley) => valley.bend(descent.run(valley.straight(x), &lower, |x| {
+                let mut blocks = problem.blocks(&valley.bent(x))?;
+                valley.straighten(&mut blocks, x);
+                Some(blocks)
+            })?),
+        };
+        Some(Refit::of(hypothesis.clone(), problem, outcome))
+    }
+
+    /// The same with other recordings of it.
+    #[must_use]
+    pub fn on<'b>(&self, records: &'b [Record]) -> Ground<'b>
+    where
+        'a: 'b,
+    {
+        let place = |record: &Record| self.records.iter().position(|own| own.path == record.path).unwrap_or(0);
+        let of = |all: &[Vec<f64>]| records.iter().map(|r| all[place(r)].clone()).collect();
+        Ground {
+            records,
+            experiment: self.experiment,
+            base: self.base.clone(),
+            beliefs: self.beliefs.clone(),
+            noise_rad: of(&self.noise_rad),
+            colour: of(&self.colour),
+            step_error_rad: self.step_error_rad,
+        }
+    }
+
+    /// Largest measured difference of two neighbouring angles; of one link the largest angle.
+    pub fn largest_bend_rad(&self) -> f64 {
+        let of = |record: &Record| {
+            let rows = 0..record.len();
+            let bend = |row: usize| match &record.theta_rad[..] {
+                [first, second, ..] => Some((second[row]? - first[row]?).abs()),
+                [only] => only[row].map(f64::abs),
+                [] => None,
+            };
+            rows.filter_map(bend).fold(0.0, f64::max)
+        };
+        self.records.iter().map(of).fold(1e-6, f64::max)
+    }
+
+    fn longest_s(&self) -> f64 {
+        self.records.iter().map(|r| r.t_s[r.len() - 1] - r.t_s[0]).fold(0.0, f64::max)
+    }
+
+    /// Number of values.
+    pub fn values(&self) -> usize {
+        self.records.iter().map(|r| r.values(0..r.len())).sum()
+    }
+}
+
+/// Sets a start value where the experiment holds it.
+fn set(experiment: &mut Experiment, parameter: Parameter, value: f64) {
+    let model = &mut experiment.model;
+    match parameter {
+        Parameter::JointStiffness => model.k_eq_n_m_per_rad = value,
+        Parameter::JointDamping => model.c_eq_n_m_s_per_rad = value,
+        Parameter::HysteresisYield => {
+            if let Some(law) = &mut model.effects.joint_hysteretic {
+                law.yield_rad = value;
+            }
+        }
+        Parameter::SupportFrequency => {
+            if let Some(law) = &mut model.effects.support_motion {
+                law.frequency_hz = value;
+            }
+        }
+        _ => {}
+    }
+}
