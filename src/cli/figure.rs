@@ -81,6 +81,7 @@ impl<'a> Figure<'a> {
             noise_rad: diagnosis.noise_rad.clone(),
             colour: diagnosis.colour.clone(),
             step_error_rad: null.problem.accuracy.step_error_rad,
+            begun: Vec::new(),
         };
         let not_drawn = || Error::Simulation { detail: "the fitted motion cannot be integrated to be drawn".into() };
         let alone = prepared.records.len() == 1;

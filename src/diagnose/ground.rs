@@ -41,6 +41,8 @@ pub struct Ground<'a> {
     pub colour: Vec<Vec<f64>>,
     /// Of the integration.
     pub step_error_rad: f64,
+    /// Where the base model's descent began: parameters and starts that short stretches led to. Empty where that is not known.
+    pub begun: Vec<f64>,
 }
 
 /// The base model with some effects.
@@ -210,7 +212,12 @@ impl<'a> Ground<'a> {
         changed
     }
 
-    /// Descends from given variables.
+    /// Descends from given variables of a hypothesis.
+    pub fn descend_from(&self, hypothesis: &Hypothesis, x: Vec<f64>, most_steps: usize) -> Option<Refit<'a>> {
+        self.descend(hypothesis, self.problem(hypothesis).ok()?, x, most_steps)
+    }
+
+    /// The same with a problem at hand.
     pub fn descend(
         &self,
         hypothesis: &Hypothesis,
@@ -247,6 +254,7 @@ impl<'a> Ground<'a> {
             noise_rad: of(&self.noise_rad),
             colour: of(&self.colour),
             step_error_rad: self.step_error_rad,
+            begun: Vec::new(),
         }
     }
 

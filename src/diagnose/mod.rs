@@ -6,6 +6,7 @@
 //! | [`noise`] | the noise, from where the motion has no power |
 //! | [`ground`] | what all fits share, and the ways to make one |
 //! | [`refit`] | the base model with some effects, fitted |
+//! | [`dropped`] | at which instant frames are missing |
 //! | [`hysteresis`] | where its fit starts, and in which variables |
 //! | [`screen`] | which would lower the residuals |
 //! | [`selection`] | which are fitted in full |
@@ -22,6 +23,7 @@
 
 pub mod adequacy;
 pub mod cause;
+pub mod dropped;
 pub mod energy;
 pub mod evidence;
 pub mod ground;
@@ -212,14 +214,13 @@ pub fn diagnose<'a>(
         noise_rad: prepared.noise_rad.clone(),
         colour: prepared.colour.clone(),
         step_error_rad: prepared.step_error_rad,
+        begun: prepared.x.clone(),
     };
     let refused = || Error::Simulation {
         detail: "no motion near the start values follows the recording; check [specimen] and [model]".into(),
     };
     let nothing = Hypothesis::default();
-    let null = ground
-        .descend(&nothing, ground.problem(&nothing)?, prepared.x.clone(), ground::MOST_STEPS)
-        .ok_or_else(refused)?;
+    let null = ground.descend_from(&nothing, prepared.x.clone(), ground::MOST_STEPS).ok_or_else(refused)?;
     let null = selection::from_weaker_dampers(&ground, null);
     let null =
         if ground.refine_noise(&null) { ground.again(&null, ground::MOST_STEPS).ok_or_else(refused)? } else { null };

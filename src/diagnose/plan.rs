@@ -38,6 +38,7 @@ pub fn planned(experiment: &Experiment, plan: &Plan) -> Result<Vec<Detectable>> 
         noise_rad: vec![vec![plan.noise_rad; marks]],
         colour: vec![vec![0.0; marks]],
         step_error_rad: (1e-3 * plan.noise_rad).clamp(1e-10, 1e-6),
+        begun: Vec::new(),
     };
     let nothing = Hypothesis::default();
     let problem = ground.problem(&nothing)?;

@@ -5,7 +5,7 @@ use rayon::prelude::*;
 use super::ground::{self, Ground, Hypothesis};
 use super::refit::Refit;
 use super::screen::{Score, Screen};
-use super::{Cause, hysteresis};
+use super::{Cause, dropped, hysteresis};
 use crate::model::Parameter;
 use crate::progress::Progress;
 
@@ -65,7 +65,7 @@ pub fn fits<'a>(ground: &mut Ground<'a>, null: Refit<'a>, causes: &[Cause], prog
     let pairs = pairs.par_iter().with_max_len(1).filter_map(|(seed, score)| {
         let fit = ground.refit(&score.hypothesis(&seed.hypothesis), seed, &score.start);
         progress.advance(1);
-        fit
+        fit.map(|fit| dropped::settled(ground, fit))
     });
     let pairs: Vec<Refit<'a>> = pairs.collect();
     all.extend(pairs);
@@ -200,6 +200,11 @@ fn single<'a>(
                     tries.push(ground.refit_anew(&hypothesis, &[]));
                 }
             }
+        }
+        (Cause::DroppedFrames, _) => {
+            tries.push(dropped::alone(ground, null));
+            let scored = score.and_then(|s| ground.refit(&s.hypothesis(&null.hypothesis), null, &s.start));
+            tries.push(scored.map(|fit| dropped::settled(ground, fit)));
         }
         (_, Some(score)) => {
             let hypothesis = score.hypothesis(&null.hypothesis);
