@@ -174,6 +174,20 @@ fn the_file_has_every_field_and_a_null_says_what_it_would_have_shown() {
 }
 
 #[test]
+fn missing_frames_are_found_at_their_instant() {
+    let folder = Folder::new();
+    // three frames, half way through: far too large a jump for a derivative
+    let angles = folder.swing(BASE, "dropped_frames = 0.1\n");
+    let report = folder.diagnosis(&angles, BASE, &[]);
+    assert_eq!(names(&report["verdict"]["effects"]), ["dropped_frames"], "{:#}", report["verdict"]);
+    assert_eq!(report["where"]["place"], "camera");
+    let first = &report["candidates"][0];
+    let missing = &first["parameters"]["dropped_frames"];
+    assert!((missing["value"].as_f64().unwrap() - 0.1).abs() < 3.0 * missing["sd"].as_f64().unwrap(), "{missing}");
+    assert!((first["dropped_at_s"].as_f64().unwrap() - 7.5).abs() < 0.07, "{}", first["dropped_at_s"]);
+}
+
+#[test]
 fn a_tilted_camera_is_not_told_from_a_side_force_without_a_plumb_line() {
     let folder = Folder::new();
     let angles = folder.swing(BASE, "camera_tilt = 0.003\n");

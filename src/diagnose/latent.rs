@@ -1,9 +1,11 @@
 //! The unknown torque: a smooth random process at one place, estimated around a fitted motion by a Kalman filter and smoother.
 //!
 //! ```text
-//! state   z = (δθ, δrate, u, δp)      u' = −u/T + w,   sd of u: σ
-//! seen    left = ∂(angle)/∂θ δθ (+ u) + noise
+//! state   z = (δθ, δrate, u, δp, e)   u' = −u/T + w,   sd of u: σ
+//! seen    left = ∂(angle)/∂θ δθ (+ u) + e + white noise
 //! ```
+//!
+//! e is the noise of each angle where that is correlated from row to row (then there is next to no white noise); a smooth torque must not be blamed for it.
 //!
 //! The initial state and the base parameters are free as in the fit itself (their prior is wide), so that u holds only what they cannot absorb.
 //! `ln L(σ) − ln L(0)` says how much the recording asks for it.
@@ -22,9 +24,12 @@ use super::Place;
 use super::refit::Refit;
 use super::surroundings::Surroundings;
 use crate::model::Parameter;
+use crate::statistics::median_step_s;
 
 /// Standard deviations of the fitted state and parameters at which their prior stands.
 const WIDE: f64 = 300.0;
+/// White noise beside correlated noise, in units of that one's variance.
+const WHITE: f64 = 1e-4;
 /// Sizes tried, a factor each.
 const SIZES: usize = 9;
 const SIZE_FACTOR: f64 = 3.0;
@@ -63,6 +68,9 @@ pub struct Filter<'a> {
     around: &'a Surroundings,
     /// Of the noise, over what was thought.
     variance: f64,
+    /// Correlation of each angle's noise from row to row, and the time between two rows.
+    colour: &'a [f64],
+    step_s: f64,
     place: Place,
     transitions: Vec<DMatrix<f64>>,
     memory_s: f64,
@@ -84,7 +92,7 @@ pub enum Beyond {
 impl<'a> Filter<'a> {
     /// For a recording of a fit.
     pub fn new(
-        fit: &Refit<'_>,
+        fit: &'a Refit<'_>,
         record: usize,
         (around, variance): (&'a Surroundings, f64),
         place: Place,
@@ -104,6 +112,9 @@ impl<'a> Filter<'a> {
         wide.extend(vec![0.0; around.rates - around.links]);
         wide.push(0.0);
         wide.extend((0..problem.free.len()).map(|i| WIDE * sd(i)));
+        let colour: &[f64] = &problem.colour[record];
+        let first_sd = |mark: usize| around.rows[0].sd_rad[mark] * variance.sqrt();
+        wide.extend((0..marks).map(|mark| if colour[mark] > 0.0 { first_sd(mark) } else { 0.0 }));
         let mut begin = vec![0.0; wide.len()];
         if beyond == Beyond::TheBaseModel {
             for place in fit.added().iter().filter_map(|p| fit.place(*p)) {
@@ -114,7 +125,8 @@ impl<'a> Filter<'a> {
                 wide[variable] = 0.0;
             }
         }
-        Some(Self { around, variance, place, transitions, memory_s, begin, wide })
+        let step_s = median_step_s(&around.t_s)?;
+        Some(Self { around, variance, colour, step_s, place, transitions, memory_s, begin, wide })
     }
 
     /// ln L up to a constant, for a standard deviation of the unknown.
@@ -157,13 +169,29 @@ impl<'a> Filter<'a> {
             let variance = column[input] - column.dot(&(&weight * column));
             course.push((predicted - column.dot(&pull), variance.max(0.0).sqrt()));
             if k > 0 {
-                let transition = &self.transitions[k - 1];
+                let transition = self.transition(k - 1);
                 pull = transition.tr_mul(&pull);
-                weight = transition.tr_mul(&(weight * transition));
+                weight = transition.tr_mul(&(weight * &transition));
             }
         }
         course.reverse();
         course
+    }
+
+    /// Where the noise of each angle stands in the state.
+    fn of_noise(&self) -> std::ops::Range<usize> {
+        self.wide.len() - self.colour.len()..self.wide.len()
+    }
+
+    /// From one row to the next, the noise included.
+    fn transition(&self, k: usize) -> DMatrix<f64> {
+        let total = self.wide.len();
+        let steps = (self.around.t_s[k + 1] - self.around.t_s[k]) / self.step_s;
+        let mut transition = self.transitions[k].clone().resize(total, total, 0.0);
+        for (of_noise, rho) in self.of_noise().zip(self.colour) {
+            transition[(of_noise, of_noise)] = rho.powf(steps);
+        }
+        transition
     }
 
     /// Runs the filter; `hear` gets all that it comes by.
@@ -180,20 +208,29 @@ impl<'a> Filter<'a> {
         }
         for k in 0..self.around.rows.len() {
             if k > 0 {
-                let transition = &self.transitions[k - 1];
-                z = transition * &z;
+                let transition = self.transition(k - 1);
+                z = &transition * &z;
                 transition.mul_to(&p, &mut moved);
                 moved.mul_to(&transition.transpose(), &mut p);
                 let fade = (self.around.t_s[k] - self.around.t_s[k - 1]) / self.memory_s;
                 p[(input, input)] += size * size * (1.0 - (-2.0 * fade).exp());
+                for (mark, of_noise) in self.of_noise().enumerate() {
+                    let rho = transition[(of_noise, of_noise)];
+                    let sd_rad = self.around.rows[k].sd_rad[mark];
+                    if self.colour[mark] > 0.0 {
+                        p[(of_noise, of_noise)] += self.variance * sd_rad * sd_rad * (1.0 - rho * rho);
+                    }
+                }
             }
             hear(Stage::Row(&z, &p));
             let row = &self.around.rows[k];
             for (mark, left) in row.left_rad.iter().enumerate() {
                 let Some(left) = left else { continue };
                 (0..n).for_each(|i| slopes[i] = row.observed[(mark, i)]);
+                self.of_noise().enumerate().for_each(|(of, i)| slopes[i] = f64::from(u8::from(of == mark)));
                 p.mul_to(&slopes, &mut gain);
-                let variance = self.variance * row.sd_rad[mark].powi(2) + slopes.dot(&gain);
+                let white = if self.colour[mark] > 0.0 { WHITE } else { 1.0 };
+                let variance = white * self.variance * row.sd_rad[mark].powi(2) + slopes.dot(&gain);
                 let innovation = left - slopes.dot(&z);
                 hear(Stage::Value { slopes: &slopes, innovation, variance, gain: &gain });
                 z.axpy(innovation / variance, &gain, 1.0);

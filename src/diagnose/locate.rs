@@ -11,7 +11,7 @@ use crate::fit::{Residuals, Verdict, residuals_of};
 use crate::model::observe::chord_angles_rad;
 
 /// Power of the motion at a frequency, over its largest, from which on a torque of that frequency is in step with it.
-const IN_STEP: f64 = 3e-4;
+const IN_STEP: f64 = 1e-5;
 /// Places of an unknown.
 const PLACES: [Place; 4] = [Place::Hinge, Place::Joint, Place::Air, Place::Camera];
 

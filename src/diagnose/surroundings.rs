@@ -63,7 +63,7 @@ impl Surroundings {
             let sd_rad = problem.noise_rad[record][value.link] * data.relative_sd[value.link][value.row];
             let row = &mut rows[value.row];
             row.left_rad[value.link] = data.theta_rad[value.link][value.row].map(|m| m - value.predicted_rad);
-            row.sd_rad[value.link] = sd_rad * long_run(problem.colour[record][value.link]);
+            row.sd_rad[value.link] = sd_rad;
         }
         let flows = true_s.windows(2).map(|pair| flow(&model, &problem.free, &swing, 0.5 * (pair[0] + pair[1])));
         Some(Self {
@@ -159,11 +159,6 @@ impl Surroundings {
         }
         pattern
     }
-}
-
-/// Correlated noise weighs less: the standard deviation that white noise of the same power at low frequencies has.
-fn long_run(rho: f64) -> f64 {
-    ((1.0 + rho) / (1.0 - rho)).sqrt()
 }
 
 fn row(chain: &Chain, swing: &Trajectory, t_s: f64, gain: f64) -> Row {
