@@ -18,6 +18,8 @@ use crate::output::OutputFile;
 
 /// Longest planned recording.
 const MOST_ROWS: f64 = 1e6;
+/// A joint that yields before this angle is dry.
+const DRY_RAD: f64 = 1e-3;
 /// Candidates listed on the page.
 const LISTED: usize = 6;
 /// Candidates written to the file.
@@ -251,11 +253,14 @@ impl Report<'_> {
                     "Something is missing that is not in the table of effects ({percent:.0} %): no named law, nor two of them, leaves only noise{nearest}."
                 )
             }
-            Status::Identified => format!("Missing: {} ({percent:.0} %).{}", words(&verdict.effects), self.more()),
+            Status::Identified => {
+                format!("Missing: {} ({percent:.0} %).{}{}", words(&verdict.effects), self.remark(), self.more())
+            }
             Status::Ambiguous => format!(
-                "Missing: most likely {} ({percent:.0} %), but the recording does not tell it from others: {}.{}",
+                "Missing: most likely {} ({percent:.0} %), but the recording does not tell it from others: {}.{}{}",
                 words(&verdict.effects),
                 names(&verdict.class, ""),
+                self.remark(),
                 self.more()
             ),
         }
@@ -267,13 +272,22 @@ impl Report<'_> {
         if !verdict::is_beyond_noise(fit) {
             return String::new();
         }
-        let values: usize = fit.problem.records.iter().map(|r| r.values(0..r.len())).sum();
         format!(
             " That is their share among the laws of the table: they explain {:.1} % of what the base model leaves, but what is left is still {:.0} times the \
              noise, and something that is not in the table is missing, too.",
             1e2 * self.diagnosis.explained(),
-            (fit.chi2 / values as f64).sqrt()
+            verdict::over_noise(fit)
         )
+    }
+
+    /// What a law's coefficients say beside their values.
+    fn remark(&self) -> &'static str {
+        match self.diagnosis.named().value(Parameter::HysteresisYield) {
+            Some(yield_rad) if yield_rad < DRY_RAD => {
+                " The joint yields at next to no angle: that is dry friction in it."
+            }
+            _ => "",
+        }
     }
 
     fn place(&self) -> Option<Place> {

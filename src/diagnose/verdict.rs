@@ -187,8 +187,17 @@ impl Verdict {
 
 /// Whether a fit with names leaves so much that the noise does not matter.
 pub fn is_beyond_noise(fit: &Refit<'_>) -> bool {
-    let values: usize = fit.problem.records.iter().map(|r| r.values(0..r.len())).sum();
-    !fit.hypothesis.causes.is_empty() && fit.chi2 > BEYOND_NOISE.powi(2) * values as f64
+    !fit.hypothesis.causes.is_empty() && over_noise(fit) > BEYOND_NOISE
+}
+
+/// What a fit leaves of the angles, over their noise: root mean squares, of the worst recording.
+pub fn over_noise(fit: &Refit<'_>) -> f64 {
+    let of = |record: usize| {
+        let Some(left) = locate::residuals(fit, record) else { return 0.0 };
+        let squares = left.rmse_rad.iter().zip(&left.noise_rad).map(|(left, noise)| (left / noise).powi(2));
+        (squares.sum::<f64>() / left.rmse_rad.len().max(1) as f64).sqrt()
+    };
+    (0..fit.problem.records.len()).map(of).fold(0.0, f64::max)
 }
 
 /// What to measure to split a class.
