@@ -123,11 +123,11 @@ fn dry_friction_is_named_with_its_size_and_place_and_drawn() {
     assert!((value - 4.0e-7).abs() < 3.0 * sd && sd < 4.0e-9, "{friction}");
     let left = |key: &str| report["heldout"][key][0].as_f64().unwrap();
     assert!(left("augmented_rmse_rad") < 0.3 * left("baseline_rmse_rad"), "{}", report["heldout"]);
-    // without a law, the smoother finds about that torque, less what the base model's damper took for its own
+    // without a law, the smoother finds that torque to a factor of two: it cannot jump as friction does, and leaves the damper's share open
     let torque = &report["where"]["missing_torque"];
     assert_eq!((&torque["place"], &torque["phase"]), (&"hinge".into(), &"velocity".into()), "{torque}");
     let rms_n_m = torque["rms"].as_f64().unwrap();
-    assert!((1.5e-7..5.0e-7).contains(&rms_n_m), "{torque}");
+    assert!((2.0e-7..8.0e-7).contains(&rms_n_m), "{torque}");
     let svg = fs::read_to_string(figure).unwrap();
     assert!(svg.starts_with("<svg") && svg.ends_with("</svg>\n"));
     for words in [

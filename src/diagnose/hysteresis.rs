@@ -147,7 +147,7 @@ mod tests {
     #[test]
     fn derivatives_are_those_of_the_straight_variables() {
         let valley = Straightened { torque: 0, yields: 2 };
-        let straight = [6e-5, 7.0, 0.05];
+        let straight = [0.6, 7.0, 0.5];
         let value = |straight: &[f64]| slopes() * DVector::from_vec(valley.bent(straight));
         let residual = DVector::zeros(4);
         let mut blocks = vec![Block { columns: vec![0, 1, 2], residual, slopes: slopes(), robust: true }];
