@@ -35,11 +35,10 @@ struct Jump {
 /// Missing frames alone, from the base model's fit and from where its descent started: short stretches have no jump, and there the first of them still
 /// follows the recording up to it.
 pub fn alone<'a>(ground: &Ground<'a>, null: &Refit<'a>) -> Option<Refit<'a>> {
-    let free = null.problem.free.len();
     let begun = Refit { x: ground.begun.clone(), ..null.clone() };
     let starts = [null, &begun];
     let jumps = starts.into_iter().filter(|start| start.x.len() == null.x.len()).filter_map(|start| {
-        let jump = likeliest(ground, &start.x, free)?;
+        let jump = likeliest(ground, &start.x)?;
         Some((start, jump))
     });
     let fits = jumps.filter_map(|(start, jump)| {
@@ -51,7 +50,7 @@ pub fn alone<'a>(ground: &Ground<'a>, null: &Refit<'a>) -> Option<Refit<'a>> {
 }
 
 /// The likeliest jump of whole frames for parameters and starts of the base model.
-fn likeliest(ground: &Ground<'_>, x: &[f64], free: usize) -> Option<Jump> {
+fn likeliest(ground: &Ground<'_>, x: &[f64]) -> Option<Jump> {
     let mut jumps = Vec::new();
     for record in 0..ground.records.len() {
         let hypothesis = Hypothesis::default().and(Cause::DroppedFrames, Some((record, 0.0)));
@@ -60,7 +59,7 @@ fn likeliest(ground: &Ground<'_>, x: &[f64], free: usize) -> Option<Jump> {
         for frames in 1..=MOST_FRAMES {
             for missing_s in [frames as f64 * step_s, -(frames as f64) * step_s] {
                 let mut x = x.to_vec();
-                x.insert(free, missing_s);
+                x.insert(ground.base.len(), missing_s);
                 jumps.extend(best_instant(&problem, record, &x));
             }
         }

@@ -20,12 +20,11 @@ const LOSSES: [(Parameter, Place); 6] = [
 pub fn added_torque_n_m(fit: &Refit<'_>) -> f64 {
     let mut square = 0.0;
     let mut count = 0usize;
+    let is_law =
+        |p: &Parameter| !matches!(p, Parameter::SupportSine | Parameter::SupportCosine | Parameter::SupportFrequency);
+    let added: Vec<Parameter> = fit.added().into_iter().filter(is_law).collect();
+    let values: Vec<f64> = added.iter().map(|p| fit.value(*p).unwrap_or(0.0)).collect();
     for record in 0..fit.problem.records.len() {
-        let is_law = |p: &Parameter| {
-            !matches!(p, Parameter::SupportSine | Parameter::SupportCosine | Parameter::SupportFrequency)
-        };
-        let added: Vec<Parameter> = fit.added().into_iter().filter(is_law).collect();
-        let values: Vec<f64> = added.iter().map(|p| fit.value(*p).unwrap_or(0.0)).collect();
         along(fit, record, &added, |_, torques, _| {
             let n = torques.first().map_or(0, |t| t.len());
             let total: f64 =

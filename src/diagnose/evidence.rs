@@ -7,8 +7,8 @@
 //! s² = 1 + (v − 1)(1 + ρ)/(1 − ρ)                     v = max(1, χ²/N) of the best hypothesis, ρ its correlation from row to row
 //! ```
 //!
-//! Σ is scaled by v. What the best hypothesis leaves beyond the noise goes on from row to row, so that fewer values count than there are. A support's frequency, a joint's yield angle and the instant
-//! of missing frames count as any value within their range.
+//! Σ is scaled by v. What the best hypothesis leaves beyond the noise goes on from row to row, so that fewer values count than there are. A support's
+//! frequency, a joint's yield angle and the instant of missing frames count as any value within their range.
 
 use super::ground::Hypothesis;
 use super::refit::Refit;

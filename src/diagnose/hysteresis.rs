@@ -109,9 +109,8 @@ fn softened<'a>(ground: &Ground<'a>, null: &Refit<'a>) -> Option<Refit<'a>> {
             (Parameter::HysteresisYield, yield_rad),
         ]
     };
-    let best = starts
-        .map(start)
-        .min_by(|a, b| ground.cost_at(&hypothesis, null, a).total_cmp(&ground.cost_at(&hypothesis, null, b)))?;
+    let costed = starts.map(start).map(|start| (ground.cost_at(&hypothesis, null, &start), start));
+    let (_, best) = costed.min_by(|a, b| a.0.total_cmp(&b.0))?;
     ground.refit(&hypothesis, null, &best)
 }
 

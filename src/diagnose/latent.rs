@@ -68,10 +68,10 @@ pub struct Filter<'a> {
     around: &'a Surroundings,
     /// Of the noise, over what was thought.
     variance: f64,
-    /// Correlation of each angle's noise from row to row, and the time between two rows.
+    /// Correlation of each angle's noise from row to row.
     colour: &'a [f64],
-    step_s: f64,
     place: Place,
+    /// From each row to the next, the noise included.
     transitions: Vec<DMatrix<f64>>,
     memory_s: f64,
     /// State at the first row, and parameters; with their standard deviations.
@@ -102,7 +102,7 @@ impl<'a> Filter<'a> {
         let (model, _) = problem.model(record, &fit.x[..problem.free.len()]).ok()?;
         let memory_s = 1.0 / model.pace_rad_s();
         let pattern = |k: usize| Some(around.pattern(model.chain(), place, k));
-        let transitions = around.transitions(memory_s, pattern);
+        let mut transitions = around.transitions(memory_s, pattern);
         let sd = |i: usize| 1.0 / fit.normal[(i, i)].max(1e-300).sqrt();
         let (start, marks) = (problem.start_of(record), problem.marks());
         let angle = (0..marks).map(|i| sd(start + i)).fold(0.0, f64::max);
@@ -125,8 +125,14 @@ impl<'a> Filter<'a> {
                 wide[variable] = 0.0;
             }
         }
-        let step_s = median_step_s(&around.t_s)?;
-        Some(Self { around, variance, colour, step_s, place, transitions, memory_s, begin, wide })
+        let (step_s, total) = (median_step_s(&around.t_s)?, wide.len());
+        for (transition, pair) in transitions.iter_mut().zip(around.t_s.windows(2)) {
+            *transition = std::mem::take(transition).resize(total, total, 0.0);
+            for (of_noise, rho) in (total - marks..total).zip(colour) {
+                transition[(of_noise, of_noise)] = rho.powf((pair[1] - pair[0]) / step_s);
+            }
+        }
+        Some(Self { around, variance, colour, place, transitions, memory_s, begin, wide })
     }
 
     /// ln L up to a constant, for a standard deviation of the unknown.
@@ -169,9 +175,9 @@ impl<'a> Filter<'a> {
             let variance = column[input] - column.dot(&(&weight * column));
             course.push((predicted - column.dot(&pull), variance.max(0.0).sqrt()));
             if k > 0 {
-                let transition = self.transition(k - 1);
+                let transition = &self.transitions[k - 1];
                 pull = transition.tr_mul(&pull);
-                weight = transition.tr_mul(&(weight * &transition));
+                weight = transition.tr_mul(&(weight * transition));
             }
         }
         course.reverse();
@@ -181,17 +187,6 @@ impl<'a> Filter<'a> {
     /// Where the noise of each angle stands in the state.
     fn of_noise(&self) -> std::ops::Range<usize> {
         self.wide.len() - self.colour.len()..self.wide.len()
-    }
-
-    /// From one row to the next, the noise included.
-    fn transition(&self, k: usize) -> DMatrix<f64> {
-        let total = self.wide.len();
-        let steps = (self.around.t_s[k + 1] - self.around.t_s[k]) / self.step_s;
-        let mut transition = self.transitions[k].clone().resize(total, total, 0.0);
-        for (of_noise, rho) in self.of_noise().zip(self.colour) {
-            transition[(of_noise, of_noise)] = rho.powf(steps);
-        }
-        transition
     }
 
     /// Runs the filter; `hear` gets all that it comes by.
@@ -208,8 +203,8 @@ impl<'a> Filter<'a> {
         }
         for k in 0..self.around.rows.len() {
             if k > 0 {
-                let transition = self.transition(k - 1);
-                z = &transition * &z;
+                let transition = &self.transitions[k - 1];
+                z = transition * &z;
                 transition.mul_to(&p, &mut moved);
                 moved.mul_to(&transition.transpose(), &mut p);
                 let fade = (self.around.t_s[k] - self.around.t_s[k - 1]) / self.memory_s;

@@ -269,6 +269,9 @@ impl<'a> Run<'a> {
     fn turn_in(&self, step: &Step) -> Option<(f64, Turn)> {
         let turns = if self.hinge == Hinge::Sticks { Turn::Lets } else { Turn::Reverses };
         let hinge = self.model.friction_n_m().map(|_| turns);
+        if hinge.is_none() && self.sides.is_empty() {
+            return None;
+        }
         let mut instant = Motion::zero(self.place.theta_rad.len(), self.place.rate.len() - self.place.theta_rad.len());
         let mut inside = 0.0;
         for look in 1..=LOOKS {
@@ -361,22 +364,13 @@ impl<'a> Run<'a> {
 
     fn change(&mut self, turn: Turn) -> Result<()> {
         match turn {
-            Turn::Corner(which) => {
-                self.sides[which] = -self.sides[which];
-                Ok(())
-            }
-            Turn::Reverses | Turn::Lets => self.change_hinge(turn),
-        }
-    }
-
-    fn change_hinge(&mut self, turn: Turn) -> Result<()> {
-        let before = std::mem::take(&mut self.first);
-        match turn {
+            Turn::Corner(which) => self.sides[which] = -self.sides[which],
             Turn::Lets => {
                 self.hinge = Hinge::sliding(self.hold_n_m()?);
                 self.first = self.accelerations(self.hinge)?;
             }
-            Turn::Reverses | Turn::Corner(_) => {
+            Turn::Reverses => {
+                let before = std::mem::take(&mut self.first);
                 let back = Hinge::sliding(-self.hinge.sign());
                 self.place.rate[0] = 0.0;
                 let slid = self.accelerations(back)?;
