@@ -93,6 +93,10 @@ impl<'a> Ground<'a> {
         problem.noise_rad.clone_from(&self.noise_rad);
         problem.colour.clone_from(&self.colour);
         problem.beliefs = beliefs;
+        if hypothesis.causes.contains(&Cause::DistributedFlexibility) {
+            // no more is free at its start than in the rods it is compared with
+            problem.further_shapes = 0;
+        }
         problem.accuracy.step_error_rad = self.step_error_rad;
         problem.accuracy.most_steps = 1000 + (STEPS_EACH_SECOND * self.longest_s()) as usize;
         if let Some((record, at_s)) = hypothesis.dropped {
@@ -270,6 +274,11 @@ impl<'a> Ground<'a> {
             rows.filter_map(bend).fold(0.0, f64::max)
         };
         self.records.iter().map(of).fold(1e-6, f64::max)
+    }
+
+    /// Whether the base model bends all along the strip.
+    pub fn is_strip(&self) -> bool {
+        self.base.contains(&Parameter::BendingStiffness)
     }
 
     fn longest_s(&self) -> f64 {

@@ -58,7 +58,7 @@ fn across(ground: &Ground<'_>, null: &Refit<'_>, best: &Refit<'_>) -> Option<Hel
     let last = ground.records.len() - 1;
     let others = ground.on(&ground.records[..last]);
     let alone = ground.on(&ground.records[last..]);
-    let starts = 2 * null.problem.marks();
+    let starts = 2 * null.problem.shapes();
     let predicted = |fit: &Refit<'_>| {
         let hypothesis =
             Hypothesis { dropped: fit.hypothesis.dropped.filter(|d| d.0 < last), ..fit.hypothesis.clone() };

@@ -86,7 +86,8 @@ pub fn alone<'a>(
     let hypothesis = Hypothesis::default().and(Cause::JointHysteretic, None);
     let near = || score.and_then(|score| ground.refit(&hypothesis, null, &score.start));
     let softened = || (unexplained || seen).then(|| softened(ground, null)).flatten();
-    let anew = || unexplained.then(|| ground.refit_anew(&hypothesis, &[])).flatten();
+    // in every joint of a strip, and from no memory in each stretch, it is too dear
+    let anew = || (unexplained && !ground.is_strip()).then(|| ground.refit_anew(&hypothesis, &[])).flatten();
     let (near, (softened, anew)) = rayon::join(near, || rayon::join(softened, anew));
     [near, softened, anew].into_iter().flatten().min_by(|a, b| a.chi2.total_cmp(&b.chi2))
 }

@@ -106,7 +106,7 @@ impl<'a> Filter<'a> {
         let sd = |i: usize| 1.0 / fit.normal[(i, i)].max(1e-300).sqrt();
         let (start, marks) = (problem.start_of(record), problem.marks());
         let angle = (0..marks).map(|i| sd(start + i)).fold(0.0, f64::max);
-        let rate = (0..marks).map(|i| sd(start + marks + i)).fold(0.0, f64::max);
+        let rate = (0..marks).map(|i| sd(start + problem.shapes() + i)).fold(0.0, f64::max);
         let mut wide = vec![WIDE * angle; around.links];
         wide.extend(vec![WIDE * rate; around.links]);
         wide.extend(vec![0.0; around.rates - around.links]);

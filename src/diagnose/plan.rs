@@ -44,7 +44,7 @@ pub fn planned(experiment: &Experiment, plan: &Plan) -> Result<Vec<Detectable>> 
     let problem = ground.problem(&nothing)?;
     let mut x = problem.start_values()?;
     x.extend(&experiment.model.release_rad);
-    x.resize(x.len() + marks, 0.0);
+    x.resize(problem.variables(), 0.0);
     let refused = || Error::Simulation { detail: "the planned swing cannot be integrated; check [model]".into() };
     let null = ground.descend(&nothing, problem, x, 1).ok_or_else(refused)?;
     let screen = Screen::at(&ground, &null).ok_or_else(refused)?;
@@ -54,7 +54,7 @@ pub fn planned(experiment: &Experiment, plan: &Plan) -> Result<Vec<Detectable>> 
 /// The base model's own swing, released at rest, without noise.
 fn recorded(experiment: &Experiment, plan: &Plan) -> Result<Record> {
     let model = ForwardModel::of(experiment)?;
-    let release = State::released(model.chain(), &experiment.model.release_rad)?;
+    let release = State::released(&model, &experiment.model.release_rad)?;
     let swing = Trajectory::swing(&model, &release, 0.0, plan.duration_s)?;
     let rows = (plan.duration_s * plan.rate_hz).floor() as usize + 1;
     let t_s: Vec<f64> = (0..rows).map(|row| row as f64 / plan.rate_hz).collect();

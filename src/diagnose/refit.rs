@@ -6,7 +6,6 @@ use super::ground::Hypothesis;
 use crate::fit::Problem;
 use crate::fit::descent::{Ending, Outcome};
 use crate::fit::problem::stacked;
-use crate::model::observe::links_from_chords;
 use crate::model::{Camera, ForwardModel, Parameter, State, Trajectory};
 
 /// A motion that leaves more than this part of the swing has lost step.
@@ -77,13 +76,9 @@ impl<'a> Refit<'a> {
         let problem = &self.problem;
         let (model, camera) = problem.model(record, &self.x[..problem.free.len()]).ok()?;
         let data = &problem.records[record];
-        let (start, marks) = (problem.start_of(record), problem.marks());
-        let links = |chords: &[f64]| links_from_chords(model.chain(), chords).0;
-        let state = State {
-            theta_rad: links(&self.x[start..start + marks]),
-            omega_rad_s: links(&self.x[start + marks..start + 2 * marks]),
-            hidden: Vec::new(),
-        };
+        let (start, shapes) = (problem.start_of(record), problem.shapes());
+        let (angles_rad, rates_rad_s) = self.x[start..start + 2 * shapes].split_at(shapes);
+        let state = State::begun(&model.start(), angles_rad, rates_rad_s);
         let camera = Camera { origin_s: data.t_s[0], ..camera };
         let true_s: Vec<f64> = data.t_s.iter().map(|t| camera.true_time_s(*t, 0)).collect();
         let span_s = (true_s[0], true_s[data.len() - 1] + 1e-9);

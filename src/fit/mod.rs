@@ -134,9 +134,8 @@ pub fn fit(records: &[Record], experiment: &Experiment, free: &[Parameter]) -> R
         .ok_or_else(refused)?;
     let uncertainty = interval::uncertainty(&problem, &outcome);
     let residuals = residuals(&problem, &outcome.x, &noise_rad)?;
-    let (marks, free) = (problem.marks(), problem.free.len());
     Ok(Fit {
-        starts: outcome.x[free..].chunks(2 * marks).map(<[f64]>::to_vec).collect(),
+        starts: (0..kept.len()).map(|record| problem.seen_start(&outcome.x, record)).collect(),
         estimates: uncertainty.estimates,
         correlation: uncertainty.correlation,
         undetermined: uncertainty.undetermined,

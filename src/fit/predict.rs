@@ -7,7 +7,7 @@ use nalgebra::DMatrix;
 use super::Record;
 use crate::error::{Error, Result};
 use crate::model::integrate::Directions;
-use crate::model::observe::{chord_angles_rad, chord_slopes, links_from_chords};
+use crate::model::observe::{chord_angles_rad, chord_slopes};
 use crate::model::step::StepPlace;
 use crate::model::{Accuracy, Camera, ForwardModel, Parameter, State, Trajectory};
 
@@ -16,7 +16,7 @@ use crate::model::{Accuracy, Camera, ForwardModel, Parameter, State, Trajectory}
 pub struct Prediction {
     /// One entry a measured value, link after link.
     pub values: Vec<Value>,
-    /// ∂angle: a row each value; columns are the parameters, then the angles between marks at the start, then their rates.
+    /// ∂angle: a row each value; columns are the parameters, then the angles at the start, then their rates.
     pub slopes: DMatrix<f64>,
     /// Angles between marks and their rates where the next stretch begins, with derivatives of each (columns as above).
     pub end: (Vec<f64>, DMatrix<f64>),
@@ -42,7 +42,7 @@ pub struct Request<'a> {
     pub record: &'a Record,
     /// Rows to predict; the motion starts at the first.
     pub rows: &'a Range<usize>,
-    /// Angles between marks at the first row, then their rates.
+    /// Angles between marks at the first row (of a strip perhaps how much of its next mode), then their rates.
     pub start: &'a [f64],
     /// The camera.
     pub camera: &'a Camera,
@@ -64,8 +64,8 @@ pub fn predict(model: &ForwardModel, request: &Request<'_>) -> Result<Prediction
     let Request { record, rows, start, parameters, accuracy, .. } = *request;
     let marks = record.links();
     let chain = model.chain();
-    let (theta_rad, spread) = links_from_chords(chain, &start[..marks]);
-    let (omega_rad_s, _) = links_from_chords(chain, &start[marks..]);
+    let shapes = start.len() / 2;
+    let spread = model.start().columns(0, shapes).into_owned();
     let start_s = record.t_s[rows.start];
     let mut camera = Camera { origin_s: start_s, ..*request.camera };
     if start_s >= camera.dropped_at_s {
@@ -74,10 +74,10 @@ pub fn predict(model: &ForwardModel, request: &Request<'_>) -> Result<Prediction
     }
     let ends_s = [0, 1].map(|link| camera.true_time_s(request.until_s, link));
     let latest_s = ends_s[0].max(ends_s[1]) + 1e-9;
-    let state = State { theta_rad, omega_rad_s, hidden: Vec::new() };
+    let state = State::begun(&spread, &start[..shapes], &start[shapes..]);
     let directions = request.slopes.then(|| directions(model, parameters, &spread));
     let swing = Trajectory::with(model, &state, (start_s, latest_s), directions.as_ref(), accuracy)?;
-    let columns = if request.slopes { parameters.len() + 2 * marks } else { 0 };
+    let columns = if request.slopes { parameters.len() + start.len() } else { 0 };
     let mut values = Vec::with_capacity(record.values(rows.clone()));
     let mut flat = Vec::with_capacity(values.capacity() * columns);
     let mut row_slopes = vec![0.0; columns];
@@ -100,12 +100,12 @@ pub fn predict(model: &ForwardModel, request: &Request<'_>) -> Result<Prediction
     Ok(Prediction { values, slopes, end: end_of(model, &swing, request, &camera)? })
 }
 
-/// The parameters, then the angles between marks at the start and their rates, which `spread` hands on to the links.
+/// The parameters, then the angles at the start and their rates, which `spread` hands on to the links.
 fn directions(model: &ForwardModel, parameters: &[Parameter], spread: &DMatrix<f64>) -> Directions {
-    let (n, m, marks) = (spread.nrows(), model.rates(), spread.ncols());
-    let (mut theta, mut rate) = (DMatrix::zeros(n, 2 * marks), DMatrix::zeros(m, 2 * marks));
-    theta.columns_mut(0, marks).copy_from(spread);
-    rate.view_mut((0, marks), (n, marks)).copy_from(spread);
+    let (n, m, shapes) = (spread.nrows(), model.rates(), spread.ncols());
+    let (mut theta, mut rate) = (DMatrix::zeros(n, 2 * shapes), DMatrix::zeros(m, 2 * shapes));
+    theta.columns_mut(0, shapes).copy_from(spread);
+    rate.view_mut((0, shapes), (n, shapes)).copy_from(spread);
     Directions { parameters: parameters.to_vec(), theta, rate }
 }
 
@@ -153,7 +153,7 @@ fn end_of(
     let mut values = chord_angles_rad(chain, &instant.theta_rad);
     values.extend((&along * omega).iter());
     let Some((theta, rate)) = instant.slopes else { return Ok((values, DMatrix::zeros(2 * marks, 0))) };
-    let columns = request.parameters.len() + 2 * marks;
+    let columns = request.parameters.len() + request.start.len();
     let mut slopes = DMatrix::zeros(2 * marks, columns);
     slopes.rows_mut(0, marks).copy_from(&(&along * theta));
     slopes.rows_mut(marks, marks).copy_from(&(&along * rate.rows(0, n)));

@@ -10,9 +10,14 @@ use crate::experiment::{Experiment, Hysteresis, SupportMotion};
 use crate::model::{Accuracy, Camera, ForwardModel, Parameter};
 use crate::statistics::{median, median_step_s};
 
+/// Standard deviations of a strip's further shapes where a motion starts, as angles between marks: the sixth part of a large swing, at some hertz.
+const FURTHER_RAD: f64 = 0.05;
+const FURTHER_RAD_S: f64 = 2.0;
+
 /// A model with free parameters, and recordings of one specimen.
 ///
-/// The variables of a fit are the free parameters, then for each recording the angles between marks at its first row and their rates.
+/// The variables of a fit are the free parameters, then for each recording the angles between marks at its first row (of a strip also how much there is of
+/// the next mode) and their rates.
 #[derive(Debug, Clone)]
 pub struct Problem<'a> {
     /// The recordings.
@@ -31,6 +36,8 @@ pub struct Problem<'a> {
     pub colour: Vec<Vec<f64>>,
     /// What is known of free parameters beforehand.
     pub beliefs: Vec<Belief>,
+    /// Shapes free at each start beyond the angles between marks.
+    pub further_shapes: usize,
 }
 
 /// A free parameter that is known beforehand, as a measured length or mass is.
@@ -78,22 +85,34 @@ impl<'a> Problem<'a> {
             dropped_at_s: vec![f64::INFINITY; records.len()],
             colour: records.iter().map(|r| vec![0.0; r.links()]).collect(),
             beliefs: Vec::new(),
+            further_shapes: usize::from(model.shapes().is_some()),
         })
     }
 
-    /// Number of angles, and as many rates, at each start.
+    /// Number of angles seen.
     pub fn marks(&self) -> usize {
         self.records.first().map_or(0, Record::links)
     }
 
     /// Number of variables.
     pub fn variables(&self) -> usize {
-        self.free.len() + self.records.len() * 2 * self.marks()
+        self.free.len() + self.records.len() * 2 * self.shapes()
+    }
+
+    /// Number of angles, and as many rates, in which each motion starts: those between marks, and further shapes.
+    pub fn shapes(&self) -> usize {
+        self.marks() + self.further_shapes
     }
 
     /// Where a recording's start stands among the variables.
     pub fn start_of(&self, record: usize) -> usize {
-        self.free.len() + record * 2 * self.marks()
+        self.free.len() + record * 2 * self.shapes()
+    }
+
+    /// Angles between marks and their rates where a recording's motion starts.
+    pub fn seen_start(&self, x: &[f64], record: usize) -> Vec<f64> {
+        let (start, marks, shapes) = (self.start_of(record), self.marks(), self.shapes());
+        [&x[start..start + marks], &x[start + shapes..start + shapes + marks]].concat()
     }
 
     /// The start values of the free parameters.
@@ -144,7 +163,7 @@ impl<'a> Problem<'a> {
         let request = Request {
             record: data,
             rows: &(0..data.len()),
-            start: &x[start..start + 2 * self.marks()],
+            start: &x[start..start + 2 * self.shapes()],
             camera: &camera,
             parameters: &self.free,
             until_s: data.t_s[data.len() - 1],
@@ -159,10 +178,28 @@ impl<'a> Problem<'a> {
         let of = |record: usize| {
             let prediction = self.predict(record, x, true).ok()?;
             let start = self.start_of(record);
-            let columns = (0..self.free.len()).chain(start..start + 2 * self.marks()).collect();
+            let columns = (0..self.free.len()).chain(start..start + 2 * self.shapes()).collect();
             Some(self.block(record, &prediction, columns))
         };
-        (0..self.records.len()).map(of).chain(self.belief_block(x).map(Some)).collect()
+        let known = self.belief_block(x).into_iter().chain(self.shape_block(x));
+        (0..self.records.len()).map(of).chain(known.map(Some)).collect()
+    }
+
+    /// How much of further shapes there is at each start, over what may be expected of them.
+    fn shape_block(&self, x: &[f64]) -> Option<Block> {
+        let (marks, shapes) = (self.marks(), self.shapes());
+        let starts = (0..self.records.len()).map(|record| self.start_of(record));
+        let further = starts.flat_map(|start| {
+            let of = |first: usize, sd: f64| (start + first + marks..start + first + shapes).map(move |i| (i, sd));
+            of(0, FURTHER_RAD).chain(of(shapes, FURTHER_RAD_S))
+        });
+        let known: Vec<(usize, f64)> = further.collect();
+        (!known.is_empty()).then(|| Block {
+            columns: known.iter().map(|(column, _)| *column).collect(),
+            residual: DVector::from_iterator(known.len(), known.iter().map(|(i, sd)| x[*i] / sd)),
+            slopes: DMatrix::from_diagonal(&DVector::from_iterator(known.len(), known.iter().map(|(_, sd)| 1.0 / sd))),
+            robust: false,
+        })
     }
 
     /// How far the parameters are from what is known of them, over its standard deviation.
@@ -183,8 +220,9 @@ impl<'a> Problem<'a> {
             let prediction = self.predict(record, x, false).ok()?;
             Some(self.block(record, &prediction, Vec::new()).residual.norm_squared())
         };
-        let beliefs = self.belief_block(x).map_or(0.0, |block| block.residual.norm_squared());
-        beliefs + (0..self.records.len()).map(|record| of(record).unwrap_or(f64::INFINITY)).sum::<f64>()
+        let known = self.belief_block(x).into_iter().chain(self.shape_block(x));
+        known.map(|block| block.residual.norm_squared()).sum::<f64>()
+            + (0..self.records.len()).map(|record| of(record).unwrap_or(f64::INFINITY)).sum::<f64>()
     }
 
     /// The residuals of a prediction over their noise; of correlated noise what the value before does not foretell.

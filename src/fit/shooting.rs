@@ -88,6 +88,7 @@ pub fn multiple_shooting(problem: &mut Problem<'_>) -> Result<Shot> {
         *noise = median(left).unwrap_or(1e-3).clamp(1e-6, 0.05);
     }
     let mut lower = problem.lower();
+    lower.truncate(free);
     lower.resize(x.len(), f64::NEG_INFINITY);
     problem.accuracy = Accuracy { step_error_rad: 3e-6, ..Accuracy::default() };
     let mut left_by_stretches = Vec::new();
@@ -108,7 +109,10 @@ pub fn multiple_shooting(problem: &mut Problem<'_>) -> Result<Shot> {
     for (index, stretch) in stretches.iter().enumerate() {
         if stretch.rows.start == 0 {
             let start = free + index * 2 * marks;
-            whole.extend_from_slice(&x[start..start + 2 * marks]);
+            for half in x[start..start + 2 * marks].chunks(marks) {
+                whole.extend_from_slice(half);
+                whole.extend(vec![0.0; problem.further_shapes]);
+            }
         }
     }
     Ok(Shot { x: whole, residuals: left_by_stretches })

@@ -1,9 +1,11 @@
 //! The equations of motion of the chain with its effects.
 
-use nalgebra::DVector;
+use nalgebra::{DMatrix, DVector};
 
 use super::effects::outside::{NodalForces, SupportMotion};
 use super::effects::{Effect, effects_of};
+use super::observe::links_from_chords;
+use super::shapes::Shapes;
 use super::{Chain, Hinge, Motion, Parameter, Partials};
 use crate::error::{Error, Result};
 use crate::experiment::Experiment;
@@ -21,6 +23,8 @@ pub struct ForwardModel {
     gravity_m_s2: f64,
     effects: Vec<Box<dyn Effect>>,
     hidden: usize,
+    /// Of a strip of many links.
+    shapes: Option<Shapes>,
     /// τ, where the hinge is dry.
     friction_n_m: Option<f64>,
 }
@@ -32,15 +36,21 @@ impl ForwardModel {
     /// [`Error::Simulation`] when the specimen cannot swing.
     pub fn of(experiment: &Experiment) -> Result<Self> {
         let (specimen, model) = (&experiment.specimen, &experiment.model);
-        let chain = match model.effects.distributed_flexibility {
-            Some(_) => Chain::continuous(specimen, model.pieces)?,
-            None => Chain::of(specimen)?,
-        };
+        let gravity_m_s2 = experiment.rig.gravity_m_s2;
         let lengths_m = specimen.lengths_m();
-        let effects = effects_of(model, lengths_m.iter().sum::<f64>() / lengths_m.len() as f64);
+        let mark_length_m = lengths_m.iter().sum::<f64>() / lengths_m.len() as f64;
+        let (chain, shapes) = match model.effects.distributed_flexibility {
+            Some(bending) => {
+                let chain = Chain::continuous(specimen, model.pieces)?;
+                let shapes = Shapes::of(&chain, gravity_m_s2, bending / mark_length_m);
+                (chain, shapes)
+            }
+            None => (Chain::of(specimen)?, None),
+        };
+        let effects = effects_of(model, mark_length_m);
         let hidden = effects.iter().map(|e| e.hidden(&chain)).sum();
         let friction_n_m = model.effects.hinge_coulomb;
-        Ok(Self { chain, gravity_m_s2: experiment.rig.gravity_m_s2, effects, hidden, friction_n_m })
+        Ok(Self { chain, gravity_m_s2, effects, hidden, shapes, friction_n_m })
     }
 
     /// The same with forces on the lower ends of the links.
@@ -49,9 +59,26 @@ impl ForwardModel {
         self
     }
 
+    /// The same with every link's angle sought for itself: what the shapes of a strip are held against.
+    #[must_use]
+    pub fn link_by_link(mut self) -> Self {
+        self.shapes = None;
+        self
+    }
+
     /// The links.
     pub fn chain(&self) -> &Chain {
         &self.chain
+    }
+
+    /// The shapes of which the motion is a sum, where it is not sought link by link.
+    pub fn shapes(&self) -> Option<&Shapes> {
+        self.shapes.as_ref()
+    }
+
+    /// Angles of the links where a motion starts: a column for each angle between marks and, of a strip, one for its next mode.
+    pub fn start(&self) -> DMatrix<f64> {
+        self.shapes.as_ref().map_or_else(|| links_from_chords(&self.chain), |shapes| shapes.start().clone())
     }
 
     /// Number of rates: one a link, and the laws' own variables.
@@ -183,21 +210,21 @@ impl ForwardModel {
         self.partials(motion, &mut partials);
         let mut q = DVector::zeros(m);
         self.torque(motion, q.as_mut_slice());
-        let inertia = -partials.acceleration;
-        let detail = || format!("no inertia left at t = {:.3} s; lower model.effects.added_mass", motion.t_s);
-        let solved = inertia.lu().solve(&q).filter(|a| a.iter().all(|v| v.is_finite()));
-        let solved = solved.ok_or_else(|| Error::Simulation { detail: detail() })?;
-        motion.acceleration.copy_from_slice(solved.as_slice());
+        motion.acceleration = balanced(partials, &q, motion.t_s)?;
         Ok(())
     }
 
     /// What friction has to bear on the first link while it is held: the sum of all other torques on it (N·m).
     pub fn hold_n_m(&self, motion: &Motion) -> f64 {
-        let mut held = motion.clone();
-        held.hinge = Hinge::Sticks;
         let mut q = vec![0.0; self.rates()];
-        self.free_torque(&held, &mut q);
+        self.torque_while_held(motion, &mut q);
         q[0]
+    }
+
+    /// Q without what holds the hinge.
+    pub(super) fn torque_while_held(&self, motion: &Motion, q: &mut [f64]) {
+        let held = Motion { hinge: Hinge::Sticks, ..motion.clone() };
+        self.free_torque(&held, q);
     }
 
     /// Kinetic energy in the pivot's frame, gravity's from the hanging position, and what the effects store (J).
@@ -215,4 +242,13 @@ impl ForwardModel {
     fn support(&self) -> Option<&SupportMotion> {
         self.effects.iter().find_map(|e| e.pivot())
     }
+}
+
+/// The accelerations for which the torques balance: `q` and `partials` are those without any.
+pub(super) fn balanced(partials: Partials, q: &DVector<f64>, t_s: f64) -> Result<Vec<f64>> {
+    let solved = (-partials.acceleration).lu().solve(q).filter(|a| a.iter().all(|v| v.is_finite()));
+    let solved = solved.ok_or_else(|| Error::Simulation {
+        detail: format!("no inertia left at t = {t_s:.3} s; lower model.effects.added_mass"),
+    })?;
+    Ok(solved.as_slice().to_vec())
 }

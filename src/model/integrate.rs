@@ -2,9 +2,10 @@
 
 use nalgebra::{DMatrix, DVector};
 
+use super::balance::Balance;
 use super::collocation::{RADAU, STAGES};
 use super::step::{Slopes, Stages, Start, Step};
-use super::{ForwardModel, Hinge, Motion, Parameter};
+use super::{ForwardModel, Hinge, Parameter};
 use crate::error::{Error, Result};
 
 /// How exact a motion is to be.
@@ -38,7 +39,7 @@ pub struct Directions {
 /// Where a motion is.
 pub(super) struct Place {
     pub t_s: f64,
-    pub theta_rad: Vec<f64>,
+    pub theta: Vec<f64>,
     pub rate: Vec<f64>,
 }
 
@@ -67,7 +68,10 @@ pub(super) fn integrate(
             return Err(Error::Simulation { detail });
         }
         if let Some(step) = run.advance(until_s)? {
-            visit(step);
+            visit(match model.shapes() {
+                Some(shapes) => step.of_links(shapes),
+                None => step,
+            });
         }
     }
     Ok(())
@@ -77,6 +81,8 @@ struct Run<'a> {
     model: &'a ForwardModel,
     accuracy: &'a Accuracy,
     stages: Stages<'a>,
+    /// At whatever instant is looked at.
+    balance: Balance<'a>,
     breaks_s: Vec<f64>,
     place: Place,
     hinge: Hinge,
@@ -107,23 +113,32 @@ impl<'a> Run<'a> {
         directions: Option<&Directions>,
         accuracy: &'a Accuracy,
     ) -> Result<Self> {
+        let balance = Balance::new(model);
         let slopes = directions.map(|d| {
             let start = d.parameters.len();
-            let mut theta = DMatrix::zeros(d.theta.nrows(), start + d.theta.ncols());
-            let mut rate = DMatrix::zeros(d.rate.nrows(), start + d.rate.ncols());
-            theta.columns_mut(start, d.theta.ncols()).copy_from(&d.theta);
-            rate.columns_mut(start, d.rate.ncols()).copy_from(&d.rate);
-            (theta, rate)
+            let with_parameters = |initial: &DMatrix<f64>| {
+                let initial = balance.coordinates(initial.clone());
+                let mut slopes = DMatrix::zeros(initial.nrows(), start + initial.ncols());
+                slopes.columns_mut(start, initial.ncols()).copy_from(&initial);
+                slopes
+            };
+            (with_parameters(&d.theta), with_parameters(&d.rate))
         });
+        let along = |values: &[f64]| {
+            balance.coordinates(DMatrix::from_column_slice(values.len(), 1, values)).as_slice().to_vec()
+        };
+        let place = Place { t_s: place.t_s, theta: along(&place.theta), rate: along(&place.rate) };
+        let rates = place.rate.len();
         let mut run = Self {
             model,
             accuracy,
             stages: Stages::new(model),
+            balance,
             breaks_s: model.breaks_s(),
             place,
             hinge: Hinge::SlidesForward,
             sides: Vec::new(),
-            first: Vec::new(),
+            first: vec![0.0; rates],
             length_s: 0.1 * accuracy.longest_step_s,
             last: None,
             parameters: directions.map(|d| d.parameters.clone()).unwrap_or_default(),
@@ -175,10 +190,10 @@ impl<'a> Run<'a> {
         }
         self.place = Place {
             t_s: if turn.is_none() && h == left_s { target_s } else { step.from_s + step.length_s },
-            theta_rad: step.theta_rad(1.0),
+            theta: step.theta_rad(1.0),
             rate: step.rate(1.0),
         };
-        if self.place.theta_rad.iter().any(|theta| theta.abs() > RUNAWAY_RAD) {
+        if self.place.theta.iter().any(|theta| theta.abs() > RUNAWAY_RAD) {
             return Err(self.stuck("the motion runs away"));
         }
         self.slopes = step.slopes(1.0);
@@ -215,7 +230,7 @@ impl<'a> Run<'a> {
         Step {
             from_s: self.place.t_s,
             length_s,
-            theta_rad: self.place.theta_rad.clone(),
+            theta_rad: self.place.theta.clone(),
             rate: self.place.rate.clone(),
             stages: k.as_slice().to_vec(),
             hinge: self.hinge,
@@ -239,24 +254,21 @@ impl<'a> Run<'a> {
         k
     }
 
-    fn accelerations(&self, hinge: Hinge) -> Result<Vec<f64>> {
+    fn accelerations(&mut self, hinge: Hinge) -> Result<Vec<f64>> {
         // just after a break of the forces, should there be one here
         let t_s = self.place.t_s + 1e-12 * (1.0 + self.place.t_s.abs());
-        let mut motion = self.model.motion(t_s, &self.place.theta_rad, &self.place.rate);
-        motion.hinge = hinge;
-        self.model.accelerate(&mut motion)?;
-        Ok(motion.acceleration)
+        self.balance.go_to(t_s, &self.place.theta, (&self.place.rate, &self.first), hinge, &[]);
+        self.balance.accelerations()
     }
 
     /// What friction bears while the hinge is held at the place (N·m).
-    fn hold_n_m(&self) -> Result<f64> {
-        let mut motion = self.model.motion(self.place.t_s, &self.place.theta_rad, &self.place.rate);
-        motion.hinge = Hinge::Sticks;
-        motion.acceleration = self.accelerations(Hinge::Sticks)?;
-        Ok(self.model.hold_n_m(&motion))
+    fn hold_n_m(&mut self) -> Result<f64> {
+        let held = self.accelerations(Hinge::Sticks)?;
+        self.balance.go_to(self.place.t_s, &self.place.theta, (&self.place.rate, &held), Hinge::Sticks, &[]);
+        Ok(self.balance.hold_n_m())
     }
 
-    fn hinge_at_start(&self) -> Result<Hinge> {
+    fn hinge_at_start(&mut self) -> Result<Hinge> {
         let Some(friction_n_m) = self.model.friction_n_m() else { return Ok(Hinge::SlidesForward) };
         if self.place.rate[0] != 0.0 {
             return Ok(Hinge::sliding(self.place.rate[0]));
@@ -266,25 +278,28 @@ impl<'a> Run<'a> {
     }
 
     /// Where in the step the hinge first reverses or is let go, or a law comes to a corner.
-    fn turn_in(&self, step: &Step) -> Option<(f64, Turn)> {
-        let turns = if self.hinge == Hinge::Sticks { Turn::Lets } else { Turn::Reverses };
-        let hinge = self.model.friction_n_m().map(|_| turns);
-        if hinge.is_none() && self.sides.is_empty() {
+    fn turn_in(&mut self, step: &Step) -> Option<(f64, Turn)> {
+        let turn = if self.hinge == Hinge::Sticks { Turn::Lets } else { Turn::Reverses };
+        let is_dry = self.model.friction_n_m().is_some();
+        if !is_dry && self.sides.is_empty() {
             return None;
         }
-        let mut instant = Motion::zero(self.place.theta_rad.len(), self.place.rate.len() - self.place.theta_rad.len());
         let mut inside = 0.0;
         for look in 1..=LOOKS {
             let tau = look as f64 / LOOKS as f64;
-            let hinge = hinge.filter(|turn| self.hinge_goes_on(step, tau, *turn) < 0.0);
-            let hinge = hinge.map(|turn| (root(inside, tau, |tau| self.hinge_goes_on(step, tau, turn)), turn));
-            let corners = self.before_corners(step, tau, &mut instant);
-            let corners = corners.iter().enumerate().filter(|(_, before)| **before < 0.0).map(|(which, _)| {
-                let before = |tau| self.before_corners(step, tau, &mut instant.clone())[which];
-                (root(inside, tau, before), Turn::Corner(which))
-            });
-            if let Some(first) = hinge.into_iter().chain(corners).min_by(|a, b| a.0.total_cmp(&b.0)) {
-                return Some(first);
+            let mut first: Option<(f64, Turn)> = None;
+            if is_dry && self.hinge_goes_on(step, tau, turn) < 0.0 {
+                first = Some((root(inside, tau, |tau| self.hinge_goes_on(step, tau, turn)), turn));
+            }
+            let corners = self.before_corners(step, tau);
+            for which in (0..corners.len()).filter(|which| corners[*which] < 0.0) {
+                let at = root(inside, tau, |tau| self.before_corners(step, tau)[which]);
+                if first.is_none_or(|(earliest, _)| at < earliest) {
+                    first = Some((at, Turn::Corner(which)));
+                }
+            }
+            if first.is_some() {
+                return first;
             }
             inside = tau;
         }
@@ -292,36 +307,34 @@ impl<'a> Run<'a> {
     }
 
     /// Positive as long as the hinge goes on as it is.
-    fn hinge_goes_on(&self, step: &Step, tau: f64, turn: Turn) -> f64 {
+    fn hinge_goes_on(&mut self, step: &Step, tau: f64, turn: Turn) -> f64 {
         if turn == Turn::Reverses {
             return self.hinge.sign() * step.one_rate(0, tau);
         }
-        let mut motion = self.model.motion(step.from_s + tau * step.length_s, &step.theta_rad(tau), &step.rate(tau));
-        motion.hinge = Hinge::Sticks;
-        motion.acceleration = step.acceleration(tau);
-        self.model.friction_n_m().unwrap_or(0.0) - self.model.hold_n_m(&motion).abs()
+        let (rate, acceleration) = (step.rate(tau), step.acceleration(tau));
+        let t_s = step.from_s + tau * step.length_s;
+        self.balance.go_to(t_s, &step.theta_rad(tau), (&rate, &acceleration), Hinge::Sticks, &[]);
+        self.model.friction_n_m().unwrap_or(0.0) - self.balance.hold_n_m().abs()
     }
 
-    /// Of every corner a quantity that is positive up to there; only the rates of `instant` count.
-    fn before_corners(&self, step: &Step, tau: f64, instant: &mut Motion) -> Vec<f64> {
+    /// Of every corner a quantity that is positive up to there.
+    fn before_corners(&mut self, step: &Step, tau: f64) -> Vec<f64> {
         if self.sides.is_empty() {
             return Vec::new();
         }
-        instant.rate = step.rate(tau);
-        self.model.corners(instant).iter().zip(&self.sides).map(|(corner, side)| corner * side).collect()
+        let corners = self.balance.corners(&step.rate(tau));
+        corners.iter().zip(&self.sides).map(|(corner, side)| corner * side).collect()
     }
 
     /// The sides of the corners at the outset; at a corner itself the one to which the motion goes: in pairs of a rate and of what has followed it.
-    fn sides_at_start(&self) -> Vec<f64> {
-        let mut motion = self.model.motion(self.place.t_s, &self.place.theta_rad, &self.place.rate);
-        let now = self.model.corners(&motion);
+    fn sides_at_start(&mut self) -> Vec<f64> {
+        let now = self.balance.corners(&self.place.rate);
         if now.is_empty() || now.len() > MOST_CORNERS {
             return Vec::new();
         }
-        for (rate, change) in motion.rate.iter_mut().zip(&self.first) {
-            *rate += 1e-9 * change;
-        }
-        let next = self.model.corners(&motion);
+        let soon: Vec<f64> =
+            self.place.rate.iter().zip(&self.first).map(|(rate, change)| rate + 1e-9 * change).collect();
+        let next = self.balance.corners(&soon);
         let mut sides: Vec<f64> = now.iter().zip(&next).map(|(a, b)| if *a == 0.0 { *b } else { *a }).collect();
         for pair in sides.chunks_exact_mut(2) {
             pair[0] = pair[0].signum();
@@ -370,7 +383,7 @@ impl<'a> Run<'a> {
                 self.first = self.accelerations(self.hinge)?;
             }
             Turn::Reverses => {
-                let before = std::mem::take(&mut self.first);
+                let before = self.first.clone();
                 let back = Hinge::sliding(-self.hinge.sign());
                 self.place.rate[0] = 0.0;
                 let slid = self.accelerations(back)?;
@@ -406,7 +419,7 @@ impl<'a> Run<'a> {
 }
 
 fn start_of<'p>(place: &'p Place, hinge: Hinge, sides: &'p [f64]) -> Start<'p> {
-    Start { from_s: place.t_s, theta_rad: &place.theta_rad, rate: &place.rate, hinge, sides }
+    Start { from_s: place.t_s, theta: &place.theta, rate: &place.rate, hinge, sides }
 }
 
 fn step_of_no_length(step: Step) -> Step {
@@ -414,7 +427,7 @@ fn step_of_no_length(step: Step) -> Step {
 }
 
 /// The root of a function that is not negative at `inside` and negative at `outside`, by halving.
-fn root(mut inside: f64, mut outside: f64, value: impl Fn(f64) -> f64) -> f64 {
+fn root(mut inside: f64, mut outside: f64, mut value: impl FnMut(f64) -> f64) -> f64 {
     for _ in 0..50 {
         let middle = 0.5 * (inside + outside);
         if value(middle) < 0.0 {

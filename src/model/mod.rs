@@ -7,6 +7,8 @@
 //! | [`parameter`] | the numbers a fit may change |
 //! | [`effects`] | every further torque, one law each |
 //! | [`forward`] | the equations of motion, and their derivatives |
+//! | [`shapes`] | the few shapes of a strip of many links |
+//! | [`balance`] | the equations along the coordinates that are integrated |
 //! | [`collocation`] | the integrator's nodes and weights |
 //! | `elimination` | small dense systems |
 //! | [`step`] | one step of it |
@@ -18,6 +20,7 @@
 //! | [`strip`] | the strip as a beam in gravity, by finite elements |
 //! | [`radiation`] | the pressure of light |
 
+pub mod balance;
 pub mod camera;
 pub mod chain;
 pub mod collocation;
@@ -31,6 +34,7 @@ pub mod observe;
 pub mod parameter;
 mod partials;
 pub mod radiation;
+pub mod shapes;
 pub mod step;
 pub mod strip;
 #[cfg(test)]

@@ -1,5 +1,7 @@
 //! The angles between marks, of a chain that may have several links between two marks.
 
+use std::f64::consts::PI;
+
 use nalgebra::DMatrix;
 
 use super::Chain;
@@ -41,25 +43,32 @@ fn chord(chain: &Chain, theta_rad: &[f64], group: std::ops::Range<usize>) -> (f6
     (first_rad + f64::atan2(across_m, along_m), f64::hypot(across_m, along_m))
 }
 
-/// The links' angles for given angles between marks, and their derivatives (links × marks): the bend is spread evenly along the strip,
-/// from the middle of one stretch between marks to the middle of the next.
-pub fn links_from_chords(chain: &Chain, chords_rad: &[f64]) -> (Vec<f64>, DMatrix<f64>) {
-    let groups = chain.groups();
-    let middle = |g: usize| 0.5 * (groups[g].start + groups[g].end) as f64;
-    let mut slopes = DMatrix::zeros(chain.count(), groups.len());
-    for link in 0..chain.count() {
-        let at = link as f64 + 0.5;
-        let own = groups.iter().position(|g| g.contains(&link)).unwrap_or(0);
-        if groups.len() == 1 || chain.count() == groups.len() {
-            slopes[(link, own)] = 1.0;
-            continue;
-        }
-        // the pair of middles that encloses the link, or the nearest pair beyond the ends
-        let lower = if at < middle(own) { own.max(1) } else { (own + 1).min(groups.len() - 1) };
-        let share = (at - middle(lower - 1)) / (middle(lower) - middle(lower - 1));
-        slopes[(link, lower - 1)] = 1.0 - share;
-        slopes[(link, lower)] = share;
+/// The links' angles for angles between marks: links × marks. Of several links between two marks the smoothest shapes with free ends are taken,
+///
+/// ```text
+/// θ(s) = Σₖ bₖ cos(kπ s/L),   k = 0 … marks − 2
+/// ```
+///
+/// as many as there are angles; θ′ = 0 at both ends, where no moment acts.
+pub fn links_from_chords(chain: &Chain) -> DMatrix<f64> {
+    let (n, groups) = (chain.count(), chain.groups());
+    if n == groups.len() {
+        return DMatrix::identity(n, n);
     }
-    let theta_rad = (0..chain.count()).map(|link| (0..groups.len()).map(|g| slopes[(link, g)] * chords_rad[g]).sum());
-    (theta_rad.collect(), slopes)
+    let whole_m: f64 = (0..n).map(|link| chain.length_m(link)).sum();
+    let mut above_m = 0.0;
+    let middles: Vec<f64> = (0..n)
+        .map(|link| {
+            above_m += chain.length_m(link);
+            (above_m - 0.5 * chain.length_m(link)) / whole_m
+        })
+        .collect();
+    let shapes = DMatrix::from_fn(n, groups.len(), |link, k| (k as f64 * PI * middles[link]).cos());
+    let chords = DMatrix::from_fn(groups.len(), groups.len(), |row, k| {
+        let across_m: f64 = groups[row].clone().map(|link| chain.length_m(link) * shapes[(link, k)]).sum();
+        across_m / groups[row].clone().map(|link| chain.length_m(link)).sum::<f64>()
+    });
+    // a sum of m such cosines has less than m zeros, so its means over m stretches do not all vanish: there is an inverse
+    let inverse = chords.try_inverse().unwrap_or_else(|| DMatrix::identity(groups.len(), groups.len()));
+    shapes * inverse
 }

@@ -2,9 +2,11 @@
 
 use nalgebra::{DMatrix, DVector};
 
+use super::balance::Balance;
 use super::collocation::{RADAU, STAGES, Weights};
 use super::elimination::Elimination;
-use super::{ForwardModel, Hinge, Motion, Parameter, Partials};
+use super::shapes::Shapes;
+use super::{ForwardModel, Hinge, Parameter, Partials};
 
 /// Newton's iterations before a step is shortened.
 const MOST_ITERATIONS: usize = 12;
@@ -121,6 +123,32 @@ impl Step {
         Some((theta, rate))
     }
 
+    /// A step of coordinates as one of the links.
+    #[must_use]
+    pub fn of_links(self, shapes: &Shapes) -> Self {
+        let columns = |values: &[f64], count: usize| DMatrix::from_column_slice(values.len() / count, count, values);
+        let expanded = |values: &[f64], count| shapes.expanded(&columns(values, count)).as_slice().to_vec();
+        let slopes = self.slopes.map(|slopes| {
+            let count = slopes.theta.ncols();
+            let stages = shapes.expanded(
+                &slopes.stages.reshape_generic(nalgebra::Dyn(self.rate.len()), nalgebra::Dyn(STAGES * count)),
+            );
+            let rows = STAGES * stages.nrows();
+            Slopes {
+                theta: shapes.expanded(&slopes.theta),
+                rate: shapes.expanded(&slopes.rate),
+                stages: stages.reshape_generic(nalgebra::Dyn(rows), nalgebra::Dyn(count)),
+            }
+        });
+        Self {
+            theta_rad: expanded(&self.theta_rad, 1),
+            rate: expanded(&self.rate, 1),
+            stages: expanded(&self.stages, STAGES),
+            slopes,
+            ..self
+        }
+    }
+
     fn sum(&self, weights: &Weights, i: usize) -> f64 {
         let m = self.rate.len();
         weights.iter().enumerate().map(|(k, w)| w * self.stages[k * m + i]).sum()
@@ -129,8 +157,9 @@ impl Step {
 
 /// Solves for the stages of one step after another.
 pub struct Stages<'a> {
-    model: &'a ForwardModel,
-    motion: Motion,
+    balance: Balance<'a>,
+    /// θ, rates and accelerations at a stage.
+    at: [Vec<f64>; 3],
     partials: Vec<Partials>,
     /// Q of every stage, scaled.
     residual: DVector<f64>,
@@ -145,8 +174,8 @@ pub struct Stages<'a> {
 pub struct Start<'a> {
     /// Time.
     pub from_s: f64,
-    /// θ.
-    pub theta_rad: &'a [f64],
+    /// Coordinates.
+    pub theta: &'a [f64],
     /// Rates.
     pub rate: &'a [f64],
     /// What the dry hinge does.
@@ -158,15 +187,16 @@ pub struct Start<'a> {
 impl<'a> Stages<'a> {
     /// For a model.
     pub fn new(model: &'a ForwardModel) -> Self {
-        let (n, m) = (model.chain().count(), model.rates());
+        let balance = Balance::new(model);
+        let (n, m) = (balance.count(), balance.rates());
         Self {
-            model,
-            motion: Motion::zero(n, m - n),
+            at: [vec![0.0; n], vec![0.0; m], vec![0.0; m]],
             partials: vec![Partials::zero(n, m); STAGES],
             residual: DVector::zeros(STAGES * m),
             matrix: vec![0.0; STAGES * m * STAGES * m],
             elimination: Elimination::default(),
-            scale: (0..m).map(|i| if i < n { 1.0 / model.chain().inertia_kg_m2()[(i, i)] } else { 1.0 }).collect(),
+            scale: (0..m).map(|i| if i < n { 1.0 / balance.inertia_kg_m2(i) } else { 1.0 }).collect(),
+            balance,
         }
     }
 
@@ -197,10 +227,10 @@ impl<'a> Stages<'a> {
         None
     }
 
-    /// Estimated error of a solved step's angles at its end (rad), after the filter that keeps it meaningful for stiff systems; `first`
+    /// Estimated error of a solved step's angles at its end, as far as they are seen (rad), after the filter that keeps it meaningful for stiff systems; `first`
     /// are the accelerations at its start.
     pub fn error_rad(&self, start: &Start<'_>, length_s: f64, k: &DVector<f64>, first: &[f64]) -> f64 {
-        let (n, m) = (start.theta_rad.len(), start.rate.len());
+        let (n, m) = (start.theta.len(), start.rate.len());
         let (h, gamma) = (length_s, RADAU.gamma * length_s);
         let estimate = |first: f64, stage: &dyn Fn(usize) -> f64| {
             h * (RADAU.gamma * first + (0..STAGES).map(|i| RADAU.error[i] * stage(i)).sum::<f64>())
@@ -216,9 +246,11 @@ impl<'a> Stages<'a> {
         corner += with_theta * (gamma * gamma);
         let right = inertia * &rate - with_theta * &angle * gamma;
         let Some(rate) = matrix.lu().solve(&right) else { return f64::INFINITY };
-        let pace_rad_s = self.model.pace_rad_s();
+        let pace_rad_s = self.balance.model().pace_rad_s();
         let hidden = rate.rows(n, m - n).amax();
-        (0..n).map(|i| (angle[i] + gamma * rate[i]).abs().max(rate[i].abs() / pace_rad_s)).fold(hidden, f64::max)
+        let of_coordinate =
+            |i: usize| self.balance.seen(i) * (angle[i] + gamma * rate[i]).abs().max(rate[i].abs() / pace_rad_s);
+        (0..n).map(of_coordinate).fold(hidden, f64::max)
     }
 
     /// Derivatives of a solved step's stages: exact for the numerical solution itself, as the balance holds at every stage.
@@ -236,12 +268,12 @@ impl<'a> Stages<'a> {
         let mut moved = vec![0.0; n * columns];
         for stage in 0..STAGES {
             self.go_to(stage, start, length_s, k);
-            self.model.partials(&self.motion, &mut self.partials[stage]);
+            self.balance.partials(&mut self.partials[stage]);
             self.fill_rows(stage, length_s);
             let partials = &self.partials[stage];
             let own = &mut right[stage * m * columns..(stage + 1) * m * columns];
             for (column, parameter) in parameters.iter().enumerate() {
-                self.model.sensitivity(*parameter, &self.motion, partials, &mut q);
+                self.balance.sensitivity(*parameter, partials, &mut q);
                 for row in 0..m {
                     own[row * columns + column] = -q[row] * self.scale[row];
                 }
@@ -274,7 +306,7 @@ impl<'a> Stages<'a> {
     fn linearise(&mut self, start: &Start<'_>, length_s: f64, k: &DVector<f64>) -> bool {
         for stage in 0..STAGES {
             self.go_to(stage, start, length_s, k);
-            self.model.partials(&self.motion, &mut self.partials[stage]);
+            self.balance.partials(&mut self.partials[stage]);
             self.fill_rows(stage, length_s);
         }
         self.elimination.decompose(self.residual.len(), &self.matrix)
@@ -308,7 +340,7 @@ impl<'a> Stages<'a> {
         for stage in 0..STAGES {
             self.go_to(stage, start, length_s, k);
             let mut rows = self.residual.rows_mut(stage * m, m);
-            self.model.torque(&self.motion, rows.as_mut_slice());
+            self.balance.torque(rows.as_mut_slice());
             for (value, scale) in rows.iter_mut().zip(&self.scale) {
                 *value *= scale;
             }
@@ -316,26 +348,23 @@ impl<'a> Stages<'a> {
     }
 
     fn go_to(&mut self, stage: usize, start: &Start<'_>, length_s: f64, k: &DVector<f64>) {
-        let (n, m, h) = (start.theta_rad.len(), start.rate.len(), length_s);
+        let (n, m, h) = (start.theta.len(), start.rate.len(), length_s);
         let (angle, rate) = (&RADAU.angle[stage], &RADAU.rate[stage]);
         let k = k.as_slice();
-        let motion = &mut self.motion;
+        let [at_theta, at_rate, at_acceleration] = &mut self.at;
         for i in 0..m {
             let (mut moved, mut sped) = (0.0, 0.0);
             for j in 0..STAGES {
                 moved += angle[j] * k[j * m + i];
                 sped += rate[j] * k[j * m + i];
             }
-            motion.rate[i] = start.rate[i] + h * sped;
-            motion.acceleration[i] = k[stage * m + i];
+            at_rate[i] = start.rate[i] + h * sped;
+            at_acceleration[i] = k[stage * m + i];
             if i < n {
-                motion.theta_rad[i] = start.theta_rad[i] + h * RADAU.nodes[stage] * start.rate[i] + h * h * moved;
-                (motion.sin[i], motion.cos[i]) = motion.theta_rad[i].sin_cos();
+                at_theta[i] = start.theta[i] + h * RADAU.nodes[stage] * start.rate[i] + h * h * moved;
             }
         }
-        motion.hinge = start.hinge;
-        motion.sides.clear();
-        motion.sides.extend_from_slice(start.sides);
-        self.model.set_time(motion, start.from_s + h * RADAU.nodes[stage]);
+        let t_s = start.from_s + h * RADAU.nodes[stage];
+        self.balance.go_to(t_s, at_theta, (at_rate, at_acceleration), start.hinge, start.sides);
     }
 }

@@ -1,11 +1,10 @@
 //! A motion, known at every instant.
 
-use nalgebra::DMatrix;
+use nalgebra::{DMatrix, DVector};
 
+use super::ForwardModel;
 use super::integrate::{Accuracy, Directions, Place, integrate};
-use super::observe::links_from_chords;
 use super::step::Step;
-use super::{Chain, ForwardModel};
 use crate::error::{Error, Result};
 
 /// Angles and rates of all links, top to bottom.
@@ -25,17 +24,26 @@ impl State {
         Self { theta_rad: theta_rad.to_vec(), omega_rad_s: vec![0.0; theta_rad.len()], hidden: Vec::new() }
     }
 
+    /// Sums of the shapes in which a motion starts (of [`ForwardModel::start`], the first ones), and their rates.
+    pub fn begun(start: &DMatrix<f64>, angles_rad: &[f64], rates_rad_s: &[f64]) -> Self {
+        let of_links = |of_shapes: &[f64]| {
+            let sum = start.columns(0, of_shapes.len()) * DVector::from_column_slice(of_shapes);
+            sum.as_slice().to_vec()
+        };
+        Self { theta_rad: of_links(angles_rad), omega_rad_s: of_links(rates_rad_s), hidden: Vec::new() }
+    }
+
     /// At rest with these angles between marks.
     ///
     /// # Errors
     /// [`Error::Simulation`] when there is not one angle for each pair of marks.
-    pub fn released(chain: &Chain, release_rad: &[f64]) -> Result<Self> {
-        let links = chain.groups().len();
+    pub fn released(model: &ForwardModel, release_rad: &[f64]) -> Result<Self> {
+        let links = model.chain().groups().len();
         if release_rad.len() != links {
             let detail = format!("{} angles for {links} links; give model.release_rad one a link", release_rad.len());
             return Err(Error::Simulation { detail });
         }
-        Ok(Self::at_rest(&links_from_chords(chain, release_rad).0))
+        Ok(Self::begun(&model.start(), release_rad, &vec![0.0; links]))
     }
 }
 
@@ -89,7 +97,7 @@ impl Trajectory {
         let mut rate = start.omega_rad_s.clone();
         rate.extend(&start.hidden);
         rate.resize(m, 0.0);
-        let place = Place { t_s: from_s, theta_rad: start.theta_rad.clone(), rate };
+        let place = Place { t_s: from_s, theta: start.theta_rad.clone(), rate };
         let mut steps = Vec::new();
         integrate(model, place, until_s, directions, accuracy, &mut |step| steps.push(step))?;
         Ok(Self { steps, start: start.clone(), from_s, until_s: until_s.max(from_s) })

@@ -34,7 +34,7 @@ impl Swing {
         // Jitter, exposure and rolling shutter together reach less than two frames beyond the last stamp.
         let last_stamp_s = render.start_s + render.duration_s + 2.0 / render.fps;
         let until_s = (0..2).map(|link| camera.true_time_s(last_stamp_s, link)).fold(0.0, f64::max);
-        let release = State::released(model.chain(), &experiment.model.release_rad)?;
+        let release = State::released(&model, &experiment.model.release_rad)?;
         let trajectory = Trajectory::swing(&model, &release, 0.0, until_s)?;
         Ok(Self {
             lengths_m: experiment.specimen.lengths_m(),

@@ -1,0 +1,160 @@
+//! The balance of torques along the coordinates that are integrated: the links' angles, or the shapes of a strip.
+
+use nalgebra::{DMatrix, DVector};
+
+use super::forward::balanced;
+use super::shapes::Shapes;
+use super::{ForwardModel, Hinge, Motion, Parameter, Partials};
+use crate::error::Result;
+
+/// A model at one instant, seen along its coordinates. Rates are those of the coordinates, then the laws' own variables.
+#[derive(Debug)]
+pub struct Balance<'a> {
+    model: &'a ForwardModel,
+    shapes: Option<&'a Shapes>,
+    motion: Motion,
+    /// Of the links, where the coordinates are shapes.
+    of_links: Partials,
+    torque: Vec<f64>,
+}
+
+impl<'a> Balance<'a> {
+    /// Of a model.
+    pub fn new(model: &'a ForwardModel) -> Self {
+        let (n, m) = (model.chain().count(), model.rates());
+        Self {
+            model,
+            shapes: model.shapes(),
+            motion: Motion::zero(n, m - n),
+            of_links: Partials::zero(n, m),
+            torque: vec![0.0; m],
+        }
+    }
+
+    /// The model.
+    pub fn model(&self) -> &'a ForwardModel {
+        self.model
+    }
+
+    /// Number of coordinates.
+    pub fn count(&self) -> usize {
+        self.shapes.map_or(self.model.chain().count(), Shapes::count)
+    }
+
+    /// Number of rates.
+    pub fn rates(&self) -> usize {
+        self.count() + self.model.rates() - self.model.chain().count()
+    }
+
+    /// Own inertia of a coordinate.
+    pub fn inertia_kg_m2(&self, i: usize) -> f64 {
+        self.shapes.map_or_else(|| self.model.chain().inertia_kg_m2()[(i, i)], |shapes| shapes.inertia_kg_m2(i))
+    }
+
+    /// How much of a coordinate is seen between marks.
+    pub fn seen(&self, i: usize) -> f64 {
+        self.shapes.map_or(1.0, |shapes| shapes.seen(i))
+    }
+
+    /// Columns of the links' values as columns of coordinates.
+    pub fn coordinates(&self, of_links: DMatrix<f64>) -> DMatrix<f64> {
+        match self.shapes {
+            None => of_links,
+            Some(shapes) => shapes.coordinates(&of_links),
+        }
+    }
+
+    /// Goes to an instant.
+    pub fn go_to(
+        &mut self,
+        t_s: f64,
+        theta: &[f64],
+        (rate, acceleration): (&[f64], &[f64]),
+        hinge: Hinge,
+        sides: &[f64],
+    ) {
+        let motion = &mut self.motion;
+        match self.shapes {
+            None => {
+                motion.theta_rad.copy_from_slice(theta);
+                motion.rate.copy_from_slice(rate);
+                motion.acceleration.copy_from_slice(acceleration);
+            }
+            Some(shapes) => {
+                shapes.expand(theta, &mut motion.theta_rad);
+                shapes.expand(rate, &mut motion.rate);
+                shapes.expand(acceleration, &mut motion.acceleration);
+            }
+        }
+        for ((sin, cos), theta) in motion.sin.iter_mut().zip(&mut motion.cos).zip(&motion.theta_rad) {
+            (*sin, *cos) = theta.sin_cos();
+        }
+        motion.hinge = hinge;
+        motion.sides.clear();
+        motion.sides.extend_from_slice(sides);
+        self.model.set_time(motion, t_s);
+    }
+
+    /// Q, one value a rate.
+    pub fn torque(&mut self, q: &mut [f64]) {
+        let Some(shapes) = self.shapes else { return self.model.torque(&self.motion, q) };
+        self.model.torque(&self.motion, &mut self.torque);
+        shapes.reduce(&self.torque, q);
+        if self.motion.hinge == Hinge::Sticks {
+            q[0] = -shapes.inertia_kg_m2(0) * self.motion.acceleration[0];
+        }
+    }
+
+    /// ∂Q.
+    pub fn partials(&mut self, partials: &mut Partials) {
+        let Some(shapes) = self.shapes else { return self.model.partials(&self.motion, partials) };
+        self.model.partials(&self.motion, &mut self.of_links);
+        shapes.reduce_partials(&self.of_links, partials);
+        if self.motion.hinge == Hinge::Sticks {
+            partials.clear_row(0);
+            partials.acceleration[(0, 0)] = -shapes.inertia_kg_m2(0);
+        }
+    }
+
+    /// ∂Q/∂parameter; `partials` are those of the same instant.
+    pub fn sensitivity(&mut self, parameter: Parameter, partials: &Partials, q: &mut [f64]) {
+        let Some(shapes) = self.shapes else { return self.model.sensitivity(parameter, &self.motion, partials, q) };
+        self.model.sensitivity(parameter, &self.motion, &self.of_links, &mut self.torque);
+        shapes.reduce(&self.torque, q);
+        if self.motion.hinge == Hinge::Sticks {
+            q[0] = 0.0;
+        }
+    }
+
+    /// The accelerations of the instant, whatever it was given.
+    ///
+    /// # Errors
+    /// [`Error::Simulation`] when no inertia is left (a negative added mass).
+    pub fn accelerations(&mut self) -> Result<Vec<f64>> {
+        let (n, m) = (self.count(), self.rates());
+        self.motion.acceleration.fill(0.0);
+        let mut partials = Partials::zero(n, m);
+        self.partials(&mut partials);
+        let mut q = DVector::zeros(m);
+        self.torque(q.as_mut_slice());
+        balanced(partials, &q, self.motion.t_s)
+    }
+
+    /// What friction has to bear while the hinge is held: the sum of all other torques on the first coordinate (N·m).
+    pub fn hold_n_m(&mut self) -> f64 {
+        let Some(shapes) = self.shapes else { return self.model.hold_n_m(&self.motion) };
+        self.model.torque_while_held(&self.motion, &mut self.torque);
+        let mut along = vec![0.0; self.rates()];
+        shapes.reduce(&self.torque, &mut along);
+        along[0]
+    }
+
+    /// Quantities at whose zeros a law has a corner; of the rates alone.
+    pub fn corners(&mut self, rate: &[f64]) -> Vec<f64> {
+        match self.shapes {
+            None => self.motion.rate.copy_from_slice(rate),
+            Some(shapes) => shapes.expand(rate, &mut self.motion.rate),
+        }
+        self.model.corners(&self.motion)
+    }
+}
