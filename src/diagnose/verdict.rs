@@ -15,10 +15,16 @@ const TOLD_APART: f64 = 0.05;
 const LAW_SHARE: f64 = 0.002;
 /// A support in step with the swing can be what it seems to be, or stand for a torque that is not known: the odds are about even.
 const IN_STEP: f64 = 0.6;
+/// The same beside a law of physics, where it gains less than this many standard deviations: three free numbers complete a law that is only nearly right, and
+/// a law outside the table that has a near relative in it is more often what has been filmed.
+const BESIDE_A_LAW: f64 = 0.35;
+const SLIGHT: f64 = 25.0;
 /// Where the best of the table leaves this many times the noise, noise is no yardstick for the model any more…
 const BEYOND_NOISE: f64 = 5.0;
-/// … and the best are named if they leave at most this part of what the base model leaves of what was not fitted.
+/// … and the best are named if they leave at most this part of what the base model leaves of what was not fitted. Of what a rig does they may be the
+/// largest part, or the nearest relatives of what is not in the table: the odds are even.
 const PROVEN: f64 = 0.5;
+const NEAREST: f64 = 0.5;
 
 /// Probabilities below this change nothing.
 const NEGLIGIBLE: f64 = 1e-4;
@@ -104,14 +110,11 @@ pub fn weigh<'a>(
     let if_named = normalised(&posterior[..fits.len()]);
     let mut probability = normalised(&posterior);
     let mut unknown = probability.pop().unwrap_or(0.0);
-    // a support in step with the swing may be a stand-in for what is not known
-    let null = fits.iter().position(|f| f.hypothesis.causes.is_empty());
+    // a support that moves may be a stand-in for what is not known
     for (fit, probability) in fits.iter().zip(&mut probability).filter(|(_, p)| **p > NEGLIGIBLE) {
-        let hz = fit.value(Parameter::SupportFrequency);
-        if hz.zip(null).is_some_and(|(hz, null)| locate::is_in_step(&fits[null], hz)) {
-            unknown += (1.0 - IN_STEP) * *probability;
-            *probability *= IN_STEP;
-        }
+        let genuine = genuine(fit, &fits);
+        unknown += (1.0 - genuine) * *probability;
+        *probability *= genuine;
     }
     let mut weighed: Vec<Weighed<'a>> = (fits.into_iter().zip(posterior).zip(probability.into_iter().zip(if_named)))
         .map(|((fit, ln_posterior), (probability, if_named))| Weighed { fit, ln_posterior, probability, if_named })
@@ -119,6 +122,19 @@ pub fn weigh<'a>(
     // where the unknown takes all, or next to all, their order among themselves still counts
     weighed.sort_by(|a, b| (b.probability.total_cmp(&a.probability)).then(b.ln_posterior.total_cmp(&a.ln_posterior)));
     (weighed, unknown, latents)
+}
+
+/// The odds that a support that a fit moves is one.
+fn genuine(fit: &Refit<'_>, fits: &[Refit<'_>]) -> f64 {
+    let Some(hz) = fit.value(Parameter::SupportFrequency) else { return 1.0 };
+    let others: Vec<Cause> = fit.hypothesis.causes.iter().copied().filter(|c| *c != Cause::SupportMotion).collect();
+    let chi2_of = |causes: &[Cause]| fits.iter().find(|f| f.hypothesis.causes == causes).map(|f| f.chi2);
+    let is_slight = chi2_of(&others).is_some_and(|without| without - fit.chi2 < SLIGHT * SLIGHT);
+    if is_slight && others.iter().any(|c| c.place() != Place::Camera) {
+        return BESIDE_A_LAW;
+    }
+    let null = fits.iter().find(|f| f.hypothesis.causes.is_empty());
+    if null.is_some_and(|null| locate::is_in_step(null, hz)) { IN_STEP } else { 1.0 }
 }
 
 /// How much likelier an unknown of any size makes the recordings than one that a law's own error allows.
@@ -150,7 +166,7 @@ impl Verdict {
         if unknown > adequate && unknown > named {
             let proven = proof.is_some_and(|proof| proof.leaves() <= PROVEN) && is_beyond_noise(&weighed[0].fit);
             return if proven {
-                Self::naming(weighed, |w| w.if_named, unknown, marks)
+                Self::naming(weighed, |w| NEAREST * w.if_named, 1.0 - NEAREST, marks)
             } else {
                 nothing(Status::Unknown, unknown)
             };
