@@ -8,6 +8,7 @@
 //! | [`refit`] | the base model with some effects, fitted |
 //! | [`dropped`] | at which instant frames are missing |
 //! | [`hysteresis`] | where its fit starts, and in which variables |
+//! | [`pieces`] | how many rods stand for a strip |
 //! | [`screen`] | which would lower the residuals |
 //! | [`selection`] | which are fitted in full |
 //! | [`evidence`] | how probable each is |
@@ -32,6 +33,7 @@ pub mod hysteresis;
 pub mod latent;
 pub mod locate;
 pub mod noise;
+pub mod pieces;
 pub mod plan;
 pub mod refit;
 pub mod screen;
@@ -39,6 +41,8 @@ pub mod selection;
 pub mod surroundings;
 pub mod torque;
 pub mod verdict;
+
+use std::sync::OnceLock;
 
 use crate::error::{Error, Result};
 use crate::experiment::Experiment;
@@ -142,6 +146,8 @@ pub struct Prepared {
     pub colour: Vec<Vec<f64>>,
     step_error_rad: f64,
     x: Vec<f64>,
+    /// The experiment with as many rods as the recordings ask for, where they do.
+    counted: OnceLock<Experiment>,
 }
 
 /// The base model's parameters and what is known of them: of a specimen of general links also its inertias and centres of mass, measured to
@@ -178,6 +184,7 @@ pub fn prepare(records: &[Record], experiment: &Experiment) -> Result<Prepared> 
         step_error_rad: problem.accuracy.step_error_rad,
         x: shot.x,
         records: kept,
+        counted: OnceLock::new(),
     })
 }
 
@@ -202,6 +209,39 @@ pub fn diagnose<'a>(
     options: &Options,
     progress: &dyn Progress,
 ) -> Result<Diagnosis<'a>> {
+    let (ground, causes, fits) = fitted(prepared, experiment, progress)?;
+    let (ground, causes, fits) = match pieces::preferred(&ground, &fits) {
+        None => (ground, causes, fits),
+        Some(count) => fitted(prepared, prepared.counted.get_or_init(|| pieces::with(experiment, count)), progress)?,
+    };
+    let marks = prepared.records.first().map_or(0, Record::links);
+    let (weighed, unknown, unknowns) = verdict::weigh(fits, ground.values(), causes.len(), |fit, variance| {
+        (locate::unknowns(fit, variance, Beyond::TheFit), energy::added_torque_n_m(fit))
+    });
+    let null = weighed.iter().find(|w| w.fit.hypothesis.causes.is_empty()).map_or(&weighed[0].fit, |w| &w.fit);
+    let best = &weighed[0].fit;
+    let held_out = heldout::held_out(&ground, null, best, options.predict_from_s);
+    let adequacy = adequacy::adequacy(&ground, null, &causes, options.bootstraps, progress);
+    Ok(Diagnosis {
+        verdict: Verdict::of(&weighed, unknown, marks, held_out.as_ref()),
+        departure: locate::departure(null),
+        missing_torque: torque::missing(best, null),
+        added_torque_n_m: energy::added_torque_n_m(best),
+        energy_shares: energy::energy_shares(best),
+        p_value: adequacy.p_value,
+        detectable: adequacy.detectable,
+        held_out,
+        noise_rad: ground.noise_rad.clone(),
+        colour: ground.colour.clone(),
+        unknowns,
+        weighed,
+    })
+}
+
+/// Ground, effects and fits of all hypotheses.
+type Fitted<'a> = (Ground<'a>, Vec<Cause>, Vec<Refit<'a>>);
+
+fn fitted<'a>(prepared: &'a Prepared, experiment: &'a Experiment, progress: &dyn Progress) -> Result<Fitted<'a>> {
     let records = &prepared.records;
     let marks = records.first().map_or(0, Record::links);
     let (base, beliefs) = base_of(experiment, marks)?;
@@ -225,25 +265,5 @@ pub fn diagnose<'a>(
     let null =
         if ground.refine_noise(&null) { ground.again(&null, ground::MOST_STEPS).ok_or_else(refused)? } else { null };
     let fits = selection::fits(&mut ground, null, &causes, progress);
-    let (weighed, unknown, unknowns) = verdict::weigh(fits, ground.values(), causes.len(), |fit, variance| {
-        (locate::unknowns(fit, variance, Beyond::TheFit), energy::added_torque_n_m(fit))
-    });
-    let null = weighed.iter().find(|w| w.fit.hypothesis.causes.is_empty()).map_or(&weighed[0].fit, |w| &w.fit);
-    let best = &weighed[0].fit;
-    let held_out = heldout::held_out(&ground, null, best, options.predict_from_s);
-    let adequacy = adequacy::adequacy(&ground, null, &causes, options.bootstraps, progress);
-    Ok(Diagnosis {
-        verdict: Verdict::of(&weighed, unknown, marks, held_out.as_ref()),
-        departure: locate::departure(null),
-        missing_torque: torque::missing(best, null),
-        added_torque_n_m: energy::added_torque_n_m(best),
-        energy_shares: energy::energy_shares(best),
-        p_value: adequacy.p_value,
-        detectable: adequacy.detectable,
-        held_out,
-        noise_rad: ground.noise_rad.clone(),
-        colour: ground.colour.clone(),
-        unknowns,
-        weighed,
-    })
+    Ok((ground, causes, fits))
 }

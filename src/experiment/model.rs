@@ -89,7 +89,7 @@ impl Default for Model {
             k_eq_n_m_per_rad: 2.0e-4,
             c_eq_n_m_s_per_rad: 2.0e-6,
             release_rad: vec![0.5, 0.6],
-            pieces: 6,
+            pieces: 8,
             effects: Effects::default(),
         }
     }

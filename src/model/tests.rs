@@ -362,7 +362,7 @@ fn a_bending_strip_hangs_together_like_its_two_rods() {
     let mut strip = experiment(0.0, 0.0, Effects { distributed_flexibility: Some(1e-2), ..Effects::default() });
     strip.model.release_rad = vec![0.4, 0.4];
     let model = ForwardModel::of(&strip).unwrap();
-    assert_eq!((model.chain().count(), model.chain().groups().len()), (12, 2));
+    assert_eq!((model.chain().count(), model.chain().groups().len()), (16, 2));
     let start = State::released(&model, &strip.model.release_rad).unwrap();
     let swing = Trajectory::swing(&model, &start, 0.0, 2.0).unwrap();
     let mut rigid = experiment(0.0, 0.0, Effects::default());

@@ -10,6 +10,10 @@
 //! vₙ is linear in s, so f Jₖ is a polynomial, of the third power at most – on either side of the point where the link turns about itself
 //! and |vₙ|vₙ has its corner. There the link is cut, and the quadrature is exact.
 
+use std::ops::RangeInclusive;
+
+use nalgebra::DMatrix;
+
 use super::Law;
 use crate::model::{Chain, Motion, Parameter, Partials};
 
@@ -67,31 +71,52 @@ impl Law for AddedMass {
     fn add_torque(&self, chain: &Chain, motion: &Motion, mass: f64, q: &mut [f64]) {
         stations(chain, motion, |at| {
             let acceleration = at.acceleration_m_s2();
-            for k in 0..=at.i {
-                q[k] -= mass * at.weight_m * (at.arm_m(k) * acceleration + at.speed_m_s * at.turn_m_s(k));
+            for (k, (q, arm)) in q.iter_mut().zip(at.arms_m).enumerate() {
+                *q -= mass * at.weight_m * (arm * acceleration + at.speed_m_s * at.turn_m_s(k));
             }
         });
     }
 
     fn add_partials(&self, chain: &Chain, motion: &Motion, mass: f64, partials: &mut Partials) {
+        let mut with = vec![[0.0; 3]; chain.count()];
         stations(chain, motion, |at| {
             let (i, v, a) = (at.i, at.speed_m_s, at.acceleration_m_s2());
             let factor = -mass * at.weight_m;
-            for k in 0..=i {
-                let (arm, turn) = (at.arm_m(k), at.turn_m_s(k));
-                for l in 0..=i {
-                    partials.acceleration[(k, l)] += factor * arm * at.arm_m(l);
-                    partials.rate[(k, l)] += factor
-                        * (arm * at.acceleration_with_rate(l) + at.arm_m(l) * turn + v * at.turn_with_rate(k, l));
-                    partials.theta[(k, l)] += factor
-                        * (at.arm_with_angle(k, l) * a
-                            + arm * at.acceleration_with_angle(l)
-                            + at.speed_with_angle(l) * turn
-                            + v * at.turn_with_angle(k, l));
+            for (l, with) in with.iter_mut().enumerate().take(i + 1) {
+                *with = [at.acceleration_with_rate(l), at.acceleration_with_angle(l), at.speed_with_angle(l)];
+            }
+            // Σ of products of something of k and something of l, column after column
+            for (l, [rate, angle, speed]) in with.iter().enumerate().take(i + 1) {
+                let rows = 0..=i;
+                let arm = at.arms_m[l];
+                let own = column(&mut partials.acceleration, l, &rows);
+                own.iter_mut().zip(at.arms_m).for_each(|(own, arm_k)| *own += factor * arm * arm_k);
+                let own = column(&mut partials.rate, l, &rows);
+                for (k, (own, arm_k)) in own.iter_mut().zip(at.arms_m).enumerate() {
+                    *own += factor * (arm_k * rate + arm * at.turn_m_s(k));
                 }
-                let (sin, cos) = (motion.sin[i], motion.cos[i]);
+                let own = column(&mut partials.theta, l, &rows);
+                for (k, (own, arm_k)) in own.iter_mut().zip(at.arms_m).enumerate() {
+                    *own += factor * (arm_k * angle + speed * at.turn_m_s(k));
+                }
+            }
+            // and what depends on both
+            let omega = motion.rate[i];
+            for k in 0..i {
+                let (arm, cross) = (at.arms_m[k], at.crosses_m[k]);
+                partials.rate[(k, i)] -= factor * v * cross;
+                partials.rate[(i, k)] += factor * v * cross;
+                partials.theta[(k, k)] += factor * (cross * a + v * arm * omega);
+                partials.theta[(k, i)] -= factor * (cross * a + v * arm * omega);
+                partials.theta[(i, k)] -= factor * v * arm * motion.rate[k];
+                partials.theta[(i, i)] += factor * v * arm * motion.rate[k];
+            }
+            let (sin, cos) = (motion.sin[i], motion.cos[i]);
+            partials.theta[(i, i)] += factor * v * motion.pivot_m_s * cos;
+            for (k, arm) in at.arms_m.iter().enumerate() {
                 let turn_with_pivot = if k == i { sin } else { 0.0 };
-                partials.pivot_velocity[k] += factor * (arm * -sin * motion.rate[i] + cos * turn + v * turn_with_pivot);
+                let turn = at.turn_m_s(k);
+                partials.pivot_velocity[k] += factor * (arm * -sin * omega + cos * turn + v * turn_with_pivot);
                 partials.pivot_acceleration[k] += factor * arm * cos;
             }
         });
@@ -106,26 +131,43 @@ impl Law for AddedMass {
 
 /// A point of the strip, at distance s down link i.
 struct Station<'a> {
-    chain: &'a Chain,
     motion: &'a Motion,
     i: usize,
-    s_m: f64,
     weight_m: f64,
+    /// Jₖ, k = 0 … i.
+    arms_m: &'a [f64],
+    /// Lₖ sin(θᵢ−θₖ), k = 0 … i.
+    crosses_m: &'a [f64],
     /// vₙ.
     speed_m_s: f64,
     /// U.
     slip_m_s: f64,
 }
 
+/// Up to so many links the arms need no memory of their own.
+const FEW_LINKS: usize = 8;
+
 fn stations(chain: &Chain, motion: &Motion, mut visit: impl FnMut(&Station<'_>)) {
-    for i in 0..chain.count() {
+    let n = chain.count();
+    let (mut few, mut many) = ([0.0; 2 * FEW_LINKS], Vec::new());
+    let both = if n <= FEW_LINKS {
+        &mut few[..2 * n]
+    } else {
+        many.resize(2 * n, 0.0);
+        &mut many[..]
+    };
+    let (arms_m, crosses_m) = both.split_at_mut(n);
+    for i in 0..n {
         let (length_m, omega_rad_s) = (chain.length_m(i), motion.rate[i]);
         let mut end_m_s = motion.pivot_m_s * motion.cos[i];
         let mut slip_m_s = motion.pivot_m_s * motion.sin[i];
         for l in 0..i {
-            end_m_s += chain.length_m(l) * motion.cos_difference(i, l) * motion.rate[l];
-            slip_m_s += chain.length_m(l) * motion.sin_difference(i, l) * motion.rate[l];
+            arms_m[l] = chain.length_m(l) * motion.cos_difference(i, l);
+            crosses_m[l] = chain.length_m(l) * motion.sin_difference(i, l);
+            end_m_s += arms_m[l] * motion.rate[l];
+            slip_m_s += crosses_m[l] * motion.rate[l];
         }
+        crosses_m[i] = 0.0;
         // where the link turns about a point of its own
         let still_m = -end_m_s / omega_rad_s;
         let cut_m = if still_m > 0.0 && still_m < length_m { still_m } else { length_m };
@@ -134,55 +176,46 @@ fn stations(chain: &Chain, motion: &Motion, mut visit: impl FnMut(&Station<'_>))
                 continue;
             }
             for (node, weight) in GAUSS {
-                let s_m = from_m + node * (until_m - from_m);
-                let (weight_m, speed_m_s) = (weight * (until_m - from_m), end_m_s + s_m * omega_rad_s);
-                visit(&Station { chain, motion, i, s_m, weight_m, speed_m_s, slip_m_s });
+                arms_m[i] = from_m + node * (until_m - from_m);
+                let (weight_m, speed_m_s) = (weight * (until_m - from_m), end_m_s + arms_m[i] * omega_rad_s);
+                let (arms_m, crosses_m) = (&arms_m[..=i], &crosses_m[..=i]);
+                visit(&Station { motion, i, weight_m, arms_m, crosses_m, speed_m_s, slip_m_s });
             }
         }
     }
 }
 
+/// Some rows of a column.
+fn column<'m>(matrix: &'m mut DMatrix<f64>, column: usize, rows: &RangeInclusive<usize>) -> &'m mut [f64] {
+    let first = column * matrix.nrows();
+    &mut matrix.as_mut_slice()[first + rows.start()..=first + rows.end()]
+}
+
 impl Station<'_> {
-    /// Jₖ.
-    fn arm_m(&self, k: usize) -> f64 {
-        if k < self.i { self.chain.length_m(k) * self.motion.cos_difference(self.i, k) } else { self.s_m }
-    }
-
-    /// Lₖ sin(θᵢ−θₖ).
-    fn cross_m(&self, k: usize) -> f64 {
-        self.chain.length_m(k) * self.motion.sin_difference(self.i, k)
-    }
-
-    /// ∂Jₖ/∂θₗ.
-    fn arm_with_angle(&self, k: usize, l: usize) -> f64 {
-        match (k < self.i, l == k, l == self.i) {
-            (true, true, _) => self.cross_m(k),
-            (true, _, true) => -self.cross_m(k),
-            _ => 0.0,
-        }
-    }
-
     /// ∂vₙ/∂θₗ.
     fn speed_with_angle(&self, l: usize) -> f64 {
-        if l < self.i { self.cross_m(l) * self.motion.rate[l] } else { -self.slip_m_s }
+        if l < self.i { self.crosses_m[l] * self.motion.rate[l] } else { -self.slip_m_s }
     }
 
     fn add_force(&self, force_n_m: f64, q: &mut [f64]) {
-        for k in 0..=self.i {
-            q[k] += self.weight_m * force_n_m * self.arm_m(k);
-        }
+        q.iter_mut().zip(self.arms_m).for_each(|(q, arm)| *q += self.weight_m * force_n_m * arm);
     }
 
     /// For a force per length f(vₙ) with its slope f′.
     fn add_force_partials(&self, force_n_m: f64, slope: f64, partials: &mut Partials) {
-        for k in 0..=self.i {
-            let arm = self.weight_m * self.arm_m(k);
-            for l in 0..=self.i {
-                partials.rate[(k, l)] += arm * slope * self.arm_m(l);
-                partials.theta[(k, l)] +=
-                    arm * slope * self.speed_with_angle(l) + self.weight_m * force_n_m * self.arm_with_angle(k, l);
-            }
-            partials.pivot_velocity[k] += arm * slope * self.motion.cos[self.i];
+        let (i, slope, force) = (self.i, self.weight_m * slope, self.weight_m * force_n_m);
+        for l in 0..=i {
+            let (with_rate, with_angle) = (slope * self.arms_m[l], slope * self.speed_with_angle(l));
+            let own = column(&mut partials.rate, l, &(0..=i));
+            own.iter_mut().zip(self.arms_m).for_each(|(own, arm)| *own += with_rate * arm);
+            let own = column(&mut partials.theta, l, &(0..=i));
+            own.iter_mut().zip(self.arms_m).for_each(|(own, arm)| *own += with_angle * arm);
+        }
+        // ∂Jₖ/∂θₖ = Lₖ sin(θᵢ−θₖ) = −∂Jₖ/∂θᵢ
+        for (k, (arm, cross)) in self.arms_m.iter().zip(self.crosses_m).enumerate() {
+            partials.theta[(k, k)] += force * cross;
+            partials.theta[(k, i)] -= force * cross;
+            partials.pivot_velocity[k] += arm * slope * self.motion.cos[i];
         }
     }
 
@@ -191,14 +224,14 @@ impl Station<'_> {
         let Motion { rate, acceleration, sin, cos, .. } = self.motion;
         let i = self.i;
         let pivot = self.motion.pivot_m_s2 * cos[i] - self.motion.pivot_m_s * rate[i] * sin[i];
-        let of_link = |l: usize| self.arm_m(l) * acceleration[l] - self.cross_m(l) * (rate[i] - rate[l]) * rate[l];
-        (0..i).map(of_link).sum::<f64>() + self.s_m * acceleration[i] + pivot
+        let of_link = |l: usize| self.arms_m[l] * acceleration[l] - self.crosses_m[l] * (rate[i] - rate[l]) * rate[l];
+        (0..=i).map(of_link).sum::<f64>() + pivot
     }
 
     /// ∂v̇ₙ/∂θ̇ₗ.
     fn acceleration_with_rate(&self, l: usize) -> f64 {
         if l < self.i {
-            -self.cross_m(l) * (self.motion.rate[self.i] - 2.0 * self.motion.rate[l])
+            -self.crosses_m[l] * (self.motion.rate[self.i] - 2.0 * self.motion.rate[l])
         } else {
             -self.slip_m_s
         }
@@ -208,7 +241,7 @@ impl Station<'_> {
     fn acceleration_with_angle(&self, l: usize) -> f64 {
         let Motion { rate, acceleration, sin, cos, .. } = self.motion;
         let i = self.i;
-        let of_link = |k: usize| self.cross_m(k) * acceleration[k] + self.arm_m(k) * (rate[i] - rate[k]) * rate[k];
+        let of_link = |k: usize| self.crosses_m[k] * acceleration[k] + self.arms_m[k] * (rate[i] - rate[k]) * rate[k];
         if l < i {
             of_link(l)
         } else {
@@ -220,31 +253,7 @@ impl Station<'_> {
 
     /// Wₖ.
     fn turn_m_s(&self, k: usize) -> f64 {
-        if k < self.i { -self.cross_m(k) * self.motion.rate[self.i] } else { self.slip_m_s }
-    }
-
-    /// ∂Wₖ/∂θ̇ₗ.
-    fn turn_with_rate(&self, k: usize, l: usize) -> f64 {
-        match (k < self.i, l < self.i) {
-            (true, false) => -self.cross_m(k),
-            (false, true) => self.cross_m(l),
-            _ => 0.0,
-        }
-    }
-
-    /// ∂Wₖ/∂θₗ.
-    fn turn_with_angle(&self, k: usize, l: usize) -> f64 {
-        let rate = &self.motion.rate;
-        match (k < self.i, l < self.i) {
-            (true, true) if k == l => self.arm_m(k) * rate[self.i],
-            (true, true) => 0.0,
-            (true, false) => -self.arm_m(k) * rate[self.i],
-            (false, true) => -self.arm_m(l) * rate[l],
-            (false, false) => {
-                (0..self.i).map(|l| self.arm_m(l) * rate[l]).sum::<f64>()
-                    + self.motion.pivot_m_s * self.motion.cos[self.i]
-            }
-        }
+        if k < self.i { -self.crosses_m[k] * self.motion.rate[self.i] } else { self.slip_m_s }
     }
 }
 

@@ -1,0 +1,89 @@
+//! How many rods stand for a strip.
+//!
+//! A chain of n rods swings as the strip does up to an error in proportion to ε = 1/n². For a large release and little noise that error is seen, and a
+//! law would be named for it. So the rods are counted, too: their χ² over ε is a parabola, of which three counts tell the lowest point.
+
+use rayon::prelude::*;
+
+use super::ground::Ground;
+use super::refit::Refit;
+use crate::experiment::{Experiment, Model};
+
+/// Counts between two marks that are tried beside the usual one, and the bounds of what they may lead to.
+const TRIED: [usize; 2] = [6, 12];
+const FEWEST: usize = 5;
+const MOST: usize = 20;
+/// Another count must lower χ² by so many variances of the best fit.
+const WORTH: f64 = 25.0;
+/// An effect must lower it by this to stand beside fewer.
+const OF_AN_EFFECT: f64 = 9.0;
+
+/// The number of rods between two marks that the recordings ask for, if it is not the usual one; `None` also where the file asks for another.
+pub fn preferred(ground: &Ground<'_>, fits: &[Refit<'_>]) -> Option<usize> {
+    let usual = Model::default().pieces;
+    if !ground.is_strip() || ground.experiment.model.pieces != usual {
+        return None;
+    }
+    let least = fits.iter().map(|fit| fit.chi2).fold(f64::INFINITY, f64::min);
+    let scatter = (least / ground.values() as f64).max(1.0);
+    let weight = |fit: &Refit<'_>| fit.chi2 / scatter + OF_AN_EFFECT * fit.hypothesis.causes.len() as f64;
+    let best = fits.iter().min_by(|a, b| weight(a).total_cmp(&weight(b)))?;
+    let within = |fit: &&Refit<'_>| fit.hypothesis.causes.iter().all(|c| best.hypothesis.causes.contains(c));
+    let compared: Vec<&Refit<'_>> = fits.iter().filter(within).collect();
+    let mut points = vec![(epsilon(usual), weight(best))];
+    points.extend(TRIED.iter().filter_map(|pieces| {
+        let experiment = with(ground.experiment, *pieces);
+        let other = Ground { experiment: &experiment, ..ground.clone() };
+        let refitted = compared.par_iter().with_max_len(1).filter_map(|fit| other.refit(&fit.hypothesis, fit, &[]));
+        let weights: Vec<f64> = refitted.map(|fit| weight(&fit)).collect();
+        Some((epsilon(*pieces), weights.into_iter().min_by(f64::total_cmp)?))
+    }));
+    let (lowest, value) = lowest_point(&points, epsilon(MOST)..=epsilon(FEWEST))?;
+    let pieces = (1.0 / lowest.sqrt()).round() as usize;
+    (pieces != usual && value < weight(best) - WORTH).then_some(pieces)
+}
+
+/// An experiment with another number of rods.
+pub fn with(experiment: &Experiment, pieces: usize) -> Experiment {
+    let mut experiment = experiment.clone();
+    experiment.model.pieces = pieces;
+    experiment
+}
+
+fn epsilon(pieces: usize) -> f64 {
+    1.0 / (pieces * pieces) as f64
+}
+
+/// Where a parabola through three points is lowest within bounds, and how low.
+fn lowest_point(points: &[(f64, f64)], bounds: std::ops::RangeInclusive<f64>) -> Option<(f64, f64)> {
+    let [(x0, y0), (x1, y1), (x2, y2)] = *points else { return None };
+    let (rise, further) = ((y1 - y0) / (x1 - x0), (y2 - y1) / (x2 - x1));
+    let bend = (further - rise) / (x2 - x0);
+    let at = |x: f64| y0 + (x - x0) * (rise + (x - x1) * bend);
+    let vertex = 0.5 * (x0 + x1 - rise / bend);
+    let inside = vertex.clamp(*bounds.start(), *bounds.end());
+    let candidates = [*bounds.start(), *bounds.end(), if bend > 0.0 { inside } else { *bounds.start() }];
+    let lowest = candidates.into_iter().min_by(|a, b| at(*a).total_cmp(&at(*b)))?;
+    lowest.is_finite().then(|| (lowest, at(lowest)))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_lowest_point_of_a_parabola_is_found_from_three_of_its_points() {
+        let parabola = |x: f64| 3.0 + 40.0 * (x - 0.3).powi(2);
+        let points = [0.9, 0.5, 0.1].map(|x| (x, parabola(x)));
+        let (x, y) = lowest_point(&points, 0.0..=1.0).unwrap();
+        assert!((x - 0.3).abs() < 1e-12 && (y - 3.0).abs() < 1e-12);
+        let (x, y) = lowest_point(&points, 0.4..=1.0).unwrap();
+        assert!((x - 0.4).abs() < 1e-12 && (y - parabola(0.4)).abs() < 1e-12);
+    }
+
+    #[test]
+    fn a_line_is_lowest_at_its_end() {
+        let (x, y) = lowest_point(&[(0.2, 5.0), (0.3, 4.0), (0.1, 6.0)], 0.05..=0.4).unwrap();
+        assert!((x - 0.4).abs() < 1e-12 && (y - 3.0).abs() < 1e-9, "{x} {y}");
+    }
+}
