@@ -33,7 +33,7 @@ const COUNTS: [usize; 5] = [1, 2, 3, 7, 20];
 /// Largest disagreement, as a part of the largest acceleration.
 const AGREES: f64 = 1e-8;
 /// Rods of a bending strip between marks.
-const PIECES: usize = 6;
+const PIECES: usize = 8;
 
 // ---- the bodies
 
