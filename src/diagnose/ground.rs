@@ -122,8 +122,13 @@ impl<'a> Ground<'a> {
     }
 
     /// The first steps of a refit.
-    pub fn begin(&self, hypothesis: &Hypothesis, near: &Refit<'_>) -> Option<Refit<'a>> {
-        let (problem, x) = self.start(hypothesis, near, &[])?;
+    pub fn begin(
+        &self,
+        hypothesis: &Hypothesis,
+        near: &Refit<'_>,
+        start: &[(Parameter, f64)],
+    ) -> Option<Refit<'a>> {
+        let (problem, x) = self.start(hypothesis, near, start)?;
         self.descend(hypothesis, problem, x, FIRST_STEPS)
     }
 

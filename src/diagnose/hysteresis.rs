@@ -112,6 +112,9 @@ fn softened<'a>(ground: &Ground<'a>, null: &Refit<'a>) -> Option<Refit<'a>> {
     };
     let costed = starts.map(start).map(|start| (ground.cost_at(&hypothesis, null, &start), start));
     let (_, best) = costed.min_by(|a, b| a.0.total_cmp(&b.0))?;
+    if ground.is_strip() {
+        return ground.begin(&hypothesis, null, &best);
+    }
     ground.refit(&hypothesis, null, &best)
 }
 

@@ -163,8 +163,10 @@ fn with_refined_noise<'a>(ground: &mut Ground<'a>, fits: Vec<Refit<'a>>) -> Vec<
     let (least, null) = (best.map_or(0.0, |best| best.chi2), fits[0].chi2);
     let again = |fit: Refit<'a>| {
         let dear = fit.hypothesis.causes.contains(&Cause::JointHysteretic);
+        // in every joint of a strip it has only begun
+        let bound = if dear && ground.is_strip() { HOPEFUL } else { HOPELESS };
         let worth = fit.hypothesis.causes.is_empty()
-            || fit.chi2 < HOPELESS * (least + HOPELESS) && !(dear && fit.chi2 > null - WORTH);
+            || fit.chi2 < bound * (least + HOPELESS) && !(dear && fit.chi2 > null - WORTH);
         match (changed, worth) {
             (true, _) => ground.again(&fit, if worth { ground::MOST_STEPS } else { 0 }).unwrap_or(fit),
             (false, true) if !fit.converged => ground.again(&fit, ground::MOST_STEPS).unwrap_or(fit),
@@ -194,7 +196,7 @@ fn single<'a>(
             // many links are dear: only where there is something to explain
             if unexplained {
                 let hypothesis = Hypothesis::default().and(cause, None);
-                let begun = ground.begin(&hypothesis, null).filter(|b| b.chi2 < HOPEFUL * null.chi2);
+                let begun = ground.begin(&hypothesis, null, &[]).filter(|b| b.chi2 < HOPEFUL * null.chi2);
                 tries.push(begun.and_then(|begun| ground.again(&begun, ground::FEW_STEPS)));
                 if out_of_step && tries.iter().flatten().all(Refit::is_out_of_step) {
                     tries.push(ground.refit_anew(&hypothesis, &[]));
@@ -239,7 +241,7 @@ fn is_loss(cause: Cause) -> bool {
 
 /// The effects that are screened: a hysteresis in each joint of a strip of many links costs more than all others, and is only fitted alone.
 pub(super) fn cheap(ground: &Ground<'_>, causes: &[Cause]) -> Vec<Cause> {
-    let strip = ground.base.contains(&Parameter::BendingStiffness);
+    let strip = ground.is_strip();
     causes.iter().copied().filter(|c| !(strip && *c == Cause::JointHysteretic)).collect()
 }
 
