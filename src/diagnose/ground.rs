@@ -122,12 +122,7 @@ impl<'a> Ground<'a> {
     }
 
     /// The first steps of a refit.
-    pub fn begin(
-        &self,
-        hypothesis: &Hypothesis,
-        near: &Refit<'_>,
-        start: &[(Parameter, f64)],
-    ) -> Option<Refit<'a>> {
+    pub fn begin(&self, hypothesis: &Hypothesis, near: &Refit<'_>, start: &[(Parameter, f64)]) -> Option<Refit<'a>> {
         let (problem, x) = self.start(hypothesis, near, start)?;
         self.descend(hypothesis, problem, x, FIRST_STEPS)
     }

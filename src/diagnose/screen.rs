@@ -22,6 +22,8 @@ const NOTHING_LEFT: f64 = 1e-5;
 const YIELDS: [f64; 3] = [0.03, 0.15, 0.6];
 /// Frequencies of a moving support: this fine for the length of the recording.
 const PER_RESOLUTION: f64 = 1.0;
+/// Peaks over the frequency that are kept beside the highest.
+const FURTHER_PEAKS: usize = 4;
 /// Highest frequency of a moving support, in units of the swing's.
 const HIGHEST: f64 = 8.0;
 
@@ -32,6 +34,8 @@ pub struct Score {
     pub cause: Cause,
     /// Values of its coefficients.
     pub start: Vec<(Parameter, f64)>,
+    /// Other values that promise something, where a scan has several peaks.
+    pub further: Vec<Vec<(Parameter, f64)>>,
     /// Where frames are missing.
     pub dropped: Option<(usize, f64)>,
     /// Fall of χ² in linear approximation.
@@ -170,7 +174,7 @@ impl<'g, 'a> Screen<'g, 'a> {
             (value[0], gain) = (0.0, 0.0);
         }
         let start = of.iter().zip(value.iter()).map(|(p, v)| (*p, *v)).collect();
-        Some(Score { cause, start, dropped, gain, sd: inverse[(0, 0)].sqrt(), columns })
+        Some(Score { cause, start, further: Vec::new(), dropped, gain, sd: inverse[(0, 0)].sqrt(), columns })
     }
 
     /// Frames missing before each row in turn: the angles after it are ahead.
@@ -249,13 +253,24 @@ impl<'g, 'a> Screen<'g, 'a> {
         let nyquist_hz = 0.5 * around.iter().map(|(a, _, _)| a.t_s.len() as f64).fold(0.0, f64::max) / span_s;
         let count = (PER_RESOLUTION * span_s * (HIGHEST * swing_hz).min(0.9 * nyquist_hz)) as usize;
         let hz = |k: usize| (k as f64 + 0.5) / (PER_RESOLUTION * span_s);
-        let best = (1..count)
-            .filter_map(|k| Some((self.promise(&self.at_frequency(&around, hz(k)))?, hz(k))))
-            .max_by(|a, b| a.0.total_cmp(&b.0))?;
-        let columns = self.at_frequency(&around, best.1);
-        let parameters = [Parameter::SupportSine, Parameter::SupportCosine];
-        let mut score = self.score(Cause::SupportMotion, columns, &parameters, None)?;
-        score.start.push((Parameter::SupportFrequency, best.1));
+        let promises: Vec<(f64, f64)> =
+            (1..count).filter_map(|k| Some((self.promise(&self.at_frequency(&around, hz(k)))?, hz(k)))).collect();
+        let is_peak = |k: &usize| {
+            let near = promises[k.saturating_sub(1)..promises.len().min(k + 2)].iter();
+            near.map(|p| p.0).fold(f64::NEG_INFINITY, f64::max) <= promises[*k].0
+        };
+        let mut peaks: Vec<(f64, f64)> = (0..promises.len()).filter(is_peak).map(|k| promises[k]).collect();
+        peaks.sort_by(|a, b| b.0.total_cmp(&a.0));
+        let at = |hz: f64| {
+            let columns = self.at_frequency(&around, hz);
+            let parameters = [Parameter::SupportSine, Parameter::SupportCosine];
+            let mut score = self.score(Cause::SupportMotion, columns, &parameters, None)?;
+            score.start.push((Parameter::SupportFrequency, hz));
+            Some(score)
+        };
+        let mut score = at(peaks.first()?.1)?;
+        let further = peaks.iter().skip(1).take(FURTHER_PEAKS).filter_map(|(_, hz)| at(*hz));
+        score.further = further.map(|other| other.start).collect();
         Some(score)
     }
 

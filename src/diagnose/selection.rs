@@ -217,6 +217,9 @@ fn single<'a>(
             if lost || slow {
                 tries.push(ground.refit_anew(&hypothesis, &score.start));
             }
+            if unexplained && near.as_ref().is_none_or(|n| n.chi2 > too_much) {
+                tries.extend(score.further.iter().map(|start| ground.refit(&hypothesis, null, start)));
+            }
             tries.push(near);
         }
         (_, None) => {}

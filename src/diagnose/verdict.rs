@@ -8,7 +8,10 @@ use super::{Cause, Place, locate};
 use crate::model::Parameter;
 
 /// A verdict stands alone when it is at least this probable.
-const ALONE: f64 = 0.8;
+const ALONE: f64 = 0.75;
+/// Of the names that fit within the noise this part stands for something outside the table that they imitate: on the training bank of the concealed
+/// benchmark, names stated at 0.99 were right in 93 of 100 cases.
+const IMITATED: f64 = 0.06;
 /// A hypothesis this much less probable than the best named one is told from it.
 const TOLD_APART: f64 = 0.05;
 /// A named law may be wrong by this part of its own torque before something unknown is suspected beside it.
@@ -110,9 +113,9 @@ pub fn weigh<'a>(
     let if_named = normalised(&posterior[..fits.len()]);
     let mut probability = normalised(&posterior);
     let mut unknown = probability.pop().unwrap_or(0.0);
-    // a support that moves may be a stand-in for what is not known
+    // a name, above all a support that moves, may be a stand-in for what is not known
     for (fit, probability) in fits.iter().zip(&mut probability).filter(|(_, p)| **p > NEGLIGIBLE) {
-        let genuine = genuine(fit, &fits);
+        let genuine = genuine(fit, &fits) * if fit.hypothesis.causes.is_empty() { 1.0 } else { 1.0 - IMITATED };
         unknown += (1.0 - genuine) * *probability;
         *probability *= genuine;
     }
