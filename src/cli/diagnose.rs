@@ -256,13 +256,15 @@ impl Report<'_> {
             Status::Identified => {
                 format!("Missing: {} ({percent:.0} %).{}{}", words(&verdict.effects), self.remark(), self.more())
             }
-            Status::Ambiguous => format!(
-                "Missing: most likely {} ({percent:.0} %), but the recording does not tell it from others: {}.{}{}",
-                words(&verdict.effects),
-                names(&verdict.class, ""),
-                self.remark(),
-                self.more()
-            ),
+            Status::Ambiguous => {
+                let others = if verdict.class.len() > verdict.effects.len() {
+                    format!(", but the recording does not tell it from others: {}", names(&verdict.class, ""))
+                } else {
+                    format!(", or something outside the table that it resembles ({:.0} %)", 1e2 * verdict.unknown)
+                };
+                let (effects, remark, more) = (words(&verdict.effects), self.remark(), self.more());
+                format!("Missing: most likely {effects} ({percent:.0} %){others}.{remark}{more}")
+            }
         }
     }
 
@@ -273,8 +275,8 @@ impl Report<'_> {
             return String::new();
         }
         format!(
-            " That is their share among the laws of the table: they explain {:.1} % of what the base model leaves, but what is left is still {:.0} times the \
-             noise, and something that is not in the table is missing, too.",
+            " Of the table they come nearest and explain {:.1} % of what the base model leaves, but what is left is still {:.0} times the noise: something that is \
+             not in the table is missing beside them, or in their place.",
             1e2 * self.diagnosis.explained(),
             verdict::over_noise(fit)
         )
