@@ -1,14 +1,17 @@
 //! Is the base model enough? Its residuals against what chance alone would leave, and what could have been seen.
 //!
 //! The residuals of a fit to data that its model made are (1 − QQᵀ)ε, ε being the noise: replicates of them cost no integration. Each statistic
-//! (the best score of any effect, the worst window, the correlation of neighbours, each over the mean square) is ranked among its replicates, and the smallest rank among the smallest
-//! ranks of the replicates, so that looking in many places is paid for.
+//! (the best score of an effect, the worst window, the highest peak of the spectrum, the correlation of neighbours, each over the mean square) is ranked among
+//! its replicates, and the smallest rank among the smallest ranks of the replicates, so that looking in many places is paid for. Effects that are scanned for are
+//! left to the spectrum and the windows: a replicate would have to be scanned anew to be held against them.
 
 use nalgebra::DVector;
 use rand::SeedableRng;
 use rand::rngs::StdRng;
 use rand_distr::{Distribution, StandardNormal};
 use rayon::prelude::*;
+use rustfft::FftPlanner;
+use rustfft::num_complex::Complex;
 
 use super::ground::Ground;
 use super::refit::Refit;
@@ -19,6 +22,8 @@ use crate::progress::Progress;
 
 /// Replicates of the residuals.
 const REPLICATES: usize = 500;
+/// What they are compared by.
+const STATISTICS: usize = 4;
 /// Values of a window.
 const WINDOW: usize = 40;
 /// An effect is detected at this many standard deviations.
@@ -68,8 +73,11 @@ pub fn adequacy(
     let Some(screen) = Screen::at(ground, null) else { return nothing };
     let scores = screen.scores(&selection::cheap(ground, causes));
     let basis = &screen.projection.basis;
+    let scanned = [Cause::DroppedFrames, Cause::SupportMotion, Cause::JointHysteretic];
+    let fixed: Vec<&Score> = scores.iter().filter(|s| !scanned.contains(&s.cause)).collect();
+    let transform = FftPlanner::new().plan_fft_forward(basis.nrows());
     let statistics = |residual: &DVector<f64>| {
-        let score = scores
+        let score = fixed
             .iter()
             .map(|s| {
                 let pull = s.columns.tr_mul(residual);
@@ -80,9 +88,17 @@ pub fn adequacy(
             (0..residual.len() / WINDOW).map(|k| residual.rows(k * WINDOW, WINDOW).norm_squared()).fold(0.0, f64::max);
         let neighbours: f64 = (1..residual.len()).map(|i| residual[i] * residual[i - 1]).sum();
         let mean_square = residual.norm_squared() / residual.len() as f64;
-        [score / mean_square, window / mean_square, (neighbours / residual.norm_squared().max(1e-300)).abs()]
+        let mut spectrum: Vec<Complex<f64>> = residual.iter().map(|r| Complex::new(*r, 0.0)).collect();
+        transform.process(&mut spectrum);
+        let peak = spectrum[..residual.len() / 2 + 1].iter().map(Complex::norm_sqr).fold(0.0, f64::max);
+        [
+            score / mean_square,
+            window / mean_square,
+            peak / mean_square,
+            (neighbours / residual.norm_squared().max(1e-300)).abs(),
+        ]
     };
-    let replicates: Vec<[f64; 3]> = if bootstraps > 0 {
+    let replicates: Vec<[f64; STATISTICS]> = if bootstraps > 0 {
         progress.begin("bootstraps", Some(bootstraps as u64));
         let of = |seed: u64| {
             let residual = replicate(ground, null, seed);
@@ -121,9 +137,9 @@ fn replicate(ground: &Ground<'_>, null: &Refit<'_>, seed: u64) -> Option<DVector
 }
 
 /// The share of replicates whose least rank is as small as the recording's.
-fn ranked(own: &[f64; 3], replicates: &[[f64; 3]]) -> f64 {
+fn ranked(own: &[f64; STATISTICS], replicates: &[[f64; STATISTICS]]) -> f64 {
     let count = replicates.len() as f64;
-    let rank = |of: &[f64; 3]| {
+    let rank = |of: &[f64; STATISTICS]| {
         (0..own.len())
             .map(|s| (1.0 + replicates.iter().filter(|r| r[s] >= of[s]).count() as f64) / (count + 1.0))
             .fold(1.0, f64::min)
