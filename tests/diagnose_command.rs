@@ -59,11 +59,15 @@ impl Folder {
 
     /// 15 s of a swing with the effects given, which the base model lacks.
     fn swing(&self, base: &str, effects: &str) -> PathBuf {
+        self.swing_of(base, effects, 1)
+    }
+
+    fn swing_of(&self, base: &str, effects: &str, seed: u32) -> PathBuf {
         let heading = if base.contains("[model.effects]") { "" } else { "[model.effects]\n" };
         let config = self.write("simulated.toml", &format!("{base}{heading}{effects}"));
         let out = self.path("angles.csv");
         freeswing("simulate")
-            .args(["--duration", "15", "--rate", "30", "--noise-rad", "1e-3"])
+            .args(["--duration", "15", "--rate", "30", "--noise-rad", "1e-3", "--seed", &seed.to_string()])
             .arg("--config")
             .arg(config)
             .arg("--out")
@@ -278,4 +282,18 @@ fn a_viscous_hinge_is_not_all_of_a_real_arm() {
     println!("{}", verdict["statement"]);
     assert_ne!(verdict["status"], "adequate", "{verdict:#}");
     assert!(report["baseline"]["p_value"].as_f64().unwrap() < 0.01, "{}", report["baseline"]);
+}
+
+#[test]
+fn p_is_spread_evenly_over_recordings_that_lack_nothing() {
+    let folder = Folder::new();
+    let mut p_values: Vec<f64> = (1..=9)
+        .map(|seed| {
+            let angles = folder.swing_of(BASE, "", seed);
+            folder.diagnosis(&angles, BASE, &[])["baseline"]["p_value"].as_f64().unwrap()
+        })
+        .collect();
+    p_values.sort_by(f64::total_cmp);
+    // of nine even draws the median leaves these bounds, and the largest one is below one half, once in five hundred times each
+    assert!((0.1..0.9).contains(&p_values[4]) && p_values[8] > 0.5, "{p_values:?}");
 }
