@@ -73,8 +73,9 @@ pub fn adequacy(
     let Some(screen) = Screen::at(ground, null) else { return nothing };
     let scores = screen.scores(&selection::cheap(ground, causes));
     let basis = &screen.projection.basis;
-    let scanned = [Cause::DroppedFrames, Cause::SupportMotion, Cause::JointHysteretic];
-    let fixed: Vec<&Score> = scores.iter().filter(|s| !scanned.contains(&s.cause)).collect();
+    // of the hysteresis, the best of several yield angles
+    let is_fixed = |s: &&Score| !s.cause.is_scanned() && s.cause != Cause::JointHysteretic;
+    let fixed: Vec<&Score> = scores.iter().filter(is_fixed).collect();
     let transform = FftPlanner::new().plan_fft_forward(basis.nrows());
     let statistics = |residual: &DVector<f64>| {
         let score = fixed

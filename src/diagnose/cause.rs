@@ -126,6 +126,11 @@ impl Cause {
         }
     }
 
+    /// Whether it has no derivative at the outset and is looked for at every instant, or frequency: the best of many gains by chance alone.
+    pub fn is_scanned(self) -> bool {
+        matches!(self, Self::DroppedFrames | Self::SupportMotion)
+    }
+
     /// Where it acts.
     pub fn place(self) -> Place {
         match self {

@@ -99,11 +99,8 @@ impl<'g, 'a> Screen<'g, 'a> {
     /// The score of each effect that says anything; effects of the fit's own hypothesis are left out.
     pub fn scores(&self, causes: &[Cause]) -> Vec<Score> {
         let further: Vec<Cause> = causes.iter().copied().filter(|c| !self.fit.hypothesis.causes.contains(c)).collect();
-        let smooth: Vec<Cause> = further
-            .iter()
-            .copied()
-            .filter(|c| !matches!(c, Cause::DroppedFrames | Cause::SupportMotion | Cause::DistributedFlexibility))
-            .collect();
+        let smooth: Vec<Cause> =
+            further.iter().copied().filter(|c| !c.is_scanned() && *c != Cause::DistributedFlexibility).collect();
         // every corner of a hysteresis ends a step, which the others need not suffer
         let (kinked, smooth): (Vec<Cause>, Vec<Cause>) = smooth.into_iter().partition(|c| *c == Cause::JointHysteretic);
         let mut scores = self.of_coefficients(&smooth, None).unwrap_or_default();

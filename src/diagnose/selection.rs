@@ -45,9 +45,7 @@ const FEWEST_PAIRS: usize = 6;
 pub fn fits<'a>(ground: &mut Ground<'a>, null: Refit<'a>, causes: &[Cause], progress: &dyn Progress) -> Vec<Refit<'a>> {
     let scores = Screen::at(ground, &null).map(|s| s.scores(&cheap(ground, causes))).unwrap_or_default();
     let out_of_step = null.is_out_of_step();
-    // what is found by a scan gains by chance alone
-    let scanned = |cause: Cause| matches!(cause, Cause::DroppedFrames | Cause::SupportMotion);
-    let seen = scores.iter().any(|s| s.gain > WORTH && !scanned(s.cause));
+    let seen = scores.iter().any(|s| s.gain > WORTH && !s.cause.is_scanned());
     progress.begin("effects", Some(causes.len() as u64));
     let singles = causes.par_iter().with_max_len(1).filter_map(|cause| {
         let fit = single(ground, &null, *cause, scores.iter().find(|s| s.cause == *cause), (out_of_step, seen));

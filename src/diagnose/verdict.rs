@@ -115,7 +115,7 @@ pub fn weigh<'a>(
     let mut unknown = probability.pop().unwrap_or(0.0);
     // a name, above all a support that moves, may be a stand-in for what is not known
     for (fit, probability) in fits.iter().zip(&mut probability).filter(|(_, p)| **p > NEGLIGIBLE) {
-        let genuine = genuine(fit, &fits) * if fit.hypothesis.causes.is_empty() { 1.0 } else { 1.0 - IMITATED };
+        let genuine = genuine(fit, &fits);
         unknown += (1.0 - genuine) * *probability;
         *probability *= genuine;
     }
@@ -127,17 +127,20 @@ pub fn weigh<'a>(
     (weighed, unknown, latents)
 }
 
-/// The odds that a support that a fit moves is one.
+/// The odds that a fit's effects are what has been filmed, and stand for nothing else.
 fn genuine(fit: &Refit<'_>, fits: &[Refit<'_>]) -> f64 {
-    let Some(hz) = fit.value(Parameter::SupportFrequency) else { return 1.0 };
-    let others: Vec<Cause> = fit.hypothesis.causes.iter().copied().filter(|c| *c != Cause::SupportMotion).collect();
-    let chi2_of = |causes: &[Cause]| fits.iter().find(|f| f.hypothesis.causes == causes).map(|f| f.chi2);
-    let is_slight = chi2_of(&others).is_some_and(|without| without - fit.chi2 < SLIGHT * SLIGHT);
-    if is_slight && others.iter().any(|c| c.place() != Place::Camera) {
-        return BESIDE_A_LAW;
+    if fit.hypothesis.causes.is_empty() {
+        return 1.0;
     }
-    let null = fits.iter().find(|f| f.hypothesis.causes.is_empty());
-    if null.is_some_and(|null| locate::is_in_step(null, hz)) { IN_STEP } else { 1.0 }
+    let named = 1.0 - IMITATED;
+    let Some(hz) = fit.value(Parameter::SupportFrequency) else { return named };
+    let fit_of = |causes: &[Cause]| fits.iter().find(|f| f.hypothesis.causes == causes);
+    let others: Vec<Cause> = fit.hypothesis.causes.iter().copied().filter(|c| *c != Cause::SupportMotion).collect();
+    let is_slight = fit_of(&others).is_some_and(|without| without.chi2 - fit.chi2 < SLIGHT * SLIGHT);
+    if is_slight && others.iter().any(|c| c.place() != Place::Camera) {
+        return BESIDE_A_LAW * named;
+    }
+    if fit_of(&[]).is_some_and(|null| locate::is_in_step(null, hz)) { IN_STEP * named } else { named }
 }
 
 /// How much likelier an unknown of any size makes the recordings than one that a law's own error allows.

@@ -181,37 +181,24 @@ impl<'a> Problem<'a> {
             let columns = (0..self.free.len()).chain(start..start + 2 * self.shapes()).collect();
             Some(self.block(record, &prediction, columns))
         };
-        let known = self.belief_block(x).into_iter().chain(self.shape_block(x));
-        (0..self.records.len()).map(of).chain(known.map(Some)).collect()
+        (0..self.records.len()).map(of).chain(self.known_blocks(x).map(Some)).collect()
     }
 
-    /// How much of further shapes there is at each start, over what may be expected of them.
-    fn shape_block(&self, x: &[f64]) -> Option<Block> {
+    /// All that is known beforehand: of the parameters, and of how much of further shapes there may be at each start.
+    fn known_blocks(&self, x: &[f64]) -> impl Iterator<Item = Block> {
         let (marks, shapes) = (self.marks(), self.shapes());
-        let starts = (0..self.records.len()).map(|record| self.start_of(record));
-        let further = starts.flat_map(|start| {
-            let of = |first: usize, sd: f64| (start + first + marks..start + first + shapes).map(move |i| (i, sd));
+        let further = (0..self.records.len()).map(|record| self.start_of(record)).flat_map(|start| {
+            let of = |first: usize, sd: f64| (start + first + marks..start + first + shapes).map(move |i| (i, 0.0, sd));
             of(0, FURTHER_RAD).chain(of(shapes, FURTHER_RAD_S))
         });
-        let known: Vec<(usize, f64)> = further.collect();
-        (!known.is_empty()).then(|| Block {
-            columns: known.iter().map(|(column, _)| *column).collect(),
-            residual: DVector::from_iterator(known.len(), known.iter().map(|(i, sd)| x[*i] / sd)),
-            slopes: DMatrix::from_diagonal(&DVector::from_iterator(known.len(), known.iter().map(|(_, sd)| 1.0 / sd))),
-            robust: false,
-        })
+        self.belief_block(x).into_iter().chain(known_block(&further.collect::<Vec<_>>(), x))
     }
 
     /// How far the parameters are from what is known of them, over its standard deviation.
     pub fn belief_block(&self, x: &[f64]) -> Option<Block> {
         let place = |belief: &Belief| self.free.iter().position(|p| *p == belief.parameter);
-        let known: Vec<(usize, &Belief)> = self.beliefs.iter().filter_map(|b| Some((place(b)?, b))).collect();
-        (!known.is_empty()).then(|| Block {
-            columns: known.iter().map(|(column, _)| *column).collect(),
-            residual: DVector::from_iterator(known.len(), known.iter().map(|(i, b)| (x[*i] - b.value) / b.sd)),
-            slopes: DMatrix::from_diagonal(&DVector::from_iterator(known.len(), known.iter().map(|(_, b)| 1.0 / b.sd))),
-            robust: false,
-        })
+        let known: Vec<_> = self.beliefs.iter().filter_map(|b| Some((place(b)?, b.value, b.sd))).collect();
+        known_block(&known, x)
     }
 
     /// Σr² over all recordings; infinite where the motion cannot be integrated.
@@ -220,8 +207,7 @@ impl<'a> Problem<'a> {
             let prediction = self.predict(record, x, false).ok()?;
             Some(self.block(record, &prediction, Vec::new()).residual.norm_squared())
         };
-        let known = self.belief_block(x).into_iter().chain(self.shape_block(x));
-        known.map(|block| block.residual.norm_squared()).sum::<f64>()
+        self.known_blocks(x).map(|block| block.residual.norm_squared()).sum::<f64>()
             + (0..self.records.len()).map(|record| of(record).unwrap_or(f64::INFINITY)).sum::<f64>()
     }
 
@@ -282,6 +268,16 @@ impl<'a> Problem<'a> {
             }
         }
     }
+}
+
+/// How far variables (place, value, standard deviation) are from what is known of them.
+fn known_block(known: &[(usize, f64, f64)], x: &[f64]) -> Option<Block> {
+    (!known.is_empty()).then(|| Block {
+        columns: known.iter().map(|(column, _, _)| *column).collect(),
+        residual: DVector::from_iterator(known.len(), known.iter().map(|(i, value, sd)| (x[*i] - value) / sd)),
+        slopes: DMatrix::from_diagonal(&DVector::from_iterator(known.len(), known.iter().map(|(_, _, sd)| 1.0 / sd))),
+        robust: false,
+    })
 }
 
 /// The derivatives of a fit's blocks with all variables, and their residuals, one row after another.

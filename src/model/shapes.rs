@@ -8,8 +8,8 @@
 //! ```
 //!
 //! Q is the whole, non-linear balance of torques. The shapes are the lowest modes of the hanging strip, and how it stands when either end is turned: a
-//! spring or friction in the hinge bends it within a short layer that no low mode has, a curl at rest bends it up to both ends. They are combined so that q₁ = θ₁, all others leaving the first
-//! link alone: dry friction holds a coordinate. Their inertia ΦᵀMΦ is diagonal.
+//! spring or friction in the hinge bends it within a short layer that no low mode has, a curl at rest bends it up to both ends. They are combined so
+//! that q₁ = θ₁, all others leaving the first link alone: dry friction holds a coordinate. Their inertia ΦᵀMΦ is diagonal.
 
 use nalgebra::{DMatrix, DVector};
 
@@ -40,7 +40,8 @@ pub struct Shapes {
 impl Shapes {
     /// Of a chain whose joints have the stiffness K of a length between marks; `None` where the chain has hardly more links than shapes.
     pub fn of(chain: &Chain, gravity_m_s2: f64, stiffness_n_m_per_rad: f64) -> Option<Self> {
-        let (n, modes) = (chain.count(), chain.groups().len() + FURTHER_MODES);
+        let (n, marks) = (chain.count(), chain.groups().len());
+        let modes = marks + FURTHER_MODES;
         let count = modes + 2;
         if n <= count {
             return None;
@@ -54,7 +55,6 @@ impl Shapes {
         let eigen = (0.5 * (&symmetric + symmetric.transpose())).symmetric_eigen();
         let mut order: Vec<usize> = (0..n).collect();
         order.sort_by(|a, b| eigen.eigenvalues[*a].total_cmp(&eigen.eigenvalues[*b]));
-        let marks = chain.groups().len();
         let mut whole = DMatrix::zeros(n, count);
         for (k, mode) in order.iter().take(modes).enumerate() {
             whole.set_column(k, &lower.tr_solve_lower_triangular(&eigen.eigenvectors.column(*mode))?);
