@@ -129,7 +129,7 @@ impl<'a> Balance<'a> {
     /// The accelerations of the instant, whatever it was given.
     ///
     /// # Errors
-    /// [`Error::Simulation`] when no inertia is left (a negative added mass).
+    /// [`crate::Error::Simulation`] when no inertia is left (a negative added mass).
     pub fn accelerations(&mut self) -> Result<Vec<f64>> {
         let (n, m) = (self.count(), self.rates());
         self.motion.acceleration.fill(0.0);
