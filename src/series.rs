@@ -29,6 +29,8 @@ pub struct AngleSeries {
     pub theta_rad: Vec<Vec<Option<f64>>>,
     /// Its standard deviation where the table states one that is positive.
     pub sd_rad: Vec<Vec<Option<f64>>>,
+    /// Whether the table also holds the marks in the picture, from which its angles were measured.
+    pub tracked: bool,
 }
 
 impl AngleSeries {
@@ -70,6 +72,7 @@ impl AngleSeries {
             t_s: Vec::new(),
             theta_rad: vec![Vec::new(); links],
             sd_rad: vec![Vec::new(); links],
+            tracked: header.iter().any(|name| name == "m1_x_px"),
         };
         for record in reader.records() {
             let record = record.map_err(|e| table.refuse(e.position().map(csv::Position::line), &e.to_string()))?;
@@ -199,6 +202,7 @@ impl AngleSeries {
             t_s: self.t_s[rows.clone()].to_vec(),
             theta_rad: part(&self.theta_rad),
             sd_rad: part(&self.sd_rad),
+            tracked: self.tracked,
         }
     }
 }

@@ -17,6 +17,7 @@ use super::ground::Ground;
 use super::refit::Refit;
 use super::screen::{Score, Screen};
 use super::{Cause, selection};
+use crate::fit::whitening::{IN_STEP_SHAPES, in_step_shapes};
 use crate::model::Parameter;
 use crate::progress::Progress;
 
@@ -125,12 +126,16 @@ fn replicate(ground: &Ground<'_>, null: &Refit<'_>, seed: u64) -> Option<DVector
     let mut records = ground.records.to_vec();
     for (index, record) in records.iter_mut().enumerate() {
         let mut noise = vec![0.0; record.links()];
+        let shapes = in_step_shapes(record, record.in_step, &ground.noise_rad[index]);
+        let mut normal = || -> f64 { StandardNormal.sample(&mut random) };
+        let sizes: Vec<[f64; IN_STEP_SHAPES]> =
+            (0..record.links()).map(|_| std::array::from_fn(|_| normal())).collect();
         for value in null.problem.predict(index, &null.x, false).ok()?.values {
-            let fresh: f64 = StandardNormal.sample(&mut random);
             let rho = ground.colour[index][value.link];
-            noise[value.link] = rho * noise[value.link] + (1.0 - rho * rho).sqrt() * fresh;
+            noise[value.link] = rho * noise[value.link] + (1.0 - rho * rho).sqrt() * normal();
             let sd_rad = ground.noise_rad[index][value.link] * record.relative_sd[value.link][value.row];
-            record.theta_rad[value.link][value.row] = Some(value.predicted_rad + sd_rad * noise[value.link]);
+            let in_step: f64 = shapes[value.link][value.row].iter().zip(&sizes[value.link]).map(|(a, b)| a * b).sum();
+            record.theta_rad[value.link][value.row] = Some(value.predicted_rad + sd_rad * noise[value.link] + in_step);
         }
     }
     let again = ground.on(&records).refit(&null.hypothesis, null, &[])?;

@@ -39,6 +39,9 @@ pub struct Ground<'a> {
     pub noise_rad: Vec<Vec<f64>>,
     /// AR(1) correlation of the noise.
     pub colour: Vec<Vec<f64>>,
+    /// Errors in step with the swing that each recording's angles may have, as a share of the noise. While the fits are sought there are none: what a model lacks
+    /// is in step with the swing as well, and no descent must be told not to mind it.
+    pub in_step: Vec<f64>,
     /// Of the integration.
     pub step_error_rad: f64,
     /// Where the base model's descent began: parameters and starts that short stretches led to. Empty where that is not known.
@@ -92,6 +95,7 @@ impl<'a> Ground<'a> {
         let mut problem = Problem::new(self.records, &experiment, &free)?;
         problem.noise_rad.clone_from(&self.noise_rad);
         problem.colour.clone_from(&self.colour);
+        problem.in_step.clone_from(&self.in_step);
         problem.beliefs = beliefs;
         if hypothesis.causes.contains(&Cause::DistributedFlexibility) {
             // no more is free at its start than in the rods it is compared with
@@ -177,6 +181,7 @@ impl<'a> Ground<'a> {
         let mut problem = fit.problem.clone();
         problem.noise_rad.clone_from(&self.noise_rad);
         problem.colour.clone_from(&self.colour);
+        problem.in_step.clone_from(&self.in_step);
         self.descend(&fit.hypothesis, problem, fit.x.clone(), steps)
     }
 
@@ -257,6 +262,7 @@ impl<'a> Ground<'a> {
             beliefs: self.beliefs.clone(),
             noise_rad: of(&self.noise_rad),
             colour: of(&self.colour),
+            in_step: records.iter().map(|r| self.in_step[place(r)]).collect(),
             step_error_rad: self.step_error_rad,
             begun: Vec::new(),
         }

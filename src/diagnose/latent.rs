@@ -1,11 +1,12 @@
 //! The unknown torque: a smooth random process at one place, estimated around a fitted motion by a Kalman filter and smoother.
 //!
 //! ```text
-//! state   z = (δθ, δrate, u, δp, e)   u' = −u/T + w,   sd of u: σ
-//! seen    left = ∂(angle)/∂θ δθ (+ u) + e + white noise
+//! state   z = (δθ, δrate, u, δp, e, b)   u' = −u/T + w,   sd of u: σ
+//! seen    left = ∂(angle)/∂θ δθ (+ u) + e + Φb + white noise
 //! ```
 //!
-//! e is the noise of each angle where that is correlated from row to row (then there is next to no white noise); a smooth torque must not be blamed for it.
+//! e is the noise of each angle where that is correlated from row to row (then there is next to no white noise), Φb what a tracked angle may err in step with
+//! the swing ([`crate::fit::whitening`]); a smooth torque must not be blamed for them.
 //!
 //! The initial state and the base parameters are free as in the fit itself (their prior is wide), so that u holds only what they cannot absorb.
 //! `ln L(σ) − ln L(0)` says how much the recording asks for it.
@@ -23,6 +24,7 @@ use nalgebra::{DMatrix, DVector};
 use super::Place;
 use super::refit::Refit;
 use super::surroundings::Surroundings;
+use crate::fit::whitening::{IN_STEP_SHAPES, in_step_shapes};
 use crate::model::Parameter;
 use crate::statistics::median_step_s;
 
@@ -70,6 +72,8 @@ pub struct Filter<'a> {
     variance: f64,
     /// Correlation of each angle's noise from row to row.
     colour: &'a [f64],
+    /// Errors in step that each angle may have, `[mark][row]`; none of an angle that was not tracked.
+    in_step: Vec<Vec<[f64; IN_STEP_SHAPES]>>,
     place: Place,
     /// From each row to the next, the noise included.
     transitions: Vec<DMatrix<f64>>,
@@ -115,6 +119,11 @@ impl<'a> Filter<'a> {
         let colour: &[f64] = &problem.colour[record];
         let first_sd = |mark: usize| around.rows[0].sd_rad[mark] * variance.sqrt();
         wide.extend((0..marks).map(|mark| if colour[mark] > 0.0 { first_sd(mark) } else { 0.0 }));
+        let in_step = match problem.in_step[record] {
+            share if share > 0.0 => in_step_shapes(&problem.records[record], share, &problem.noise_rad[record]),
+            _ => Vec::new(),
+        };
+        wide.extend(vec![variance.sqrt(); in_step.len() * IN_STEP_SHAPES]);
         let mut begin = vec![0.0; wide.len()];
         if beyond == Beyond::TheBaseModel {
             for place in fit.added().iter().filter_map(|p| fit.place(*p)) {
@@ -128,11 +137,13 @@ impl<'a> Filter<'a> {
         let (step_s, total) = (median_step_s(&around.t_s)?, wide.len());
         for (transition, pair) in transitions.iter_mut().zip(around.t_s.windows(2)) {
             *transition = std::mem::take(transition).resize(total, total, 0.0);
-            for (of_noise, rho) in (total - marks..total).zip(colour) {
+            let first = around.state() + 1 + around.parameters;
+            for (of_noise, rho) in (first..).zip(colour) {
                 transition[(of_noise, of_noise)] = rho.powf((pair[1] - pair[0]) / step_s);
             }
+            (first + marks..total).for_each(|of_step| transition[(of_step, of_step)] = 1.0);
         }
-        Some(Self { around, variance, colour, place, transitions, memory_s, begin, wide })
+        Some(Self { around, variance, colour, in_step, place, transitions, memory_s, begin, wide })
     }
 
     /// ln L up to a constant, for a standard deviation of the unknown.
@@ -186,7 +197,8 @@ impl<'a> Filter<'a> {
 
     /// Where the noise of each angle stands in the state.
     fn of_noise(&self) -> std::ops::Range<usize> {
-        self.wide.len() - self.colour.len()..self.wide.len()
+        let first = self.around.state() + 1 + self.around.parameters;
+        first..first + self.colour.len()
     }
 
     /// Runs the filter; `hear` gets all that it comes by.
@@ -223,6 +235,11 @@ impl<'a> Filter<'a> {
                 let Some(left) = left else { continue };
                 (0..n).for_each(|i| slopes[i] = row.observed[(mark, i)]);
                 self.of_noise().enumerate().for_each(|(of, i)| slopes[i] = f64::from(u8::from(of == mark)));
+                for (of, shapes) in self.in_step.iter().enumerate() {
+                    let first = self.of_noise().end + of * IN_STEP_SHAPES;
+                    let own = if of == mark { shapes[k] } else { [0.0; IN_STEP_SHAPES] };
+                    slopes.rows_mut(first, IN_STEP_SHAPES).copy_from_slice(&own);
+                }
                 p.mul_to(&slopes, &mut gain);
                 let white = if self.colour[mark] > 0.0 { WHITE } else { 1.0 };
                 let variance = white * self.variance * row.sd_rad[mark].powi(2) + slopes.dot(&gain);

@@ -90,10 +90,8 @@ pub struct Diagnosis<'a> {
     pub detectable: Vec<Detectable>,
     /// p of the base model.
     pub p_value: f64,
-    /// Noise of each angle, `[record][link]`.
-    pub noise_rad: Vec<Vec<f64>>,
-    /// Its correlation from row to row.
-    pub colour: Vec<Vec<f64>>,
+    /// What all fits share: the noise, and how much of it is correlated from row to row.
+    pub ground: Ground<'a>,
 }
 
 impl<'a> Diagnosis<'a> {
@@ -231,10 +229,9 @@ pub fn diagnose<'a>(
         p_value: adequacy.p_value,
         detectable: adequacy.detectable,
         held_out,
-        noise_rad: ground.noise_rad.clone(),
-        colour: ground.colour.clone(),
         unknowns,
         weighed,
+        ground,
     })
 }
 
@@ -253,6 +250,7 @@ fn fitted<'a>(prepared: &'a Prepared, experiment: &'a Experiment, progress: &dyn
         beliefs,
         noise_rad: prepared.noise_rad.clone(),
         colour: prepared.colour.clone(),
+        in_step: vec![0.0; records.len()],
         step_error_rad: prepared.step_error_rad,
         begun: prepared.x.clone(),
     };

@@ -37,6 +37,7 @@ pub fn planned(experiment: &Experiment, plan: &Plan) -> Result<Vec<Detectable>> 
         beliefs,
         noise_rad: vec![vec![plan.noise_rad; marks]],
         colour: vec![vec![0.0; marks]],
+        in_step: vec![0.0],
         step_error_rad: (1e-3 * plan.noise_rad).clamp(1e-10, 1e-6),
         begun: Vec::new(),
     };
@@ -65,5 +66,6 @@ fn recorded(experiment: &Experiment, plan: &Plan) -> Result<Record> {
         theta_rad: (0..marks).map(|link| chords.iter().map(|c| Some(c[link])).collect()).collect(),
         relative_sd: vec![vec![1.0; rows]; marks],
         t_s,
+        in_step: 0.0,
     })
 }

@@ -14,6 +14,7 @@ use super::Cause;
 use super::ground::{Ground, Hypothesis};
 use super::refit::Refit;
 use super::surroundings::Surroundings;
+use crate::fit::whitening::Whitening;
 use crate::model::Parameter;
 
 /// Of a column less than this is left by the projection: nothing can be said about it.
@@ -183,6 +184,8 @@ impl<'g, 'a> Screen<'g, 'a> {
         let mut of_record = Vec::new();
         for (record, data) in problem.records.iter().enumerate() {
             let prediction = problem.predict(record, &self.fit.x, false).ok()?;
+            let before = first;
+            first += prediction.values.len();
             let rates: Vec<(f64, f64)> = prediction
                 .values
                 .iter()
@@ -191,11 +194,10 @@ impl<'g, 'a> Screen<'g, 'a> {
                     (data.t_s[v.row], v.rate_rad_s / sd)
                 })
                 .collect();
-            of_record.push((first, rates));
-            first += prediction.values.len();
+            of_record.push((before, prediction.values, rates));
         }
         for (record, data) in problem.records.iter().enumerate() {
-            let (first, rates) = &of_record[record];
+            let (first, _, rates) = &of_record[record];
             let p = self.projection.basis.ncols();
             // sums over the rows from each instant on, by adding one instant after another from the last
             let mut order: Vec<usize> = (0..rates.len()).collect();
@@ -222,11 +224,13 @@ impl<'g, 'a> Screen<'g, 'a> {
             }
         }
         let (_, record, at_s) = best?;
-        let (first, rates) = &of_record[record];
+        let (first, seen, _) = &of_record[record];
+        let data = &problem.records[record];
         let mut column = DMatrix::zeros(self.projection.residual.len().max(values), 1);
-        for (i, (_, rate)) in rates.iter().enumerate().filter(|(_, (t_s, _))| *t_s >= at_s) {
-            column[(first + i, 0)] = *rate;
-        }
+        let mut after: Vec<f64> =
+            seen.iter().map(|v| if data.t_s[v.row] >= at_s { v.rate_rad_s } else { 0.0 }).collect();
+        Whitening::of(problem, record, seen).whiten(&mut after);
+        column.view_mut((*first, 0), (after.len(), 1)).copy_from_slice(&after);
         self.score(Cause::DroppedFrames, column, &[Parameter::DroppedFrames], Some((record, at_s)))
     }
 
@@ -290,14 +294,18 @@ impl<'g, 'a> Screen<'g, 'a> {
                 let (sin, cos) = (rate * t).sin_cos();
                 [-rate * rate * sin, -rate * rate * cos]
             };
-            let seen = surroundings.responses(transitions, course);
-            for mark in 0..data.links() {
-                for row in (0..data.len()).filter(|row| data.theta_rad[mark][*row].is_some()) {
-                    let sd = self.fit.problem.noise_rad[record][mark] * data.relative_sd[mark][row];
-                    (0..2).for_each(|c| columns[(first, c)] = seen[row * data.links() + mark][c] / sd);
-                    first += 1;
-                }
+            let responses = surroundings.responses(transitions, course);
+            let seen = |mark: usize| {
+                let rows = (0..data.len()).filter(move |row| data.theta_rad[mark][*row].is_some());
+                rows.map(move |row| row * data.links() + mark)
+            };
+            let places: Vec<usize> = (0..data.links()).flat_map(seen).collect();
+            for c in 0..2 {
+                let mut column: Vec<f64> = places.iter().map(|place| responses[*place][c]).collect();
+                surroundings.whitening.whiten(&mut column);
+                columns.view_mut((first, c), (column.len(), 1)).copy_from_slice(&column);
             }
+            first += places.len();
         }
         columns
     }

@@ -68,7 +68,8 @@ pub fn fits<'a>(ground: &mut Ground<'a>, null: Refit<'a>, causes: &[Cause], prog
     let pairs: Vec<Refit<'a>> = pairs.collect();
     all.extend(pairs);
     let all = with_refined_noise(ground, all);
-    without_stragglers(ground, all)
+    let all = without_stragglers(ground, all);
+    with_errors_in_step(ground, all)
 }
 
 /// The base model anew from weaker dampers, where it leaves much: what it lacks can have driven its own damper so high that a mode is gone, and no
@@ -170,6 +171,20 @@ fn with_refined_noise<'a>(ground: &mut Ground<'a>, fits: Vec<Refit<'a>>) -> Vec<
             (false, true) if !fit.converged => ground.again(&fit, ground::MOST_STEPS).unwrap_or(fit),
             _ => fit,
         }
+    };
+    fits.into_par_iter().with_max_len(1).map(again).collect()
+}
+
+/// The same fits beside the errors in step with the swing that a tracked angle may have, each gone on from where it is.
+fn with_errors_in_step<'a>(ground: &mut Ground<'a>, fits: Vec<Refit<'a>>) -> Vec<Refit<'a>> {
+    ground.in_step = ground.records.iter().map(|record| record.in_step).collect();
+    if ground.in_step.iter().all(|share| *share == 0.0) {
+        return fits;
+    }
+    let least = fits.iter().map(|fit| fit.chi2).fold(f64::INFINITY, f64::min);
+    let again = |fit: Refit<'a>| {
+        let worth = fit.hypothesis.causes.is_empty() || fit.chi2 < HOPELESS * (least + HOPELESS);
+        ground.again(&fit, if worth { ground::FEW_STEPS } else { 0 }).unwrap_or(fit)
     };
     fits.into_par_iter().with_max_len(1).map(again).collect()
 }

@@ -12,6 +12,7 @@ use nalgebra::{DMatrix, DVector};
 
 use super::Place;
 use super::refit::Refit;
+use crate::fit::whitening::Whitening;
 use crate::model::observe::{chord_angles_rad, chord_slopes};
 use crate::model::{Chain, ForwardModel, Hinge, Motion, Parameter, Partials, Trajectory};
 
@@ -28,6 +29,8 @@ pub struct Surroundings {
     pub parameters: usize,
     /// At each row, what happens there.
     pub rows: Vec<Row>,
+    /// Of the values seen, link after link.
+    pub whitening: Whitening,
     /// From each row to the next: d(δθ, δrate)/dt with δθ, δrate, then the parameters, then the torque on each rate's equation.
     flows: Vec<DMatrix<f64>>,
 }
@@ -73,6 +76,7 @@ impl Surroundings {
             rates: model.rates(),
             parameters: problem.free.len(),
             rows,
+            whitening: Whitening::of(problem, record, &prediction.values),
         })
     }
 

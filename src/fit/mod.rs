@@ -9,6 +9,7 @@
 //! | [`shooting`] | multiple shooting: start values that cannot be out of step |
 //! | [`descent`] | Levenberg–Marquardt with bounds |
 //! | [`interval`] | standard deviations and 95 % intervals |
+//! | [`whitening`] | residuals in units of their noise |
 //! | [`verdict`] | does the model reproduce the recording? |
 //!
 //! Output error: the motion from the first row on is the model's own, and the residual is what the recording shows beyond it. Each recording's
@@ -22,6 +23,7 @@ pub mod problem;
 pub mod record;
 pub mod shooting;
 pub mod verdict;
+pub mod whitening;
 
 use crate::error::{Error, Result};
 use crate::experiment::Experiment;

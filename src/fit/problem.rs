@@ -4,11 +4,12 @@ use nalgebra::{DMatrix, DVector};
 
 use super::descent::Block;
 use super::predict::{Request, Value, predict};
+use super::whitening::Whitening;
 use super::{Prediction, Record};
 use crate::error::{Error, Result};
 use crate::experiment::{Experiment, Hysteresis, SupportMotion};
 use crate::model::{Accuracy, Camera, ForwardModel, Parameter};
-use crate::statistics::{median, median_step_s};
+use crate::statistics::median;
 
 /// Standard deviations of a strip's further shapes where a motion starts, as angles between marks: the sixth part of a large swing, at some hertz.
 const FURTHER_RAD: f64 = 0.05;
@@ -34,6 +35,8 @@ pub struct Problem<'a> {
     pub dropped_at_s: Vec<f64>,
     /// Correlation of the noise from one row to the next (AR(1)) of each angle of each recording, `[record][link]`.
     pub colour: Vec<Vec<f64>>,
+    /// Errors in step with the swing that each angle of a recording may have, as a share of its noise.
+    pub in_step: Vec<f64>,
     /// What is known of free parameters beforehand.
     pub beliefs: Vec<Belief>,
     /// Shapes free at each start beyond the angles between marks.
@@ -84,6 +87,7 @@ impl<'a> Problem<'a> {
             accuracy: Accuracy::default(),
             dropped_at_s: vec![f64::INFINITY; records.len()],
             colour: records.iter().map(|r| vec![0.0; r.links()]).collect(),
+            in_step: vec![0.0; records.len()],
             beliefs: Vec::new(),
             further_shapes: usize::from(model.shapes().is_some()),
         })
@@ -211,38 +215,17 @@ impl<'a> Problem<'a> {
             + (0..self.records.len()).map(|record| of(record).unwrap_or(f64::INFINITY)).sum::<f64>()
     }
 
-    /// The residuals of a prediction over their noise; of correlated noise what the value before does not foretell.
+    /// The residuals of a prediction in units of their noise ([`super::whitening`]).
     pub fn block(&self, record: usize, prediction: &Prediction, columns: Vec<usize>) -> Block {
         let data = &self.records[record];
-        let weight = |link: usize, row: usize| 1.0 / (self.noise_rad[record][link] * data.relative_sd[link][row]);
+        let whitening = Whitening::of(self, record, &prediction.values);
+        let left =
+            |value: &Value| value.predicted_rad - data.theta_rad[value.link][value.row].unwrap_or(value.predicted_rad);
+        let mut residual = DVector::from_iterator(prediction.values.len(), prediction.values.iter().map(left));
+        whitening.whiten(residual.as_mut_slice());
         let mut slopes = prediction.slopes.clone();
-        let mut residual = DVector::zeros(prediction.values.len());
-        for (i, value) in prediction.values.iter().enumerate() {
-            let weight = weight(value.link, value.row);
-            let measured_rad = data.theta_rad[value.link][value.row].unwrap_or(value.predicted_rad);
-            residual[i] = weight * (value.predicted_rad - measured_rad);
-            slopes.row_mut(i).scale_mut(weight);
-        }
-        self.whiten(record, &prediction.values, &mut residual, &mut slopes);
+        whitening.apply(&mut slopes);
         Block { columns, residual, slopes, robust: true }
-    }
-
-    /// rᵢ ← (rᵢ − ρᵢ rᵢ₋₁)/√(1 − ρᵢ²) with ρᵢ = ρ^(steps between the two rows), and the same of the derivatives.
-    pub fn whiten(&self, record: usize, values: &[Value], residual: &mut DVector<f64>, slopes: &mut DMatrix<f64>) {
-        if self.colour[record].iter().all(|rho| *rho == 0.0) {
-            return;
-        }
-        let t_s = &self.records[record].t_s;
-        let step_s = median_step_s(t_s).unwrap_or(1.0);
-        for i in (1..values.len()).rev().filter(|i| values[*i].link == values[*i - 1].link) {
-            let steps = (t_s[values[i].row] - t_s[values[i - 1].row]) / step_s;
-            let rho = self.colour[record][values[i].link].powf(steps);
-            let scale = 1.0 / (1.0 - rho * rho).sqrt();
-            residual[i] = scale * (residual[i] - rho * residual[i - 1]);
-            for mut column in slopes.column_iter_mut() {
-                column[i] = scale * (column[i] - rho * column[i - 1]);
-            }
-        }
     }
 
     /// Sets the accuracy of the integration to a thousandth of the least noise.
