@@ -206,7 +206,7 @@ impl Report<'_> {
 
     fn proof(&self, text: &mut String) {
         let Some(held_out) = &self.diagnosis.held_out else { return };
-        let noise_rad = &self.diagnosis.ground.noise_rad[held_out.record];
+        let noise_rad = &self.diagnosis.ground.noise[held_out.record].sd_rad;
         let _ = writeln!(text, "\nFitted before {:.2} s, predicted from there on:", held_out.from_s);
         let mut table = Table::new(["", "noise mrad", "base model leaves", "with the effects named"]);
         for link in 0..noise_rad.len() {
@@ -362,8 +362,9 @@ impl Report<'_> {
             "baseline": {
                 "parameters": parameters_json(null, &null.problem.free),
                 "rmse_rad": rmse_rad(null),
-                "noise_rad": diagnosis.ground.noise_rad[0],
-                "noise_correlation": diagnosis.ground.colour[0],
+                "noise_rad": diagnosis.ground.noise[0].sd_rad,
+                "noise_correlation": diagnosis.ground.noise[0].rho,
+                "noise_correlation_across": diagnosis.ground.noise[0].across,
                 "adequate": verdict.status == Status::Adequate,
                 "p_value": diagnosis.p_value,
             },

@@ -17,7 +17,7 @@ use super::ground::Ground;
 use super::refit::Refit;
 use super::screen::{Score, Screen};
 use super::{Cause, selection};
-use crate::fit::whitening::{IN_STEP_SHAPES, in_step_shapes};
+use crate::fit::whitening::Whitening;
 use crate::model::Parameter;
 use crate::progress::Progress;
 
@@ -125,17 +125,11 @@ fn replicate(ground: &Ground<'_>, null: &Refit<'_>, seed: u64) -> Option<DVector
     let mut random = StdRng::seed_from_u64(seed);
     let mut records = ground.records.to_vec();
     for (index, record) in records.iter_mut().enumerate() {
-        let mut noise = vec![0.0; record.links()];
-        let shapes = in_step_shapes(record, record.in_step, &ground.noise_rad[index]);
-        let mut normal = || -> f64 { StandardNormal.sample(&mut random) };
-        let sizes: Vec<[f64; IN_STEP_SHAPES]> =
-            (0..record.links()).map(|_| std::array::from_fn(|_| normal())).collect();
-        for value in null.problem.predict(index, &null.x, false).ok()?.values {
-            let rho = ground.colour[index][value.link];
-            noise[value.link] = rho * noise[value.link] + (1.0 - rho * rho).sqrt() * normal();
-            let sd_rad = ground.noise_rad[index][value.link] * record.relative_sd[value.link][value.row];
-            let in_step: f64 = shapes[value.link][value.row].iter().zip(&sizes[value.link]).map(|(a, b)| a * b).sum();
-            record.theta_rad[value.link][value.row] = Some(value.predicted_rad + sd_rad * noise[value.link] + in_step);
+        let values = null.problem.predict(index, &null.x, false).ok()?.values;
+        let mut noise_rad: Vec<f64> = values.iter().map(|_| StandardNormal.sample(&mut random)).collect();
+        Whitening::of(&null.problem, index, &values).colour(&mut noise_rad);
+        for (value, noise_rad) in values.iter().zip(noise_rad) {
+            record.theta_rad[value.link][value.row] = Some(value.predicted_rad + noise_rad);
         }
     }
     let again = ground.on(&records).refit(&null.hypothesis, null, &[])?;

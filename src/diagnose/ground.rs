@@ -7,6 +7,7 @@ use crate::error::Result;
 use crate::experiment::{Experiment, Hysteresis};
 use crate::fit::descent::Descent;
 use crate::fit::shooting::multiple_shooting;
+use crate::fit::whitening::RecordNoise;
 use crate::fit::{Belief, Problem, Record};
 use crate::model::Parameter;
 use crate::model::observe::chord_angles_rad;
@@ -35,13 +36,9 @@ pub struct Ground<'a> {
     pub base: Vec<Parameter>,
     /// What is known of them.
     pub beliefs: Vec<Belief>,
-    /// Noise of each angle, `[record][link]`.
-    pub noise_rad: Vec<Vec<f64>>,
-    /// AR(1) correlation of the noise.
-    pub colour: Vec<Vec<f64>>,
-    /// Errors in step with the swing that each recording's angles may have, as a share of the noise. While the fits are sought there are none: what a model lacks
-    /// is in step with the swing as well, and no descent must be told not to mind it.
-    pub in_step: Vec<f64>,
+    /// Noise of each recording. While the fits are sought it has no errors in step with the swing: what a model lacks is in step as well, and no descent must
+    /// be told not to mind it.
+    pub noise: Vec<RecordNoise>,
     /// Of the integration.
     pub step_error_rad: f64,
     /// Where the base model's descent began: parameters and starts that short stretches led to. Empty where that is not known.
@@ -93,9 +90,7 @@ impl<'a> Ground<'a> {
             free.extend(cause.parameters());
         }
         let mut problem = Problem::new(self.records, &experiment, &free)?;
-        problem.noise_rad.clone_from(&self.noise_rad);
-        problem.colour.clone_from(&self.colour);
-        problem.in_step.clone_from(&self.in_step);
+        problem.noise.clone_from(&self.noise);
         problem.beliefs = beliefs;
         if hypothesis.causes.contains(&Cause::DistributedFlexibility) {
             // no more is free at its start than in the rods it is compared with
@@ -171,7 +166,7 @@ impl<'a> Ground<'a> {
         }
         let accuracy = problem.accuracy;
         let x = multiple_shooting(&mut problem).ok()?.x;
-        problem.noise_rad.clone_from(&self.noise_rad);
+        problem.noise.clone_from(&self.noise);
         problem.accuracy = accuracy;
         self.descend(hypothesis, problem, x, FEW_STEPS)
     }
@@ -179,33 +174,32 @@ impl<'a> Ground<'a> {
     /// The same hypothesis with the noise as it is known now.
     pub fn again(&self, fit: &Refit<'a>, steps: usize) -> Option<Refit<'a>> {
         let mut problem = fit.problem.clone();
-        problem.noise_rad.clone_from(&self.noise_rad);
-        problem.colour.clone_from(&self.colour);
-        problem.in_step.clone_from(&self.in_step);
+        problem.noise.clone_from(&self.noise);
         self.descend(&fit.hypothesis, problem, fit.x.clone(), steps)
     }
 
     /// Takes the noise from what a fit leaves where the motion has no power, if that changes anything that counts, and says so: all fits that are to be
     /// compared must then be made anew.
     pub fn refine_noise(&mut self, by: &Refit<'_>) -> bool {
-        let (mut noise_rad, mut colour) = (self.noise_rad.clone(), self.colour.clone());
+        let mut all = self.noise.clone();
         let mut changed = false;
-        for record in 0..self.records.len() {
+        for (record, known) in all.iter_mut().enumerate() {
             let Ok(prediction) = by.problem.predict(record, &by.x, false) else { return false };
             let Some((model, swing, true_s)) = by.motion(record) else { return false };
             let data = &self.records[record];
             let chords: Vec<Vec<f64>> =
                 true_s.iter().map(|t| chord_angles_rad(model.chain(), &swing.at(*t).theta_rad)).collect();
-            for link in 0..data.links() {
-                let mut left = vec![0.0; data.len()];
-                let motion: Vec<f64> = chords.iter().map(|chord| chord[link]).collect();
-                for value in prediction.values.iter().filter(|v| v.link == link) {
-                    let measured_rad = data.theta_rad[link][value.row].unwrap_or(value.predicted_rad);
-                    left[value.row] = (measured_rad - value.predicted_rad) / data.relative_sd[link][value.row];
-                }
-                let (known_rad, known_rho) = (&mut noise_rad[record][link], &mut colour[record][link]);
-                let whole = noise::of_all(&left);
-                let noise = match noise::off_the_lines(&left, &motion) {
+            let mut angles = vec![(vec![0.0; data.len()], Vec::new()); data.links()];
+            for value in &prediction.values {
+                let measured_rad = data.theta_rad[value.link][value.row].unwrap_or(value.predicted_rad);
+                angles[value.link].0[value.row] =
+                    (measured_rad - value.predicted_rad) / data.relative_sd[value.link][value.row];
+            }
+            for (link, (left, motion)) in angles.iter_mut().enumerate() {
+                motion.extend(chords.iter().map(|chord| chord[link]));
+                let (known_rad, known_rho) = (&mut known.sd_rad[link], &mut known.rho[link]);
+                let whole = noise::of_all(left);
+                let noise = match noise::off_the_lines(left, motion) {
                     Some(noise) => noise,
                     // a motion with power everywhere, as one with a jump has: what is left at most
                     None if whole.sd < *known_rad => whole,
@@ -214,9 +208,14 @@ impl<'a> Ground<'a> {
                 changed |= (noise.sd / *known_rad - 1.0).abs() > 0.03 || (noise.rho - *known_rho).abs() > 0.03;
                 (*known_rad, *known_rho) = (noise.sd, noise.rho);
             }
+            if let [first, second] = &angles[..] {
+                let across = noise::across([first, second].map(|(left, motion)| (&left[..], &motion[..])));
+                changed |= (across - known.across).abs() > 0.03;
+                known.across = across;
+            }
         }
         if changed {
-            (self.noise_rad, self.colour) = (noise_rad, colour);
+            self.noise = all;
         }
         changed
     }
@@ -254,15 +253,12 @@ impl<'a> Ground<'a> {
         'a: 'b,
     {
         let place = |record: &Record| self.records.iter().position(|own| own.path == record.path).unwrap_or(0);
-        let of = |all: &[Vec<f64>]| records.iter().map(|r| all[place(r)].clone()).collect();
         Ground {
             records,
             experiment: self.experiment,
             base: self.base.clone(),
             beliefs: self.beliefs.clone(),
-            noise_rad: of(&self.noise_rad),
-            colour: of(&self.colour),
-            in_step: records.iter().map(|r| self.in_step[place(r)]).collect(),
+            noise: records.iter().map(|r| self.noise[place(r)].clone()).collect(),
             step_error_rad: self.step_error_rad,
             begun: Vec::new(),
         }

@@ -5,7 +5,7 @@
 //! seen    left = ∂(angle)/∂θ δθ (+ u) + e + Φb + white noise
 //! ```
 //!
-//! e is the noise of each angle where that is correlated from row to row (then there is next to no white noise), Φb what a tracked angle may err in step with
+//! e is the noise of each angle where that is correlated from row to row, or from angle to angle (then there is next to no white noise), Φb what a tracked angle may err in step with
 //! the swing ([`crate::fit::whitening`]); a smooth torque must not be blamed for them.
 //!
 //! The initial state and the base parameters are free as in the fit itself (their prior is wide), so that u holds only what they cannot absorb.
@@ -24,7 +24,7 @@ use nalgebra::{DMatrix, DVector};
 use super::Place;
 use super::refit::Refit;
 use super::surroundings::Surroundings;
-use crate::fit::whitening::{IN_STEP_SHAPES, in_step_shapes};
+use crate::fit::whitening::{IN_STEP_SHAPES, RecordNoise, in_step_shapes};
 use crate::model::Parameter;
 use crate::statistics::median_step_s;
 
@@ -70,8 +70,8 @@ pub struct Filter<'a> {
     around: &'a Surroundings,
     /// Of the noise, over what was thought.
     variance: f64,
-    /// Correlation of each angle's noise from row to row.
-    colour: &'a [f64],
+    /// Of the recording.
+    noise: &'a RecordNoise,
     /// Errors in step that each angle may have, `[mark][row]`; none of an angle that was not tracked.
     in_step: Vec<Vec<[f64; IN_STEP_SHAPES]>>,
     place: Place,
@@ -116,13 +116,9 @@ impl<'a> Filter<'a> {
         wide.extend(vec![0.0; around.rates - around.links]);
         wide.push(0.0);
         wide.extend((0..problem.free.len()).map(|i| WIDE * sd(i)));
-        let colour: &[f64] = &problem.colour[record];
-        let first_sd = |mark: usize| around.rows[0].sd_rad[mark] * variance.sqrt();
-        wide.extend((0..marks).map(|mark| if colour[mark] > 0.0 { first_sd(mark) } else { 0.0 }));
-        let in_step = match problem.in_step[record] {
-            share if share > 0.0 => in_step_shapes(&problem.records[record], share, &problem.noise_rad[record]),
-            _ => Vec::new(),
-        };
+        let noise = &problem.noise[record];
+        wide.extend(vec![0.0; marks]);
+        let in_step = if noise.in_step > 0.0 { in_step_shapes(&problem.records[record], noise) } else { Vec::new() };
         wide.extend(vec![variance.sqrt(); in_step.len() * IN_STEP_SHAPES]);
         let mut begin = vec![0.0; wide.len()];
         if beyond == Beyond::TheBaseModel {
@@ -138,12 +134,12 @@ impl<'a> Filter<'a> {
         for (transition, pair) in transitions.iter_mut().zip(around.t_s.windows(2)) {
             *transition = std::mem::take(transition).resize(total, total, 0.0);
             let first = around.state() + 1 + around.parameters;
-            for (of_noise, rho) in (first..).zip(colour) {
+            for (of_noise, rho) in (first..).zip(&noise.rho) {
                 transition[(of_noise, of_noise)] = rho.powf((pair[1] - pair[0]) / step_s);
             }
             (first + marks..total).for_each(|of_step| transition[(of_step, of_step)] = 1.0);
         }
-        Some(Self { around, variance, colour, in_step, place, transitions, memory_s, begin, wide })
+        Some(Self { around, variance, noise, in_step, place, transitions, memory_s, begin, wide })
     }
 
     /// ln L up to a constant, for a standard deviation of the unknown.
@@ -195,10 +191,30 @@ impl<'a> Filter<'a> {
         course
     }
 
+    /// Adds what of a row's correlated noise the row before does not foretell.
+    fn add_noise(&self, k: usize, p: &mut DMatrix<f64>) {
+        if !self.noise.is_correlated() {
+            return;
+        }
+        let fresh = |(mark, place): (usize, usize)| {
+            let rho = if k > 0 { self.transitions[k - 1][(place, place)] } else { 0.0 };
+            self.around.rows[k].sd_rad[mark] * (self.variance * (1.0 - rho * rho)).sqrt()
+        };
+        let sd_rad: Vec<f64> = self.of_noise().enumerate().map(fresh).collect();
+        for (mark, place) in self.of_noise().enumerate() {
+            p[(place, place)] += sd_rad[mark] * sd_rad[mark];
+            if mark > 0 {
+                let both = self.noise.across * sd_rad[mark - 1] * sd_rad[mark];
+                p[(place - 1, place)] += both;
+                p[(place, place - 1)] += both;
+            }
+        }
+    }
+
     /// Where the noise of each angle stands in the state.
     fn of_noise(&self) -> std::ops::Range<usize> {
         let first = self.around.state() + 1 + self.around.parameters;
-        first..first + self.colour.len()
+        first..first + self.noise.rho.len()
     }
 
     /// Runs the filter; `hear` gets all that it comes by.
@@ -221,14 +237,8 @@ impl<'a> Filter<'a> {
                 moved.mul_to(&transition.transpose(), &mut p);
                 let fade = (self.around.t_s[k] - self.around.t_s[k - 1]) / self.memory_s;
                 p[(input, input)] += size * size * (1.0 - (-2.0 * fade).exp());
-                for (mark, of_noise) in self.of_noise().enumerate() {
-                    let rho = transition[(of_noise, of_noise)];
-                    let sd_rad = self.around.rows[k].sd_rad[mark];
-                    if self.colour[mark] > 0.0 {
-                        p[(of_noise, of_noise)] += self.variance * sd_rad * sd_rad * (1.0 - rho * rho);
-                    }
-                }
             }
+            self.add_noise(k, &mut p);
             hear(Stage::Row(&z, &p));
             let row = &self.around.rows[k];
             for (mark, left) in row.left_rad.iter().enumerate() {
@@ -241,7 +251,7 @@ impl<'a> Filter<'a> {
                     slopes.rows_mut(first, IN_STEP_SHAPES).copy_from_slice(&own);
                 }
                 p.mul_to(&slopes, &mut gain);
-                let white = if self.colour[mark] > 0.0 { WHITE } else { 1.0 };
+                let white = if self.noise.is_correlated() { WHITE } else { 1.0 };
                 let variance = white * self.variance * row.sd_rad[mark].powi(2) + slopes.dot(&gain);
                 let innovation = left - slopes.dot(&z);
                 hear(Stage::Value { slopes: &slopes, innovation, variance, gain: &gain });

@@ -40,7 +40,7 @@ pub fn unknowns(fit: &Refit<'_>, variance: f64, beyond: Beyond) -> Vec<Latent> {
 /// A large size of an unknown: gravity's torque at the largest angle, or a hundred times the noise.
 fn typical(fit: &Refit<'_>, place: Place) -> f64 {
     if place == Place::Camera {
-        return 10.0 * fit.problem.noise_rad.iter().flatten().copied().fold(0.0, f64::max);
+        return 10.0 * fit.problem.noise.iter().flat_map(|n| &n.sd_rad).copied().fold(0.0, f64::max);
     }
     let Ok((model, _)) = fit.problem.model(0, &fit.x[..fit.problem.free.len()]) else { return 1.0 };
     let angles = fit.problem.records.iter().flat_map(|r| r.theta_rad.iter().flatten().flatten());

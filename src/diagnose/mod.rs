@@ -47,6 +47,7 @@ use std::sync::OnceLock;
 use crate::error::{Error, Result};
 use crate::experiment::Experiment;
 use crate::fit::shooting::multiple_shooting;
+use crate::fit::whitening::RecordNoise;
 use crate::fit::{Belief, Problem, Record, base_parameters};
 use crate::model::{ForwardModel, Parameter};
 use crate::progress::Progress;
@@ -140,8 +141,7 @@ pub struct Options {
 pub struct Prepared {
     /// Cleaned.
     pub records: Vec<Record>,
-    pub noise_rad: Vec<Vec<f64>>,
-    pub colour: Vec<Vec<f64>>,
+    pub noise: Vec<RecordNoise>,
     step_error_rad: f64,
     x: Vec<f64>,
     /// The experiment with as many rods as the recordings ask for, where they do.
@@ -177,8 +177,7 @@ pub fn prepare(records: &[Record], experiment: &Experiment) -> Result<Prepared> 
     problem.integrate_below_the_noise();
     let (kept, _) = crate::fit::without_outliers(&problem, &shot.x)?;
     Ok(Prepared {
-        noise_rad: problem.noise_rad.clone(),
-        colour: colour(&shot.residuals, &problem.noise_rad),
+        noise: coloured(&shot.residuals, &problem.noise),
         step_error_rad: problem.accuracy.step_error_rad,
         x: shot.x,
         records: kept,
@@ -186,15 +185,19 @@ pub fn prepare(records: &[Record], experiment: &Experiment) -> Result<Prepared> 
     })
 }
 
-/// The correlation of neighbouring residuals of each angle, where it is more than chance and the stretches' own starts make of it.
-fn colour(residuals: &[(usize, usize, f64)], like: &[Vec<f64>]) -> Vec<Vec<f64>> {
+/// Noise with the correlation of neighbouring residuals of each angle, where it is more than chance and the stretches' own starts make of it.
+fn coloured(residuals: &[(usize, usize, f64)], white: &[RecordNoise]) -> Vec<RecordNoise> {
     let of = |record: usize, link: usize| {
         let r: Vec<f64> = residuals.iter().filter(|r| r.0 == record && r.1 == link).map(|r| r.2).collect();
         let power: f64 = r.iter().map(|v| v * v).sum();
         let rho = r.windows(2).map(|w| w[0] * w[1]).sum::<f64>() / power.max(1e-300);
         if rho > COLOURED { (rho + 0.05).min(0.9) } else { 0.0 }
     };
-    like.iter().enumerate().map(|(record, links)| (0..links.len()).map(|link| of(record, link)).collect()).collect()
+    let with_colour = |(record, white): (usize, &RecordNoise)| {
+        let rho = (0..white.sd_rad.len()).map(|link| of(record, link)).collect();
+        RecordNoise { rho, ..white.clone() }
+    };
+    white.iter().enumerate().map(with_colour).collect()
 }
 
 /// Diagnoses recordings of one specimen.
@@ -248,9 +251,7 @@ fn fitted<'a>(prepared: &'a Prepared, experiment: &'a Experiment, progress: &dyn
         experiment,
         base,
         beliefs,
-        noise_rad: prepared.noise_rad.clone(),
-        colour: prepared.colour.clone(),
-        in_step: vec![0.0; records.len()],
+        noise: prepared.noise.clone(),
         step_error_rad: prepared.step_error_rad,
         begun: prepared.x.clone(),
     };

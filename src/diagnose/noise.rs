@@ -24,6 +24,9 @@ const RHO_STEPS: usize = 48;
 /// Less correlation than this is none: ln-likelihood it must gain.
 const COLOURED: f64 = 6.0;
 
+/// Two angles' noise goes together where their correlation is this many times what chance makes of it.
+const TOGETHER: f64 = 4.0;
+
 /// Noise of one angle.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Noise {
@@ -33,22 +36,26 @@ pub struct Noise {
     pub rho: f64,
 }
 
+/// How far the noise of two angles goes together: the correlation of their residuals at frequencies at which neither swings; zero where that is no more
+/// than chance, or where they swing nearly everywhere. Each is given as its residual and its motion.
+pub fn across([first, second]: [(&[f64], &[f64]); 2]) -> f64 {
+    let (Some(one), Some(other)) = (between_lines(first), between_lines(second)) else { return 0.0 };
+    let free: Vec<usize> = one.into_iter().filter(|k| other.binary_search(k).is_ok()).collect();
+    let (a, b) = (transform(first.0), transform(second.0));
+    let (mut both, mut powers) = (0.0, [0.0; 2]);
+    for k in &free {
+        both += (a[*k] * b[*k].conj()).re;
+        powers = [powers[0] + a[*k].norm_sqr(), powers[1] + b[*k].norm_sqr()];
+    }
+    let together = both / (powers[0] * powers[1]).sqrt().max(1e-300);
+    if together.abs() > TOGETHER / (free.len().max(1) as f64).sqrt() { together } else { 0.0 }
+}
+
 /// The noise in a residual, given the motion it is the residual of; missing rows are zero in both. `None` where the motion has power nearly everywhere.
 pub fn off_the_lines(residual: &[f64], motion: &[f64]) -> Option<Noise> {
-    let (noise, lines) = (spectrum(residual), spectrum(motion));
+    let noise = spectrum(residual);
     let present = residual.iter().filter(|r| **r != 0.0).count() as f64 / residual.len() as f64;
-    let strongest = lines.iter().copied().fold(0.0, f64::max);
-    let of_motion = |k: usize| {
-        lines[k.saturating_sub(BINS)..(k + BINS + 1).min(lines.len())].iter().any(|p| *p > MOTION * strongest)
-    };
-    let free: Vec<usize> = (1..noise.len()).filter(|k| !of_motion(*k)).collect();
-    if (free.len() as f64) < ENOUGH * noise.len() as f64 {
-        return None;
-    }
-    // a line that the motion does not have, as of a moving support, must not count as noise
-    let mut sorted: Vec<f64> = free.iter().map(|k| noise[*k]).collect();
-    let usual = median(&mut sorted)? / std::f64::consts::LN_2;
-    let free: Vec<usize> = free.into_iter().filter(|k| noise[*k] < 25.0 * usual).collect();
+    let free = between_lines((residual, motion))?;
     let count = free.len() as f64;
     let shape = |rho: f64, k: usize| {
         let angle = std::f64::consts::PI * k as f64 / (noise.len() - 1) as f64;
@@ -66,6 +73,23 @@ pub fn off_the_lines(residual: &[f64], motion: &[f64]) -> Option<Noise> {
     Some(Noise { sd: (variance / present).sqrt(), rho })
 }
 
+/// The frequencies at which neither the motion has power nor the residual a line of its own, in order; `None` where few are left.
+fn between_lines((residual, motion): (&[f64], &[f64])) -> Option<Vec<usize>> {
+    let (noise, lines) = (spectrum(residual), spectrum(motion));
+    let strongest = lines.iter().copied().fold(0.0, f64::max);
+    let of_motion = |k: usize| {
+        lines[k.saturating_sub(BINS)..(k + BINS + 1).min(lines.len())].iter().any(|p| *p > MOTION * strongest)
+    };
+    let free: Vec<usize> = (1..noise.len()).filter(|k| !of_motion(*k)).collect();
+    if (free.len() as f64) < ENOUGH * noise.len() as f64 {
+        return None;
+    }
+    // a line that the motion does not have, as of a moving support, must not count as noise
+    let mut sorted: Vec<f64> = free.iter().map(|k| noise[*k]).collect();
+    let usual = median(&mut sorted)? / std::f64::consts::LN_2;
+    Some(free.into_iter().filter(|k| noise[*k] < 25.0 * usual).collect())
+}
+
 /// The noise in a residual that is nothing but noise; missing rows are zero.
 pub fn of_all(residual: &[f64]) -> Noise {
     let present: Vec<f64> = residual.iter().copied().filter(|r| *r != 0.0).collect();
@@ -77,13 +101,18 @@ pub fn of_all(residual: &[f64]) -> Noise {
 
 /// Power of each frequency from zero to half the rate, scaled so that white noise has its variance.
 pub(super) fn spectrum(values: &[f64]) -> Vec<f64> {
+    transform(values).iter().map(Complex::norm_sqr).collect()
+}
+
+/// The transform of windowed values, on the scale of [`spectrum`].
+fn transform(values: &[f64]) -> Vec<Complex<f64>> {
     let n = values.len();
     let window = |i: usize| 0.5 - 0.5 * (std::f64::consts::TAU * (i as f64 + 0.5) / n as f64).cos();
     let mut buffer: Vec<Complex<f64>> =
         values.iter().enumerate().map(|(i, v)| Complex::new(v * window(i), 0.0)).collect();
     FftPlanner::new().plan_fft_forward(n).process(&mut buffer);
-    let scale: f64 = (0..n).map(|i| window(i) * window(i)).sum();
-    buffer[..=n / 2].iter().map(|c| c.norm_sqr() / scale).collect()
+    let scale = (0..n).map(|i| window(i) * window(i)).sum::<f64>().sqrt();
+    buffer[..=n / 2].iter().map(|c| c / scale).collect()
 }
 
 #[cfg(test)]
@@ -112,6 +141,22 @@ mod tests {
     fn a_misfit_of_the_swing_is_not_taken_for_noise() {
         let noise = case(0.0).unwrap();
         assert!((noise.sd / 1e-3 - 1.0).abs() < 0.06 && noise.rho == 0.0, "{noise:?}");
+    }
+
+    #[test]
+    fn the_noise_of_a_mark_between_two_angles_is_found_in_both() {
+        let mut random = rand::rngs::StdRng::seed_from_u64(5);
+        let mut marks = || -> [f64; 3] { std::array::from_fn(|_| StandardNormal.sample(&mut random)) };
+        let motion: Vec<f64> = (0..1800).map(|i| 0.5 * (0.28 * f64::from(i)).sin()).collect();
+        let seen: Vec<[f64; 3]> = (0..1800).map(|_| marks()).collect();
+        let left = |link: usize| -> Vec<f64> {
+            (0..1800).map(|i| 1e-4 * (seen[i][link + 1] - seen[i][link]) + 0.02 * motion[i]).collect()
+        };
+        let (first, second) = (left(0), left(1));
+        let found = across([(&first, &motion), (&second, &motion)]);
+        assert!((found + 0.5).abs() < 0.06, "{found}");
+        let other: Vec<f64> = (0..1800).map(|i| 1e-4 * seen[(i + 900) % 1800][0]).collect();
+        assert_eq!(across([(&first, &motion), (&other, &motion)]), 0.0);
     }
 
     #[test]

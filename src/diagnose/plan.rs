@@ -7,6 +7,7 @@ use super::{Cause, base_of};
 use crate::error::{Error, Result};
 use crate::experiment::Experiment;
 use crate::fit::Record;
+use crate::fit::whitening::RecordNoise;
 use crate::model::observe::chord_angles_rad;
 use crate::model::{ForwardModel, State, Trajectory};
 
@@ -35,9 +36,7 @@ pub fn planned(experiment: &Experiment, plan: &Plan) -> Result<Vec<Detectable>> 
         experiment,
         base,
         beliefs,
-        noise_rad: vec![vec![plan.noise_rad; marks]],
-        colour: vec![vec![0.0; marks]],
-        in_step: vec![0.0],
+        noise: vec![RecordNoise::white(vec![plan.noise_rad; marks])],
         step_error_rad: (1e-3 * plan.noise_rad).clamp(1e-10, 1e-6),
         begun: Vec::new(),
     };

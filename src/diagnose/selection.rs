@@ -177,8 +177,10 @@ fn with_refined_noise<'a>(ground: &mut Ground<'a>, fits: Vec<Refit<'a>>) -> Vec<
 
 /// The same fits beside the errors in step with the swing that a tracked angle may have, each gone on from where it is.
 fn with_errors_in_step<'a>(ground: &mut Ground<'a>, fits: Vec<Refit<'a>>) -> Vec<Refit<'a>> {
-    ground.in_step = ground.records.iter().map(|record| record.in_step).collect();
-    if ground.in_step.iter().all(|share| *share == 0.0) {
+    for (noise, record) in ground.noise.iter_mut().zip(ground.records) {
+        noise.in_step = record.in_step;
+    }
+    if ground.noise.iter().all(|noise| noise.in_step == 0.0) {
         return fits;
     }
     let least = fits.iter().map(|fit| fit.chi2).fold(f64::INFINITY, f64::min);

@@ -5,6 +5,7 @@ use super::heldout::HeldOut;
 use super::latent::Latent;
 use super::refit::Refit;
 use super::{Cause, Place, locate};
+use crate::fit::whitening::RecordNoise;
 use crate::model::Parameter;
 
 /// A verdict stands alone when it is at least this probable.
@@ -109,7 +110,11 @@ pub fn weigh<'a>(
     let mut posterior: Vec<f64> = fits.iter().map(ln).collect();
     let best = (0..fits.len()).max_by(|a, b| posterior[*a].total_cmp(&posterior[*b])).unwrap_or(0);
     let (latents, added_n_m) = remainder(&fits[best], fits[best].chi2 / values as f64);
-    posterior.push(posterior[best] + evidence::PRIOR_UNKNOWN.ln() + unknown_gain(&latents, added_n_m));
+    posterior.push(
+        posterior[best]
+            + evidence::PRIOR_UNKNOWN.ln()
+            + unknown_gain(&latents, added_n_m, slow_errors_rad(&fits[best])),
+    );
     let if_named = normalised(&posterior[..fits.len()]);
     let mut probability = normalised(&posterior);
     let mut unknown = probability.pop().unwrap_or(0.0);
@@ -143,10 +148,16 @@ fn genuine(fit: &Refit<'_>, fits: &[Refit<'_>]) -> f64 {
     if fit_of(&[]).is_some_and(|null| locate::is_in_step(null, hz)) { IN_STEP * named } else { named }
 }
 
-/// How much likelier an unknown of any size makes the recordings than one that a law's own error allows.
-fn unknown_gain(latents: &[Latent], added_n_m: f64) -> f64 {
+/// The errors that tracked angles may have from one swing to the next, as large as those in step with it.
+fn slow_errors_rad(fit: &Refit<'_>) -> f64 {
+    let of_record = |noise: &RecordNoise| noise.in_step * noise.sd_rad.iter().copied().fold(0.0, f64::max);
+    fit.problem.noise.iter().map(of_record).fold(0.0, f64::max)
+}
+
+/// How much likelier an unknown of any size makes the recordings than one that a law's own error, or the tracker's, allows.
+fn unknown_gain(latents: &[Latent], added_n_m: f64, slow_errors_rad: f64) -> f64 {
     let of = |latent: &Latent| {
-        let allowed = if latent.place == Place::Camera { 0.0 } else { LAW_SHARE * added_n_m };
+        let allowed = if latent.place == Place::Camera { slow_errors_rad } else { LAW_SHARE * added_n_m };
         let tolerated = latent.tried.iter().filter(|t| t.0 <= allowed).map(|t| t.1).fold(0.0, f64::max);
         latent.gain - tolerated
     };

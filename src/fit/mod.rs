@@ -121,7 +121,7 @@ impl Fit {
 pub fn fit(records: &[Record], experiment: &Experiment, free: &[Parameter]) -> Result<Fit> {
     let mut problem = Problem::new(records, experiment, free)?;
     let start = shooting::multiple_shooting(&mut problem)?.x;
-    let noise_rad = problem.noise_rad.clone();
+    let noise_rad: Vec<Vec<f64>> = problem.noise.iter().map(|noise| noise.sd_rad.clone()).collect();
     problem.integrate_below_the_noise();
     let refused = || Error::Simulation {
         detail: "no motion near the start values follows the recording; check [specimen] and [model]".into(),
@@ -222,5 +222,5 @@ pub(crate) fn residuals_of(problem: &Problem<'_>, x: &[f64], index: usize) -> Re
     let rms =
         |of: &Vec<Residual>| (of.iter().map(|r| r.left_rad().powi(2)).sum::<f64>() / of.len().max(1) as f64).sqrt();
     let rmse_rad = values.iter().map(rms).collect();
-    Ok(Residuals { rmse_rad, values, noise_rad: problem.noise_rad[index].clone() })
+    Ok(Residuals { rmse_rad, values, noise_rad: problem.noise[index].sd_rad.clone() })
 }

@@ -4,7 +4,7 @@ use nalgebra::{DMatrix, DVector};
 
 use super::descent::Block;
 use super::predict::{Request, Value, predict};
-use super::whitening::Whitening;
+use super::whitening::{RecordNoise, Whitening};
 use super::{Prediction, Record};
 use crate::error::{Error, Result};
 use crate::experiment::{Experiment, Hysteresis, SupportMotion};
@@ -27,16 +27,12 @@ pub struct Problem<'a> {
     pub free: Vec<Parameter>,
     /// The model, its coefficients at their start values.
     pub experiment: Experiment,
-    /// Noise of each angle of each recording, `[record][link]`.
-    pub noise_rad: Vec<Vec<f64>>,
+    /// Noise of each recording.
+    pub noise: Vec<RecordNoise>,
     /// Of the integration.
     pub accuracy: Accuracy,
     /// From this stamp on frames may be missing, of each recording.
     pub dropped_at_s: Vec<f64>,
-    /// Correlation of the noise from one row to the next (AR(1)) of each angle of each recording, `[record][link]`.
-    pub colour: Vec<Vec<f64>>,
-    /// Errors in step with the swing that each angle of a recording may have, as a share of its noise.
-    pub in_step: Vec<f64>,
     /// What is known of free parameters beforehand.
     pub beliefs: Vec<Belief>,
     /// Shapes free at each start beyond the angles between marks.
@@ -83,11 +79,9 @@ impl<'a> Problem<'a> {
             records,
             free: free.to_vec(),
             experiment,
-            noise_rad: records.iter().map(|r| vec![1e-3; r.links()]).collect(),
+            noise: records.iter().map(|r| RecordNoise::white(vec![1e-3; r.links()])).collect(),
             accuracy: Accuracy::default(),
             dropped_at_s: vec![f64::INFINITY; records.len()],
-            colour: records.iter().map(|r| vec![0.0; r.links()]).collect(),
-            in_step: vec![0.0; records.len()],
             beliefs: Vec::new(),
             further_shapes: usize::from(model.shapes().is_some()),
         })
@@ -230,7 +224,7 @@ impl<'a> Problem<'a> {
 
     /// Sets the accuracy of the integration to a thousandth of the least noise.
     pub fn integrate_below_the_noise(&mut self) {
-        let least = self.noise_rad.iter().flatten().copied().fold(f64::INFINITY, f64::min);
+        let least = self.noise.iter().flat_map(|n| &n.sd_rad).copied().fold(f64::INFINITY, f64::min);
         self.accuracy.step_error_rad = (1e-3 * least).clamp(1e-10, 1e-6);
     }
 
@@ -247,7 +241,7 @@ impl<'a> Problem<'a> {
                 let freedom = residuals.len().saturating_sub(variables).max(1) as f64 / residuals.len() as f64;
                 let factor = 1.4826 * median / freedom.sqrt();
                 // an exact table still has the digits it was written with
-                self.noise_rad[record][link] = (self.noise_rad[record][link] * factor).max(1e-9);
+                self.noise[record].sd_rad[link] = (self.noise[record].sd_rad[link] * factor).max(1e-9);
             }
         }
     }

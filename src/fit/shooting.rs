@@ -84,7 +84,7 @@ pub fn multiple_shooting(problem: &mut Problem<'_>) -> Result<Shot> {
         x.extend(near.iter().map(|n| n[1]));
         near.iter().enumerate().for_each(|(link, n)| left[stretch.record][link].push(n[2]));
     }
-    for (noise, left) in problem.noise_rad.iter_mut().flatten().zip(left.iter_mut().flatten()) {
+    for (noise, left) in problem.noise.iter_mut().flat_map(|n| &mut n.sd_rad).zip(left.iter_mut().flatten()) {
         *noise = median(left).unwrap_or(1e-3).clamp(1e-6, 0.05);
     }
     let mut lower = problem.lower();
@@ -170,7 +170,7 @@ fn blocks(problem: &Problem<'_>, stretches: &[Stretch], x: &[f64], seam: f64, pa
         slopes.columns_mut(0, end_slopes.ncols()).copy_from(&end_slopes);
         let mut residual = DVector::zeros(2 * marks);
         for row in 0..2 * marks {
-            let noise_rad = problem.noise_rad[stretch.record][row % marks];
+            let noise_rad = problem.noise[stretch.record].sd_rad[row % marks];
             let weight = 1.0 / (seam * noise_rad * if row < marks { 1.0 } else { pace_rad_s });
             residual[row] = weight * (end[row] - x[next + row]);
             slopes[(row, free + 2 * marks + row)] = -1.0;

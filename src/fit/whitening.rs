@@ -1,12 +1,16 @@
-//! Residuals in units of their noise: divided by it, less what the noise before foretells, and with errors in step with the swing discounted.
+//! Residuals in units of their noise: divided by it, less what the noise before and beside foretells, and with errors in step with the swing discounted.
 //!
-//! A value's noise has the standard deviation σ and the correlation ρ from row to row. Beside it a tracked angle has errors that come again whenever the
+//! A value's noise has the standard deviation σ and the correlation ρ from row to row, and that of the next angle goes with it by κ: the mark between
+//! them is seen once, so that what tilts one tilts the other back. Beside it a tracked angle has errors that come again whenever the
 //! specimen is where it was: what a mark stands on shifts it by a hundredth of a pixel, and turns with the strip. They are Φb, b normal of unit variance:
 //!
 //! ```text
-//! r ← r/σ,    rᵢ ← (rᵢ − ρᵢrᵢ₋₁)/√(1 − ρᵢ²),    r ← (1 + ΦΦᵀ)^(−1/2) r        Φ with its rows like r's
+//! r ← r/σ                                       of every value
+//! r ← (r − ρ r_before)/√(1 − ρ²)                from row to row
+//! r ← (r − κ r_beside)/√(1 − κ²)                from angle to angle
+//! r ← (1 + ΦΦᵀ)^(−1/2) r                        Φ with its rows like r's
 //! Φ of an angle: share · σ · [1, u, u³, w]      u: the angle,  w: the next link's less it;  each of root mean square 1
-//! (1 + ΦΦᵀ)^(−1/2) = 1 − ΦMΦᵀ                   M = V diag((1 − 1/√(1 + λ))/λ) Vᵀ,    ΦᵀΦ = VΛVᵀ
+//! (1 + ΦΦᵀ)^(∓1/2) = 1 + Ψ diag(((1 + λ)^(∓1/2) − 1)/λ) Ψᵀ        Ψ = ΦV,  ΦᵀΦ = VΛVᵀ
 //! ```
 //!
 //! so that residuals become independent and of unit variance, and their derivatives with them.
@@ -21,6 +25,31 @@ use crate::statistics::median_step_s;
 /// Shapes of an error in step with the swing, of each angle.
 pub const IN_STEP_SHAPES: usize = 4;
 
+/// Noise of one recording's angles.
+#[derive(Debug, Clone, PartialEq)]
+pub struct RecordNoise {
+    /// Standard deviation of each angle.
+    pub sd_rad: Vec<f64>,
+    /// Correlation of each angle's noise from row to row (first-order autoregression).
+    pub rho: Vec<f64>,
+    /// Correlation of the noise of an angle and the next one's (κ), after that from row to row.
+    pub across: f64,
+    /// Errors in step with the swing that each angle may have, as a share of its noise.
+    pub in_step: f64,
+}
+
+impl RecordNoise {
+    /// White and independent.
+    pub fn white(sd_rad: Vec<f64>) -> Self {
+        Self { rho: vec![0.0; sd_rad.len()], sd_rad, across: 0.0, in_step: 0.0 }
+    }
+
+    /// Whether a value foretells another.
+    pub fn is_correlated(&self) -> bool {
+        self.across != 0.0 || self.rho.iter().any(|rho| *rho > 0.0)
+    }
+}
+
 /// What makes residuals of some rows of a recording independent and of unit variance.
 #[derive(Debug, Clone)]
 pub struct Whitening {
@@ -28,22 +57,27 @@ pub struct Whitening {
     weights: Vec<f64>,
     /// What the value before foretells; zero where nothing.
     foretold: Vec<f64>,
-    /// Φ and M.
-    in_step: Option<(DMatrix<f64>, DMatrix<f64>)>,
+    /// The value of the angle above at the same row.
+    beside: Vec<Option<usize>>,
+    across: f64,
+    /// Ψ and λ.
+    in_step: Option<(DMatrix<f64>, DVector<f64>)>,
 }
 
 impl Whitening {
     /// Of some values of a recording, link after link.
     pub fn of(problem: &Problem<'_>, record: usize, values: &[Value]) -> Self {
         let data = &problem.records[record];
-        let sd_rad = |v: &Value| problem.noise_rad[record][v.link] * data.relative_sd[v.link][v.row];
+        let sd_rad = |v: &Value| problem.noise[record].sd_rad[v.link] * data.relative_sd[v.link][v.row];
         let mut whitening = Self {
             weights: values.iter().map(|v| 1.0 / sd_rad(v)).collect(),
             foretold: foretold(problem, record, values),
+            beside: beside(data, values),
+            across: problem.noise[record].across,
             in_step: None,
         };
-        if problem.in_step[record] > 0.0 {
-            let shapes = in_step_shapes(data, problem.in_step[record], &problem.noise_rad[record]);
+        if problem.noise[record].in_step > 0.0 {
+            let shapes = in_step_shapes(data, &problem.noise[record]);
             let mut phi = DMatrix::zeros(values.len(), data.links() * IN_STEP_SHAPES);
             for (i, value) in values.iter().enumerate() {
                 let own = shapes[value.link][value.row];
@@ -51,9 +85,7 @@ impl Whitening {
             }
             whitening.apply(&mut phi);
             let eigen = phi.tr_mul(&phi).symmetric_eigen();
-            let shrink = |l: f64| if l > 1e-12 { (1.0 - 1.0 / (1.0 + l).sqrt()) / l } else { 0.5 };
-            let scaled = &eigen.eigenvectors * DMatrix::from_diagonal(&eigen.eigenvalues.map(shrink));
-            whitening.in_step = Some((phi, scaled * eigen.eigenvectors.transpose()));
+            whitening.in_step = Some((phi * &eigen.eigenvectors, eigen.eigenvalues));
         }
         whitening
     }
@@ -72,20 +104,48 @@ impl Whitening {
                 column[i] = (column[i] - rho * column[i - 1]) / (1.0 - rho * rho).sqrt();
             }
         }
-        if let Some((phi, shrink)) = &self.in_step {
-            let along = DVector::from_fn(phi.ncols(), |k, _| {
-                phi.column(k).as_slice().iter().zip(column.iter()).map(|(a, b)| a * b).sum::<f64>()
-            });
-            for (shape, size) in phi.column_iter().zip((shrink * along).iter()) {
-                column.iter_mut().zip(shape.iter()).for_each(|(value, shape)| *value -= size * shape);
+        if self.across != 0.0 {
+            // the last angle first, so that those beside are as they were
+            for i in (0..column.len()).rev() {
+                if let Some(beside) = self.beside[i] {
+                    column[i] = (column[i] - self.across * column[beside]) / (1.0 - self.across * self.across).sqrt();
+                }
             }
+        }
+        self.stretch(column, -0.5);
+    }
+
+    /// Makes noise of as many independent numbers of unit variance: the inverse of [`Whitening::whiten`].
+    pub fn colour(&self, column: &mut [f64]) {
+        self.stretch(column, 0.5);
+        if self.across != 0.0 {
+            for i in 0..column.len() {
+                if let Some(beside) = self.beside[i] {
+                    column[i] = (1.0 - self.across * self.across).sqrt() * column[i] + self.across * column[beside];
+                }
+            }
+        }
+        for i in 1..column.len() {
+            let rho = self.foretold[i];
+            column[i] = (1.0 - rho * rho).sqrt() * column[i] + rho * column[i - 1];
+        }
+        column.iter_mut().zip(&self.weights).for_each(|(value, weight)| *value /= weight);
+    }
+
+    /// (1 + ΦΦᵀ)^power of a column.
+    fn stretch(&self, column: &mut [f64], power: f64) {
+        let Some((shapes, lambda)) = &self.in_step else { return };
+        for (shape, lambda) in shapes.column_iter().zip(lambda.iter().map(|l| l.max(1e-12))) {
+            let along: f64 = shape.iter().zip(column.iter()).map(|(a, b)| a * b).sum();
+            let size = along * ((1.0 + lambda).powf(power) - 1.0) / lambda;
+            column.iter_mut().zip(shape.iter()).for_each(|(value, shape)| *value += size * shape);
         }
     }
 }
 
 /// ρ^(steps between the two rows) of each value and the one before it.
 fn foretold(problem: &Problem<'_>, record: usize, values: &[Value]) -> Vec<f64> {
-    let (colour, t_s) = (&problem.colour[record], &problem.records[record].t_s);
+    let (colour, t_s) = (&problem.noise[record].rho, &problem.records[record].t_s);
     let mut foretold = vec![0.0; values.len()];
     if colour.iter().all(|rho| *rho == 0.0) {
         return foretold;
@@ -100,8 +160,15 @@ fn foretold(problem: &Problem<'_>, record: usize, values: &[Value]) -> Vec<f64> 
     foretold
 }
 
-/// Errors in step with the swing that each angle may have (rad), `[link][row]`; `share` of the noise each.
-pub fn in_step_shapes(record: &Record, share: f64, noise_rad: &[f64]) -> Vec<Vec<[f64; IN_STEP_SHAPES]>> {
+/// Of each value, where the one of the angle above at the same row stands.
+fn beside(record: &Record, values: &[Value]) -> Vec<Option<usize>> {
+    let mut place = vec![vec![None; record.len()]; record.links()];
+    values.iter().enumerate().for_each(|(i, value)| place[value.link][value.row] = Some(i));
+    values.iter().map(|value| place[value.link.checked_sub(1)?][value.row]).collect()
+}
+
+/// Errors in step with the swing that each angle may have (rad), `[link][row]`.
+pub fn in_step_shapes(record: &Record, noise: &RecordNoise) -> Vec<Vec<[f64; IN_STEP_SHAPES]>> {
     let of_unit_size = |values: Vec<f64>| -> Vec<f64> {
         let rms = (values.iter().map(|v| v * v).sum::<f64>() / values.len().max(1) as f64).sqrt();
         values.iter().map(|v| v / rms.max(1e-300)).collect()
@@ -113,7 +180,7 @@ pub fn in_step_shapes(record: &Record, share: f64, noise_rad: &[f64]) -> Vec<Vec
         let cube = of_unit_size(angle.iter().map(|a| a.powi(3)).collect());
         let bend = |row: usize| Some(next?[row]? - angles[row]?);
         let bend = of_unit_size((0..record.len()).map(|row| bend(row).unwrap_or(0.0)).collect());
-        let size = share * noise_rad[link];
+        let size = noise.in_step * noise.sd_rad[link];
         (0..record.len()).map(|row| [1.0, angle[row], cube[row], bend[row]].map(|shape| size * shape)).collect()
     };
     (0..record.links()).map(of).collect()
@@ -143,23 +210,28 @@ mod tests {
     fn whitened_errors_have_unit_variance_in_every_direction() {
         let records = [record()];
         let mut problem = Problem::new(&records, &Experiment::default(), &[]).unwrap();
-        problem.colour = vec![vec![0.3, 0.0]];
-        problem.in_step = vec![0.25];
+        let noise = RecordNoise { sd_rad: vec![1e-3, 2e-3], rho: vec![0.3, 0.0], across: -0.6, in_step: 0.25 };
+        problem.noise = vec![noise.clone()];
         let values: Vec<Value> = (0..2)
             .flat_map(|link| (0..200).map(move |row| Value { link, row, predicted_rad: 0.0, rate_rad_s: 0.0 }))
             .collect();
         // the covariance as it is stated: coloured noise and errors in step
-        let shapes = in_step_shapes(&records[0], 0.25, &problem.noise_rad[0]);
+        let shapes = in_step_shapes(&records[0], &noise);
+        let stationary = (1.0 - 0.3f64.powi(2)).sqrt() * noise.across;
         let covariance = DMatrix::from_fn(400, 400, |i, j| {
-            let (a, b) = (&values[i], &values[j]);
-            if a.link != b.link {
-                return 0.0;
+            let (a, b) =
+                if values[i].link <= values[j].link { (&values[i], &values[j]) } else { (&values[j], &values[i]) };
+            let (earlier, later) = (a.row.min(b.row), a.row.max(b.row));
+            let steps = (later - earlier) as i32;
+            let sizes = noise.sd_rad[a.link] * noise.sd_rad[b.link];
+            if a.link == b.link {
+                let (one, other) = (shapes[a.link][a.row], shapes[b.link][b.row]);
+                let in_step: f64 = one.iter().zip(&other).map(|(x, y)| x * y).sum();
+                return sizes * noise.rho[a.link].powi(steps) + in_step;
             }
-            let noise_rad = problem.noise_rad[0][a.link];
-            let apart = a.row.abs_diff(b.row) as i32;
-            let noise = noise_rad * noise_rad * problem.colour[0][a.link].powi(apart);
-            let (one, other) = (shapes[a.link][a.row], shapes[b.link][b.row]);
-            noise + one.iter().zip(&other).map(|(x, y)| x * y).sum::<f64>()
+            // the first angle remembers what both had at an earlier row, the second one forgets
+            let at_once = if b.row == 0 { noise.across } else { stationary };
+            if a.row >= b.row { sizes * at_once * 0.3f64.powi(steps) } else { 0.0 }
         });
         let whitening = Whitening::of(&problem, 0, &values);
         let mut once = covariance;
@@ -168,5 +240,10 @@ mod tests {
         whitening.apply(&mut twice);
         let off = (&twice - DMatrix::identity(400, 400)).amax();
         assert!(off < 1e-9, "{off}");
+        let given: Vec<f64> = (0..400).map(|i| f64::from(i * i % 37)).collect();
+        let mut back = given.clone();
+        whitening.colour(&mut back);
+        whitening.whiten(&mut back);
+        assert!(given.iter().zip(&back).all(|(a, b)| (a - b).abs() < 1e-9));
     }
 }
