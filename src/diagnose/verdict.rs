@@ -156,10 +156,13 @@ fn slow_errors_rad(fit: &Refit<'_>) -> f64 {
 
 /// How much likelier an unknown of any size makes the recordings than one that a law's own error, or the tracker's, allows.
 fn unknown_gain(latents: &[Latent], added_n_m: f64, slow_errors_rad: f64) -> f64 {
+    let within =
+        |latent: &Latent, allowed: f64| latent.tried.iter().filter(|t| t.0 <= allowed).map(|t| t.1).fold(0.0, f64::max);
+    let is_camera = |latent: &&Latent| latent.place == Place::Camera;
+    let wander = latents.iter().find(is_camera).map_or(0.0, |camera| within(camera, slow_errors_rad));
     let of = |latent: &Latent| {
-        let allowed = if latent.place == Place::Camera { slow_errors_rad } else { LAW_SHARE * added_n_m };
-        let tolerated = latent.tried.iter().filter(|t| t.0 <= allowed).map(|t| t.1).fold(0.0, f64::max);
-        latent.gain - tolerated
+        let own = if is_camera(&latent) { 0.0 } else { within(latent, LAW_SHARE * added_n_m) };
+        latent.gain - own.max(wander)
     };
     // any size is as likely as any other, at any place
     let looks: usize = latents.iter().map(|l| l.tried.len()).sum();
