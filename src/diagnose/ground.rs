@@ -16,6 +16,10 @@ use crate::model::observe::chord_angles_rad;
 const YIELD_SHARE: f64 = 0.2;
 /// Steps of the integration for each second of the recording before a motion is given up.
 const STEPS_EACH_SECOND: f64 = 300.0;
+/// A motion is given up where it turns this many times as far as the recording, and a turn's sixth.
+const RUNAWAY: f64 = 5.0;
+/// A dear hypothesis goes on where its first steps lead below this multiple of the base model's χ².
+pub(super) const HOPEFUL: f64 = 1.2;
 /// Rods between two marks while bending all along the strip is only a candidate.
 const CANDIDATE_PIECES: usize = 3;
 /// Losses imitate each other closely: only a weakly damped step goes along the valley between them.
@@ -97,6 +101,8 @@ impl<'a> Ground<'a> {
             problem.further_shapes = 0;
         }
         problem.accuracy.step_error_rad = self.step_error_rad;
+        problem.accuracy.most_angle_rad =
+            RUNAWAY * (1.0 + self.records.iter().map(Record::largest_angle_rad).fold(0.0, f64::max));
         problem.accuracy.most_steps = 1000 + (STEPS_EACH_SECOND * self.longest_s()) as usize;
         if let Some((record, at_s)) = hypothesis.dropped {
             problem.dropped_at_s[record] = at_s;
@@ -109,15 +115,19 @@ impl<'a> Ground<'a> {
         let (problem, x) = self.start(hypothesis, near, start)?;
         // a score is linear: where it overshoots, start from nothing
         let mut careful = x.clone();
-        for cause in &hypothesis.causes {
-            let first = cause.parameters()[0];
-            let given = start.iter().any(|(p, _)| *p == first);
-            if let Some(i) = problem.free.iter().position(|p| *p == first).filter(|_| given) {
-                careful[i] = 0.0;
-            }
+        let given = hypothesis.causes.iter().flat_map(|cause| cause.parameters());
+        let given = given.filter(|p| p.is_proportional() && start.iter().any(|(given, _)| given == *p));
+        for place in given.filter_map(|p| problem.free.iter().position(|free| free == p)) {
+            careful[place] = 0.0;
         }
-        let x = if problem.cost(&x) < problem.cost(&careful) { x } else { careful };
-        self.descend(hypothesis, problem, x, FEW_STEPS)
+        if careful == x {
+            return self.descend(hypothesis, problem, x, FEW_STEPS);
+        }
+        // without what is given it is the fit nearby
+        let is_near = near.is_part_of(hypothesis, &problem) && start.iter().all(|(p, _)| near.value(*p).is_none());
+        let worst_start = if is_near { near.chi2 } else { problem.cost(&careful) };
+        self.descend_below(worst_start, hypothesis, problem.clone(), x, FEW_STEPS)
+            .or_else(|| self.descend(hypothesis, problem, careful, FEW_STEPS))
     }
 
     /// The first steps of a refit.
@@ -159,7 +169,8 @@ impl<'a> Ground<'a> {
     }
 
     /// Fits a hypothesis from the start values of the experiment, by multiple shooting first: for a base model whose motion is out of step.
-    pub fn refit_anew(&self, hypothesis: &Hypothesis, start: &[(Parameter, f64)]) -> Option<Refit<'a>> {
+    /// It goes on where its first steps lead below a multiple of `known`, what is known to be left without.
+    pub fn refit_anew(&self, hypothesis: &Hypothesis, start: &[(Parameter, f64)], known: f64) -> Option<Refit<'a>> {
         let mut problem = self.problem(hypothesis).ok()?;
         for (parameter, value) in start {
             set(&mut problem.experiment, *parameter, *value);
@@ -168,7 +179,15 @@ impl<'a> Ground<'a> {
         let x = multiple_shooting(&mut problem).ok()?.x;
         problem.noise.clone_from(&self.noise);
         problem.accuracy = accuracy;
-        self.descend(hypothesis, problem, x, FEW_STEPS)
+        self.if_hopeful(self.descend(hypothesis, problem, x, FIRST_STEPS)?, known)
+    }
+
+    /// Goes on with a fit that has begun where its first steps have led below a multiple of `known`.
+    pub fn if_hopeful(&self, begun: Refit<'a>, known: f64) -> Option<Refit<'a>> {
+        match begun.converged || !(begun.chi2 < HOPEFUL * known) {
+            true => Some(begun),
+            false => self.again(&begun, FEW_STEPS - FIRST_STEPS),
+        }
     }
 
     /// The same hypothesis with the noise as it is known now.
@@ -233,8 +252,20 @@ impl<'a> Ground<'a> {
         x: Vec<f64>,
         most_steps: usize,
     ) -> Option<Refit<'a>> {
+        self.descend_below(f64::INFINITY, hypothesis, problem, x, most_steps)
+    }
+
+    /// The same unless the start costs more than `worst_start`.
+    fn descend_below(
+        &self,
+        worst_start: f64,
+        hypothesis: &Hypothesis,
+        problem: Problem<'a>,
+        x: Vec<f64>,
+        most_steps: usize,
+    ) -> Option<Refit<'a>> {
         let lower = problem.lower();
-        let descent = Descent { most_steps, enough: 0.02, damping: FIRST_DAMPING, ..Descent::default() };
+        let descent = Descent { most_steps, enough: 0.02, damping: FIRST_DAMPING, worst_start, ..Descent::default() };
         let outcome = match Straightened::of(&problem) {
             None => descent.run(x, &lower, |x| problem.blocks(x))?,
             Some(valley) => valley.bend(descent.run(valley.straight(x), &lower, |x| {

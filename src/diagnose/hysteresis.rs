@@ -7,6 +7,7 @@ use super::Cause;
 use super::ground::{Ground, Hypothesis};
 use super::refit::Refit;
 use super::screen::Score;
+use super::selection::Lacks;
 use crate::fit::Problem;
 use crate::fit::descent::{Block, Outcome};
 use crate::model::Parameter;
@@ -77,17 +78,18 @@ impl Straightened {
 
 /// The hysteresis alone, from every start that may lead to its minimum: where the score points, and, as far as there is something to explain, as a part of
 /// the spring, and from short stretches that do not know what the base model has given up.
-pub fn alone<'a>(
+pub(super) fn alone<'a>(
     ground: &Ground<'a>,
     null: &Refit<'a>,
     score: Option<&Score>,
-    (unexplained, seen): (bool, bool),
+    lacks: Lacks,
 ) -> Option<Refit<'a>> {
     let hypothesis = Hypothesis::default().and(Cause::JointHysteretic, None);
     let near = || score.and_then(|score| ground.refit(&hypothesis, null, &score.start));
-    let softened = || (unexplained || seen).then(|| softened(ground, null)).flatten();
+    let softened = || (lacks.unexplained || lacks.seen).then(|| softened(ground, null)).flatten();
     // in every joint of a strip, and from no memory in each stretch, it is too dear
-    let anew = || (unexplained && !ground.is_strip()).then(|| ground.refit_anew(&hypothesis, &[])).flatten();
+    let anew =
+        || (lacks.unexplained && !ground.is_strip()).then(|| ground.refit_anew(&hypothesis, &[], null.chi2)).flatten();
     let (near, (softened, anew)) = rayon::join(near, || rayon::join(softened, anew));
     [near, softened, anew].into_iter().flatten().min_by(|a, b| a.chi2.total_cmp(&b.chi2))
 }

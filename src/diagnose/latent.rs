@@ -25,7 +25,6 @@ use super::Place;
 use super::refit::Refit;
 use super::surroundings::Surroundings;
 use crate::fit::whitening::{IN_STEP_SHAPES, RecordNoise, in_step_shapes};
-use crate::model::Parameter;
 use crate::statistics::median_step_s;
 
 /// Standard deviations of the fitted state and parameters at which their prior stands.
@@ -123,10 +122,8 @@ impl<'a> Filter<'a> {
         let mut begin = vec![0.0; wide.len()];
         if beyond == Beyond::TheBaseModel {
             for place in fit.added().iter().filter_map(|p| fit.place(*p)) {
-                let is_linear =
-                    !matches!(problem.free[place], Parameter::HysteresisYield | Parameter::SupportFrequency);
                 let variable = around.state() + 1 + place;
-                begin[variable] = if is_linear { -fit.x[place] } else { 0.0 };
+                begin[variable] = if problem.free[place].is_proportional() { -fit.x[place] } else { 0.0 };
                 wide[variable] = 0.0;
             }
         }

@@ -7,7 +7,7 @@ use super::refit::Refit;
 use super::surroundings::Surroundings;
 use super::torque::Phase;
 use super::{Cause, Place, noise};
-use crate::fit::{Residuals, Verdict, residuals_of};
+use crate::fit::{Record, Residuals, Verdict, residuals_of};
 use crate::model::observe::chord_angles_rad;
 
 /// Power of the motion at a frequency, over its largest, from which on a torque of that frequency is in step with it.
@@ -43,8 +43,7 @@ fn typical(fit: &Refit<'_>, place: Place) -> f64 {
         return 10.0 * fit.problem.noise.iter().flat_map(|n| &n.sd_rad).copied().fold(0.0, f64::max);
     }
     let Ok((model, _)) = fit.problem.model(0, &fit.x[..fit.problem.free.len()]) else { return 1.0 };
-    let angles = fit.problem.records.iter().flat_map(|r| r.theta_rad.iter().flatten().flatten());
-    let largest_rad = angles.fold(0.0f64, |a, b| a.max(b.abs()));
+    let largest_rad = fit.problem.records.iter().map(Record::largest_angle_rad).fold(0.0, f64::max);
     0.3 * model.gravity_m_s2() * model.chain().static_moment_kg_m(0) * largest_rad
 }
 

@@ -2,6 +2,7 @@
 
 use nalgebra::{DMatrix, DVector};
 
+use super::Cause;
 use super::ground::Hypothesis;
 use crate::fit::Problem;
 use crate::fit::descent::{Ending, Outcome};
@@ -9,7 +10,7 @@ use crate::fit::problem::stacked;
 use crate::model::{Camera, ForwardModel, Parameter, State, Trajectory};
 
 /// A motion that leaves more than this part of the swing has lost step.
-const OUT_OF_STEP: f64 = 0.35;
+pub(super) const OUT_OF_STEP: f64 = 0.35;
 
 /// A hypothesis fitted to the recordings.
 #[derive(Debug, Clone)]
@@ -40,6 +41,17 @@ impl<'a> Refit<'a> {
     /// The value of a free parameter.
     pub fn value(&self, parameter: Parameter) -> Option<f64> {
         self.place(parameter).map(|i| self.x[i])
+    }
+
+    /// Whether a hypothesis only adds laws to this one's, about the same recordings with the same noise.
+    pub fn is_part_of(&self, hypothesis: &Hypothesis, problem: &Problem<'_>) -> bool {
+        let (own, all) = (&self.hypothesis, &hypothesis.causes);
+        let bends = |causes: &[Cause]| causes.contains(&Cause::DistributedFlexibility);
+        own.causes.iter().all(|cause| all.contains(cause))
+            && bends(&own.causes) == bends(all)
+            && (own.dropped == hypothesis.dropped || own.dropped.is_none())
+            && std::ptr::eq(self.problem.records, problem.records)
+            && self.problem.noise == problem.noise
     }
 
     /// Where a free parameter stands among the variables.

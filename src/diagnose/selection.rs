@@ -3,7 +3,7 @@
 use rayon::prelude::*;
 
 use super::ground::{self, Ground, Hypothesis};
-use super::refit::Refit;
+use super::refit::{OUT_OF_STEP, Refit};
 use super::screen::{Score, Screen};
 use super::{Cause, dropped, hysteresis};
 use crate::model::Parameter;
@@ -17,8 +17,6 @@ const SOMETHING_LEFT: f64 = 4.0;
 const PROMISING: f64 = 3.0;
 /// A base model that leaves this part of the swing lacks something, whatever the noise.
 const MUCH_LEFT: f64 = 0.05;
-/// A dear hypothesis goes on where its first steps lead below this multiple of the base model's χ².
-const HOPEFUL: f64 = 1.2;
 /// Dampers to start the base model from, over the one it found.
 const WEAKER: [f64; 2] = [0.1, 0.01];
 /// An effect explains much where it leaves less than this part of the base model's χ², and leads elsewhere where a base parameter differs by
@@ -44,11 +42,10 @@ const FEWEST_PAIRS: usize = 6;
 /// The fits of all hypotheses, the base model first; what the best of them leaves refines the noise.
 pub fn fits<'a>(ground: &mut Ground<'a>, null: Refit<'a>, causes: &[Cause], progress: &dyn Progress) -> Vec<Refit<'a>> {
     let scores = Screen::at(ground, &null).map(|s| s.scores(&cheap(ground, causes))).unwrap_or_default();
-    let out_of_step = null.is_out_of_step();
-    let seen = scores.iter().any(|s| s.gain > WORTH && !s.cause.is_scanned());
+    let lacks = Lacks::of(ground, &null, &scores);
     progress.begin("effects", Some(causes.len() as u64));
     let singles = causes.par_iter().with_max_len(1).filter_map(|cause| {
-        let fit = single(ground, &null, *cause, scores.iter().find(|s| s.cause == *cause), (out_of_step, seen));
+        let fit = single(ground, &null, *cause, scores.iter().find(|s| s.cause == *cause), lacks);
         progress.advance(1);
         fit
     });
@@ -163,7 +160,7 @@ fn with_refined_noise<'a>(ground: &mut Ground<'a>, fits: Vec<Refit<'a>>) -> Vec<
     let again = |fit: Refit<'a>| {
         let dear = fit.hypothesis.causes.contains(&Cause::JointHysteretic);
         // in every joint of a strip it has only begun
-        let bound = if dear && ground.is_strip() { HOPEFUL } else { HOPELESS };
+        let bound = if dear && ground.is_strip() { ground::HOPEFUL } else { HOPELESS };
         let worth = fit.hypothesis.causes.is_empty()
             || fit.chi2 < bound * (least + HOPELESS) && !(dear && fit.chi2 > null - WORTH);
         match (changed, worth) {
@@ -191,30 +188,55 @@ fn with_errors_in_step<'a>(ground: &mut Ground<'a>, fits: Vec<Refit<'a>>) -> Vec
     fits.into_par_iter().with_max_len(1).map(again).collect()
 }
 
-/// One effect, from every start that may lead to its minimum; of the base model, whether it is out of step, and whether anything was seen.
+/// How much the base model lacks, which decides from how many starts an effect is fitted.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Lacks {
+    /// χ² from which on a fit leaves more than noise.
+    too_much: f64,
+    /// The base model leaves more than noise.
+    pub unexplained: bool,
+    /// Its motion has lost step with a recording.
+    out_of_step: bool,
+    /// An effect that is not scanned for would explain some of it.
+    pub seen: bool,
+}
+
+impl Lacks {
+    fn of(ground: &Ground<'_>, null: &Refit<'_>, scores: &[Score]) -> Self {
+        let values = ground.values() as f64;
+        let too_much = values + SOMETHING_LEFT * (2.0 * values).sqrt();
+        let left_share = null.left_share();
+        Self {
+            too_much,
+            unexplained: left_share > MUCH_LEFT || null.chi2 > too_much,
+            out_of_step: left_share > OUT_OF_STEP,
+            seen: scores.iter().any(|s| s.gain > WORTH && !s.cause.is_scanned()),
+        }
+    }
+}
+
+/// One effect, from every start that may lead to its minimum.
 fn single<'a>(
     ground: &Ground<'a>,
     null: &Refit<'a>,
     cause: Cause,
     score: Option<&Score>,
-    (out_of_step, seen): (bool, bool),
+    lacks: Lacks,
 ) -> Option<Refit<'a>> {
-    let values = ground.values() as f64;
-    let too_much = values + SOMETHING_LEFT * (2.0 * values).sqrt();
-    let unexplained = null.left_share() > MUCH_LEFT || null.chi2 > too_much;
     if cause == Cause::JointHysteretic {
-        return hysteresis::alone(ground, null, score, (unexplained, seen));
+        return hysteresis::alone(ground, null, score, lacks);
     }
+    let Lacks { too_much, unexplained, out_of_step, .. } = lacks;
     let mut tries = Vec::new();
     match (cause, score) {
         (Cause::DistributedFlexibility, _) => {
             // many links are dear: only where there is something to explain
             if unexplained {
                 let hypothesis = Hypothesis::default().and(cause, None);
-                let begun = ground.begin(&hypothesis, null, &[]).filter(|b| b.chi2 < HOPEFUL * null.chi2);
+                let begun = ground.begin(&hypothesis, null, &[]).filter(|b| b.chi2 < ground::HOPEFUL * null.chi2);
                 tries.push(begun.and_then(|begun| ground.again(&begun, ground::FEW_STEPS)));
                 if out_of_step && tries.iter().flatten().all(Refit::is_out_of_step) {
-                    tries.push(ground.refit_anew(&hypothesis, &[]));
+                    tries.push(ground.refit_anew(&hypothesis, &[], null.chi2));
                 }
             }
         }
@@ -230,7 +252,7 @@ fn single<'a>(
             // a base model may have damped away what a better one keeps: short stretches remember it
             let slow = unexplained && is_loss(cause) && near.as_ref().is_none_or(|n| !n.converged);
             if lost || slow {
-                tries.push(ground.refit_anew(&hypothesis, &score.start));
+                tries.push(ground.refit_anew(&hypothesis, &score.start, null.chi2));
             }
             if unexplained && near.as_ref().is_none_or(|n| n.chi2 > too_much) {
                 tries.extend(score.further.iter().map(|start| ground.refit(&hypothesis, null, start)));
@@ -242,7 +264,7 @@ fn single<'a>(
     let unsolved = unexplained && tries.iter().flatten().all(|t| t.chi2 > too_much);
     if cause == Cause::RestCurl && unsolved {
         // a base model that has given its second mode up is no place to start from
-        tries.push(ground.refit_anew(&Hypothesis::default().and(cause, None), &[]));
+        tries.push(ground.refit_anew(&Hypothesis::default().and(cause, None), &[], null.chi2));
     }
     tries.into_iter().flatten().min_by(|a, b| a.chi2.total_cmp(&b.chi2))
 }

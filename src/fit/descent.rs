@@ -28,13 +28,22 @@ pub struct Descent {
     pub enough: f64,
     /// A variable that is to stay where it is.
     pub fixed: Option<usize>,
+    /// A start that costs more is no start.
+    pub worst_start: f64,
     /// Damping of the first step, in units of the normal matrix' diagonal: small where the start is known to be near.
     pub damping: f64,
 }
 
 impl Default for Descent {
     fn default() -> Self {
-        Self { huber: f64::INFINITY, most_steps: 60, enough: 1e-5, fixed: None, damping: 1e-4 }
+        Self {
+            huber: f64::INFINITY,
+            most_steps: 60,
+            enough: 1e-5,
+            fixed: None,
+            worst_start: f64::INFINITY,
+            damping: 1e-4,
+        }
     }
 }
 
@@ -82,7 +91,7 @@ struct Normals {
 impl Descent {
     /// Descends from `x`. `evaluate` gives the blocks at a place, or `None` where there are none. `lower` holds a bound each variable.
     ///
-    /// Returns `None` where even the start cannot be evaluated.
+    /// Returns `None` where even the start cannot be evaluated, or is too bad.
     pub fn run(
         &self,
         x: Vec<f64>,
@@ -92,6 +101,9 @@ impl Descent {
         let mut x = x;
         let mut blocks = evaluate(&x)?;
         let mut normals = self.normals(&blocks, x.len());
+        if normals.cost > self.worst_start {
+            return None;
+        }
         let (mut damping, mut growth) = (self.damping, 2.0);
         let mut ending = Ending::LostPatience;
         let mut steps = 0;

@@ -126,11 +126,7 @@ impl<'a> Problem<'a> {
         for (bound, parameter) in lower.iter_mut().zip(&self.free) {
             if parameter.is_not_negative() {
                 // a yield angle or a frequency of zero has no meaning
-                *bound = if matches!(parameter, Parameter::HysteresisYield | Parameter::SupportFrequency) {
-                    1e-4
-                } else {
-                    0.0
-                };
+                *bound = if parameter.is_proportional() { 0.0 } else { 1e-4 };
             }
         }
         lower

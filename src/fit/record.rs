@@ -63,6 +63,11 @@ impl Record {
         }
     }
 
+    /// The largest angle of any link, to either side.
+    pub fn largest_angle_rad(&self) -> f64 {
+        self.theta_rad.iter().flatten().flatten().fold(0.0, |most, angle| most.max(angle.abs()))
+    }
+
     /// Number of angles.
     pub fn links(&self) -> usize {
         self.theta_rad.len()

@@ -17,11 +17,13 @@ pub struct Accuracy {
     pub longest_step_s: f64,
     /// Most steps in one motion.
     pub most_steps: usize,
+    /// Where a link turns further, the motion is given up: a softening spring without end has let go.
+    pub most_angle_rad: f64,
 }
 
 impl Default for Accuracy {
     fn default() -> Self {
-        Self { step_error_rad: 1e-10, longest_step_s: 0.1, most_steps: 2_000_000 }
+        Self { step_error_rad: 1e-10, longest_step_s: 0.1, most_steps: 2_000_000, most_angle_rad: 1e4 }
     }
 }
 
@@ -43,8 +45,6 @@ pub(super) struct Place {
     pub rate: Vec<f64>,
 }
 
-/// No link turns this far: a softening spring without end has let go.
-const RUNAWAY_RAD: f64 = 1e4;
 /// Where the laws have more corners than this, steps do not end at each of them.
 const MOST_CORNERS: usize = 4;
 /// Points of a step where a reversal is looked for.
@@ -193,7 +193,7 @@ impl<'a> Run<'a> {
             theta: step.theta_rad(1.0),
             rate: step.rate(1.0),
         };
-        if self.place.theta.iter().any(|theta| theta.abs() > RUNAWAY_RAD) {
+        if self.place.theta.iter().any(|theta| theta.abs() > self.accuracy.most_angle_rad) {
             return Err(self.stuck("the motion runs away"));
         }
         self.slopes = step.slopes(1.0);

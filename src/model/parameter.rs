@@ -113,6 +113,11 @@ impl Parameter {
         }
     }
 
+    /// Whether its law is proportional to it, and gone at zero; a yield angle or a frequency only shapes a law.
+    pub fn is_proportional(self) -> bool {
+        !matches!(self, Self::HysteresisYield | Self::SupportFrequency)
+    }
+
     /// Whether nature allows only values from zero upwards.
     pub fn is_not_negative(self) -> bool {
         match self {
