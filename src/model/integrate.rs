@@ -193,7 +193,9 @@ impl<'a> Run<'a> {
             theta: step.theta_rad(1.0),
             rate: step.rate(1.0),
         };
-        if self.place.theta.iter().any(|theta| theta.abs() > self.accuracy.most_angle_rad) {
+        // of shapes only the first is an angle
+        let angles = if self.model.shapes().is_some() { 1 } else { self.place.theta.len() };
+        if self.place.theta[..angles].iter().any(|theta| theta.abs() > self.accuracy.most_angle_rad) {
             return Err(self.stuck("the motion runs away"));
         }
         self.slopes = step.slopes(1.0);
