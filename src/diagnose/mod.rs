@@ -210,11 +210,15 @@ pub fn diagnose<'a>(
     options: &Options,
     progress: &dyn Progress,
 ) -> Result<Diagnosis<'a>> {
-    let (ground, causes, fits) = fitted(prepared, experiment, progress)?;
-    let (ground, causes, fits) = match pieces::preferred(&ground, &fits) {
-        None => (ground, causes, fits),
-        Some(count) => fitted(prepared, prepared.counted.get_or_init(|| pieces::with(experiment, count)), progress)?,
-    };
+    let mut found = fitted(prepared, experiment, progress)?;
+    if let Some(count) = pieces::preferred(&found.0, &found.2) {
+        let counted = prepared.counted.get_or_init(|| pieces::with(experiment, count));
+        let again = fitted(prepared, counted, progress)?;
+        if pieces::is_kept(&found.0, &found.2, &again.2) {
+            found = again;
+        }
+    }
+    let (ground, causes, fits) = found;
     let marks = prepared.records.first().map_or(0, Record::links);
     let (weighed, unknown, unknowns) = verdict::weigh(fits, ground.values(), causes.len(), |fit, variance| {
         (locate::unknowns(fit, variance, Beyond::TheFit), energy::added_torque_n_m(fit))

@@ -5,6 +5,7 @@
 
 use rayon::prelude::*;
 
+use super::Cause;
 use super::ground::Ground;
 use super::refit::Refit;
 use crate::experiment::{Experiment, Model};
@@ -17,6 +18,28 @@ const MOST: usize = 20;
 const WORTH: f64 = 25.0;
 /// An effect must lower it by this to stand beside fewer.
 const OF_AN_EFFECT: f64 = 9.0;
+/// Where the best fit leaves this many variances of the noise, a wrong count may have led to it, and every effect is tried with other counts.
+const UNEXPLAINED: f64 = 1.2;
+
+/// How well each fit does, what it needs being paid for, over what the best of them leaves.
+struct Weights {
+    scatter: f64,
+}
+
+impl Weights {
+    fn of(ground: &Ground<'_>, fits: &[Refit<'_>]) -> Self {
+        let least = fits.iter().map(|fit| fit.chi2).fold(f64::INFINITY, f64::min);
+        Self { scatter: (least / ground.values() as f64).max(1.0) }
+    }
+
+    fn weight(&self, fit: &Refit<'_>) -> f64 {
+        fit.chi2 / self.scatter + OF_AN_EFFECT * fit.hypothesis.causes.len() as f64
+    }
+
+    fn best<'f, 'a>(&self, fits: &'f [Refit<'a>]) -> Option<&'f Refit<'a>> {
+        fits.iter().min_by(|a, b| self.weight(a).total_cmp(&self.weight(b)))
+    }
+}
 
 /// The number of rods between two marks that the recordings ask for, if it is not the usual one; `None` also where the file asks for another.
 pub fn preferred(ground: &Ground<'_>, fits: &[Refit<'_>]) -> Option<usize> {
@@ -24,23 +47,32 @@ pub fn preferred(ground: &Ground<'_>, fits: &[Refit<'_>]) -> Option<usize> {
     if !ground.is_strip() || ground.experiment.model.pieces != usual {
         return None;
     }
-    let least = fits.iter().map(|fit| fit.chi2).fold(f64::INFINITY, f64::min);
-    let scatter = (least / ground.values() as f64).max(1.0);
-    let weight = |fit: &Refit<'_>| fit.chi2 / scatter + OF_AN_EFFECT * fit.hypothesis.causes.len() as f64;
-    let best = fits.iter().min_by(|a, b| weight(a).total_cmp(&weight(b)))?;
-    let within = |fit: &&Refit<'_>| fit.hypothesis.causes.iter().all(|c| best.hypothesis.causes.contains(c));
-    let compared: Vec<&Refit<'_>> = fits.iter().filter(within).collect();
-    let mut points = vec![(epsilon(usual), weight(best))];
-    points.extend(TRIED.iter().filter_map(|pieces| {
-        let experiment = with(ground.experiment, *pieces);
-        let other = Ground { experiment: &experiment, ..ground.clone() };
-        let refitted = compared.par_iter().with_max_len(1).filter_map(|fit| other.refit(&fit.hypothesis, fit, &[]));
-        let weights: Vec<f64> = refitted.map(|fit| weight(&fit)).collect();
-        Some((epsilon(*pieces), weights.into_iter().min_by(f64::total_cmp)?))
-    }));
-    let (lowest, value) = lowest_point(&points, epsilon(MOST)..=epsilon(FEWEST))?;
+    let weights = Weights::of(ground, fits);
+    let best = weights.best(fits)?;
+    let within = |fit: &Refit<'_>| fit.hypothesis.causes.iter().all(|c| best.hypothesis.causes.contains(c));
+    let is_dear = |cause: &Cause| matches!(cause, Cause::JointHysteretic | Cause::DistributedFlexibility);
+    let simple = |fit: &Refit<'_>| fit.hypothesis.causes.len() < 2 && !fit.hypothesis.causes.iter().any(is_dear);
+    let unexplained = weights.scatter > UNEXPLAINED;
+    let compared: Vec<&Refit<'_>> = fits.iter().filter(|fit| within(fit) || unexplained && simple(fit)).collect();
+    let others = TRIED.map(|pieces| with(ground.experiment, pieces));
+    let promised = compared.par_iter().with_max_len(1).filter_map(|fit| {
+        let mut points = vec![(epsilon(usual), weights.weight(fit))];
+        for (experiment, pieces) in others.iter().zip(TRIED) {
+            let other = Ground { experiment, ..ground.clone() };
+            points.push((epsilon(pieces), weights.weight(&other.refit(&fit.hypothesis, fit, &[])?)));
+        }
+        lowest_point(&points, epsilon(MOST)..=epsilon(FEWEST))
+    });
+    let (lowest, value) = promised.min_by(|a, b| a.1.total_cmp(&b.1))?;
     let pieces = (1.0 / lowest.sqrt()).round() as usize;
-    (pieces != usual && value < weight(best) - WORTH).then_some(pieces)
+    (pieces != usual && value < weights.weight(best) - WORTH).then_some(pieces)
+}
+
+/// Whether fits with another count do better, as was promised.
+pub fn is_kept(ground: &Ground<'_>, before: &[Refit<'_>], after: &[Refit<'_>]) -> bool {
+    let weights = Weights::of(ground, before);
+    let of = |fits| weights.best(fits).map_or(f64::INFINITY, |fit| weights.weight(fit));
+    of(after) < of(before)
 }
 
 /// An experiment with another number of rods.
