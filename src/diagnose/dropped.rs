@@ -38,28 +38,28 @@ pub fn alone<'a>(ground: &Ground<'a>, null: &Refit<'a>) -> Option<Refit<'a>> {
     let begun = Refit { x: ground.begun.clone(), ..null.clone() };
     let starts = [null, &begun];
     let jumps = starts.into_iter().filter(|start| start.x.len() == null.x.len()).filter_map(|start| {
-        let jump = likeliest(ground, &start.x)?;
+        let jump = likeliest(ground, start)?;
         Some((start, jump))
     });
     let fits = jumps.filter_map(|(start, jump)| {
-        let hypothesis = Hypothesis::default().and(Cause::DroppedFrames, Some((jump.record, jump.at_s)));
+        let hypothesis = null.hypothesis.and(Cause::DroppedFrames, Some((jump.record, jump.at_s)));
         let fit = ground.refit(&hypothesis, start, &[(Parameter::DroppedFrames, jump.missing_s)])?;
         Some(settled(ground, fit))
     });
     fits.min_by(|a, b| a.chi2.total_cmp(&b.chi2))
 }
 
-/// The likeliest jump of whole frames for parameters and starts of the base model.
-fn likeliest(ground: &Ground<'_>, x: &[f64]) -> Option<Jump> {
+/// The likeliest jump of whole frames for parameters and starts of a fit.
+fn likeliest(ground: &Ground<'_>, fit: &Refit<'_>) -> Option<Jump> {
     let mut jumps = Vec::new();
     for record in 0..ground.records.len() {
-        let hypothesis = Hypothesis::default().and(Cause::DroppedFrames, Some((record, 0.0)));
+        let hypothesis = fit.hypothesis.and(Cause::DroppedFrames, Some((record, 0.0)));
         let problem = ground.problem(&hypothesis).ok()?;
         let step_s = median_step_s(&ground.records[record].t_s)?;
         for frames in 1..=MOST_FRAMES {
             for missing_s in [frames as f64 * step_s, -(frames as f64) * step_s] {
-                let mut x = x.to_vec();
-                x.insert(ground.base.len(), missing_s);
+                let mut x = fit.x.clone();
+                x.insert(problem.free.iter().position(|p| *p == Parameter::DroppedFrames)?, missing_s);
                 jumps.extend(best_instant(&problem, record, &x));
             }
         }

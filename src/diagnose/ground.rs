@@ -18,6 +18,8 @@ const YIELD_SHARE: f64 = 0.2;
 const STEPS_EACH_SECOND: f64 = 300.0;
 /// A motion is given up where it turns this many times as far as the recording, and a turn's sixth.
 const RUNAWAY: f64 = 5.0;
+/// A fit from short stretches goes on where its first steps lead below this multiple of the base model's χ².
+const BEYOND_HOPE: f64 = 10.0;
 /// A dear hypothesis goes on where its first steps lead below this multiple of the base model's χ².
 pub(super) const HOPEFUL: f64 = 1.2;
 /// Rods between two marks while bending all along the strip is only a candidate.
@@ -184,7 +186,7 @@ impl<'a> Ground<'a> {
 
     /// Goes on with a fit that has begun where its first steps have led below a multiple of `known`.
     pub fn if_hopeful(&self, begun: Refit<'a>, known: f64) -> Option<Refit<'a>> {
-        match begun.converged || !(begun.chi2 < HOPEFUL * known) {
+        match begun.converged || !(begun.chi2 < BEYOND_HOPE * known) {
             true => Some(begun),
             false => self.again(&begun, FEW_STEPS - FIRST_STEPS),
         }

@@ -4,7 +4,7 @@
 //! the valley of equal sums is bent, and a descent creeps along it; in (K, T_h/Δ_y, Δ_y) it is straight.
 
 use super::Cause;
-use super::ground::{Ground, Hypothesis};
+use super::ground::Ground;
 use super::refit::Refit;
 use super::screen::Score;
 use super::selection::Lacks;
@@ -84,7 +84,7 @@ pub(super) fn alone<'a>(
     score: Option<&Score>,
     lacks: Lacks,
 ) -> Option<Refit<'a>> {
-    let hypothesis = Hypothesis::default().and(Cause::JointHysteretic, None);
+    let hypothesis = null.hypothesis.and(Cause::JointHysteretic, None);
     let near = || score.and_then(|score| ground.refit(&hypothesis, null, &score.start));
     let softened = || (lacks.unexplained || lacks.seen).then(|| softened(ground, null)).flatten();
     // in every joint of a strip, and from no memory in each stretch, it is too dear
@@ -98,7 +98,7 @@ pub(super) fn alone<'a>(
 fn softened<'a>(ground: &Ground<'a>, null: &Refit<'a>) -> Option<Refit<'a>> {
     let spring =
         [Parameter::JointStiffness, Parameter::BendingStiffness].into_iter().find(|p| null.value(*p).is_some())?;
-    let hypothesis = Hypothesis::default().and(Cause::JointHysteretic, None);
+    let hypothesis = null.hypothesis.and(Cause::JointHysteretic, None);
     let stiffness =
         null.problem.model(0, &null.x[..null.problem.free.len()]).ok()?.0.value(Parameter::JointStiffness)?;
     let starts = YIELD_SHARES.iter().flat_map(|yields| SPRING_SHARES.iter().map(move |share| (*yields, *share)));

@@ -11,6 +11,7 @@
 //! | [`pieces`] | how many rods stand for a strip |
 //! | [`screen`] | which would lower the residuals |
 //! | [`selection`] | which are fitted in full |
+//! | [`second_look`] | from further starts, where much is left |
 //! | [`evidence`] | how probable each is |
 //! | [`surroundings`] | what a small torque would have done |
 //! | [`latent`] | the unknown torque |
@@ -37,6 +38,7 @@ pub mod pieces;
 pub mod plan;
 pub mod refit;
 pub mod screen;
+pub mod second_look;
 pub mod selection;
 pub mod surroundings;
 pub mod torque;

@@ -5,7 +5,7 @@ use rayon::prelude::*;
 use super::ground::{self, Ground, Hypothesis};
 use super::refit::{OUT_OF_STEP, Refit};
 use super::screen::{Score, Screen};
-use super::{Cause, dropped, hysteresis};
+use super::{Cause, dropped, hysteresis, second_look};
 use crate::model::Parameter;
 use crate::progress::Progress;
 
@@ -66,6 +66,7 @@ pub fn fits<'a>(ground: &mut Ground<'a>, null: Refit<'a>, causes: &[Cause], prog
     all.extend(pairs);
     let all = with_refined_noise(ground, all);
     let all = without_stragglers(ground, all);
+    let all = second_look::second_look(ground, all, causes, progress);
     with_errors_in_step(ground, all)
 }
 
@@ -152,7 +153,7 @@ fn without_stragglers<'a>(ground: &Ground<'a>, mut fits: Vec<Refit<'a>>) -> Vec<
 }
 
 /// The same fits with the noise that the best of them leaves; those that have not yet converged, and are worth it, go on.
-fn with_refined_noise<'a>(ground: &mut Ground<'a>, fits: Vec<Refit<'a>>) -> Vec<Refit<'a>> {
+pub(super) fn with_refined_noise<'a>(ground: &mut Ground<'a>, fits: Vec<Refit<'a>>) -> Vec<Refit<'a>> {
     let best = fits.iter().min_by(|a, b| a.chi2.total_cmp(&b.chi2));
     let changed = best.is_some_and(|best| ground.refine_noise(best));
     let ground = &*ground;
@@ -188,12 +189,12 @@ fn with_errors_in_step<'a>(ground: &mut Ground<'a>, fits: Vec<Refit<'a>>) -> Vec
     fits.into_par_iter().with_max_len(1).map(again).collect()
 }
 
-/// How much the base model lacks, which decides from how many starts an effect is fitted.
+/// How much a fit lacks, which decides from how many starts an effect is fitted.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Lacks {
     /// χ² from which on a fit leaves more than noise.
-    too_much: f64,
-    /// The base model leaves more than noise.
+    pub too_much: f64,
+    /// It leaves more than noise.
     pub unexplained: bool,
     /// Its motion has lost step with a recording.
     out_of_step: bool,
@@ -202,7 +203,7 @@ pub(super) struct Lacks {
 }
 
 impl Lacks {
-    fn of(ground: &Ground<'_>, null: &Refit<'_>, scores: &[Score]) -> Self {
+    pub fn of(ground: &Ground<'_>, null: &Refit<'_>, scores: &[Score]) -> Self {
         let values = ground.values() as f64;
         let too_much = values + SOMETHING_LEFT * (2.0 * values).sqrt();
         let left_share = null.left_share();
@@ -215,8 +216,8 @@ impl Lacks {
     }
 }
 
-/// One effect, from every start that may lead to its minimum.
-fn single<'a>(
+/// One effect beside a fit, from every start that may lead to its minimum.
+pub(super) fn single<'a>(
     ground: &Ground<'a>,
     null: &Refit<'a>,
     cause: Cause,
@@ -232,7 +233,7 @@ fn single<'a>(
         (Cause::DistributedFlexibility, _) => {
             // many links are dear: only where there is something to explain
             if unexplained {
-                let hypothesis = Hypothesis::default().and(cause, None);
+                let hypothesis = null.hypothesis.and(cause, None);
                 let begun = ground.begin(&hypothesis, null, &[]).filter(|b| b.chi2 < ground::HOPEFUL * null.chi2);
                 tries.push(begun.and_then(|begun| ground.again(&begun, ground::FEW_STEPS)));
                 if out_of_step && tries.iter().flatten().all(Refit::is_out_of_step) {
@@ -264,7 +265,7 @@ fn single<'a>(
     let unsolved = unexplained && tries.iter().flatten().all(|t| t.chi2 > too_much);
     if cause == Cause::RestCurl && unsolved {
         // a base model that has given its second mode up is no place to start from
-        tries.push(ground.refit_anew(&Hypothesis::default().and(cause, None), &[], null.chi2));
+        tries.push(ground.refit_anew(&null.hypothesis.and(cause, None), &[], null.chi2));
     }
     tries.into_iter().flatten().min_by(|a, b| a.chi2.total_cmp(&b.chi2))
 }
