@@ -6,6 +6,9 @@ use std::path::{Path, PathBuf};
 use assert_cmd::Command;
 use predicates::prelude::*;
 use predicates::str::contains;
+use rand::SeedableRng;
+use rand::rngs::StdRng;
+use rand_distr::{Distribution, Normal};
 use serde_json::Value;
 
 const BASE: &str = "
@@ -296,4 +299,56 @@ fn p_is_spread_evenly_over_recordings_that_lack_nothing() {
     p_values.sort_by(f64::total_cmp);
     // of nine even draws the median leaves these bounds, and the largest one is below one half, once in five hundred times each
     assert!((0.1..0.9).contains(&p_values[4]) && p_values[8] > 0.5, "{p_values:?}");
+}
+
+/// A table as `track` writes it, from angles without noise: marks 145 px apart, each with noise of its own, and drawn along the links by 0.15 px.
+fn tracked(angles: &str) -> String {
+    let mut random = StdRng::seed_from_u64(11);
+    let normal = Normal::new(0.0, 0.025).unwrap();
+    let mut noise = || normal.sample(&mut random);
+    let mut table = String::from("t_s,m1_x_px,m1_y_px,m2_x_px,m2_y_px,m3_x_px,m3_y_px,theta1_rad,theta2_rad\n");
+    for line in angles.lines().skip(1) {
+        let values: Vec<f64> = line.split(',').map(|v| v.parse().unwrap()).collect();
+        // frame, t_s, theta1_rad, theta2_rad
+        let (t_s, along) = (values[1], [2, 3].map(|i| [values[i].sin(), values[i].cos()]));
+        // the first mark has the strip below it, the second on both sides, the third above
+        let pulls = [[0.0; 2], along[0], along[1]].into_iter().zip([along[0], along[1], [0.0; 2]]);
+        let mut at = [320.0, 96.0];
+        let mut marks = Vec::new();
+        for (index, (above, below)) in pulls.enumerate() {
+            if index > 0 {
+                at = [at[0] + 145.0 * above[0], at[1] + 145.0 * above[1]];
+            }
+            marks.push([0, 1].map(|axis| at[axis] + 0.15 * (below[axis] - above[axis]) + noise()));
+        }
+        let angle = |i: usize| (marks[i + 1][0] - marks[i][0]).atan2(marks[i + 1][1] - marks[i][1]);
+        let pixels: Vec<String> = marks.iter().flatten().map(|v| format!("{v:.4}")).collect();
+        table += &format!("{t_s},{},{:.7},{:.7}\n", pixels.join(","), angle(0), angle(1));
+    }
+    table
+}
+
+#[test]
+fn what_a_tracker_does_in_step_with_the_swing_is_not_blamed_on_physics() {
+    let folder = Folder::new();
+    let base = BASE.replace("0.62", "0.9");
+    let config = folder.write("simulated.toml", &base);
+    let exact = folder.path("exact.csv");
+    freeswing("simulate")
+        .args(["--duration", "25", "--rate", "30", "--config"])
+        .arg(config)
+        .arg("--out")
+        .arg(&exact)
+        .assert()
+        .success();
+    let table = tracked(&fs::read_to_string(exact).unwrap());
+    let angles = folder.write("tracked.csv", &table);
+    let known = folder.diagnosis(&angles, &base, &[]);
+    assert_eq!(known["verdict"]["status"], "adequate", "{:#}", known["verdict"]);
+    let across = known["baseline"]["noise_correlation_across"].as_f64().unwrap();
+    assert!((across + 0.5).abs() < 0.12, "{across}");
+    // of angles alone nothing says that they were tracked
+    let alone = folder.write("alone.csv", &table.replace("m1_x_px", "elsewhere"));
+    let unknown = folder.diagnosis(&alone, &base, &[]);
+    assert_ne!(unknown["verdict"]["status"], "adequate", "{:#}", unknown["verdict"]);
 }

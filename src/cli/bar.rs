@@ -14,6 +14,8 @@ static HANDLER: Once = Once::new();
 pub struct Bar {
     bar: Mutex<ProgressBar>,
     quiet: bool,
+    /// What is counted, with a space before it.
+    unit: &'static str,
 }
 
 impl Bar {
@@ -27,7 +29,16 @@ impl Bar {
                 }
             });
         });
-        Self { bar: Mutex::new(ProgressBar::hidden()), quiet }
+        Self::counting(" frames", quiet)
+    }
+
+    /// The same for work that counts fits and holds no file open: Ctrl-C ends it at once.
+    pub fn of_fits(quiet: bool) -> Self {
+        Self::counting("", quiet)
+    }
+
+    fn counting(unit: &'static str, quiet: bool) -> Self {
+        Self { bar: Mutex::new(ProgressBar::hidden()), quiet, unit }
     }
 
     fn with(&self, f: impl FnOnce(&mut ProgressBar)) {
@@ -49,10 +60,10 @@ impl Progress for Bar {
         let target = if self.quiet { ProgressDrawTarget::hidden() } else { ProgressDrawTarget::stderr() };
         let new = ProgressBar::with_draw_target(total, target);
         let template = match total {
-            Some(_) => "{prefix:>10} {wide_bar} {pos}/{len} frames, {per_sec}, {eta} left",
-            None => "{prefix:>10} {spinner} {pos} frames, {per_sec}",
+            Some(_) => format!("{{prefix:>11}} {{wide_bar}} {{pos}}/{{len}}{}, {{per_sec}}, {{eta}} left", self.unit),
+            None => format!("{{prefix:>11}} {{spinner}} {{pos}}{}, {{per_sec}}", self.unit),
         };
-        if let Ok(style) = ProgressStyle::with_template(template) {
+        if let Ok(style) = ProgressStyle::with_template(&template) {
             new.set_style(style);
         }
         new.set_prefix(stage);

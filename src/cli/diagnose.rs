@@ -91,7 +91,7 @@ impl DiagnoseArgs {
         let records = super::recordings(&self.angles, marks, (self.from, self.until))?;
         let json = self.json.as_deref().map(OutputFile::create).transpose()?;
         let figure = self.figure.as_deref().map(OutputFile::create).transpose()?;
-        let bar = Bar::new(self.quiet);
+        let bar = Bar::of_fits(self.quiet);
         let prepared = diagnose::prepare(&records, &experiment)?;
         let diagnosis = diagnose::diagnose(&prepared, &experiment, &self.options(), &bar)?;
         drop(bar);

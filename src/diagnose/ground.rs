@@ -14,10 +14,6 @@ use crate::model::observe::chord_angles_rad;
 
 /// A yield angle of the joint's hysteresis to start from, as a part of the largest bend.
 const YIELD_SHARE: f64 = 0.2;
-/// Steps of the integration for each second of the recording before a motion is given up.
-const STEPS_EACH_SECOND: f64 = 300.0;
-/// A motion is given up where it turns this many times as far as the recording, and a turn's sixth.
-const RUNAWAY: f64 = 5.0;
 /// A fit from short stretches goes on where its first steps lead below this multiple of the base model's χ².
 const BEYOND_HOPE: f64 = 10.0;
 /// A dear hypothesis goes on where its first steps lead below this multiple of the base model's χ².
@@ -61,6 +57,11 @@ pub struct Hypothesis {
 }
 
 impl Hypothesis {
+    /// Whether its motion costs many times what others do.
+    pub fn is_dear(&self) -> bool {
+        self.causes.iter().any(|cause| matches!(cause, Cause::JointHysteretic | Cause::DistributedFlexibility))
+    }
+
     /// With one effect more.
     #[must_use]
     pub fn and(&self, cause: Cause, dropped: Option<(usize, f64)>) -> Self {
@@ -102,10 +103,7 @@ impl<'a> Ground<'a> {
             // no more is free at its start than in the rods it is compared with
             problem.further_shapes = 0;
         }
-        problem.accuracy.step_error_rad = self.step_error_rad;
-        problem.accuracy.most_angle_rad =
-            RUNAWAY * (1.0 + self.records.iter().map(Record::largest_angle_rad).fold(0.0, f64::max));
-        problem.accuracy.most_steps = 1000 + (STEPS_EACH_SECOND * self.longest_s()) as usize;
+        problem.accuracy = problem.accuracy_of(self.step_error_rad);
         if let Some((record, at_s)) = hypothesis.dropped {
             problem.dropped_at_s[record] = at_s;
         }
@@ -314,10 +312,6 @@ impl<'a> Ground<'a> {
     /// Whether the base model bends all along the strip.
     pub fn is_strip(&self) -> bool {
         self.base.contains(&Parameter::BendingStiffness)
-    }
-
-    fn longest_s(&self) -> f64 {
-        self.records.iter().map(|r| r.t_s[r.len() - 1] - r.t_s[0]).fold(0.0, f64::max)
     }
 
     /// Number of values.

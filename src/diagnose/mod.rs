@@ -100,8 +100,7 @@ pub struct Diagnosis<'a> {
 impl<'a> Diagnosis<'a> {
     /// The base model.
     pub fn null(&self) -> &Refit<'a> {
-        // every selection holds it
-        self.weighed.iter().find(|w| w.fit.hypothesis.causes.is_empty()).map_or(&self.weighed[0].fit, |w| &w.fit)
+        base_model(&self.weighed)
     }
 
     /// The part of what the base model leaves beyond the noise that the named fit explains.
@@ -225,7 +224,7 @@ pub fn diagnose<'a>(
     let (weighed, unknown, unknowns) = verdict::weigh(fits, ground.values(), causes.len(), |fit, variance| {
         (locate::unknowns(fit, variance, Beyond::TheFit), energy::added_torque_n_m(fit))
     });
-    let null = weighed.iter().find(|w| w.fit.hypothesis.causes.is_empty()).map_or(&weighed[0].fit, |w| &w.fit);
+    let null = base_model(&weighed);
     let best = &weighed[0].fit;
     let held_out = heldout::held_out(&ground, null, best, options.predict_from_s);
     let adequacy = adequacy::adequacy(&ground, null, &causes, options.bootstraps, progress);
@@ -242,6 +241,11 @@ pub fn diagnose<'a>(
         weighed,
         ground,
     })
+}
+
+/// The base model's fit, which every selection holds.
+fn base_model<'w, 'a>(weighed: &'w [Weighed<'a>]) -> &'w Refit<'a> {
+    weighed.iter().find(|w| w.fit.hypothesis.causes.is_empty()).map_or(&weighed[0].fit, |w| &w.fit)
 }
 
 /// Ground, effects and fits of all hypotheses.

@@ -5,7 +5,6 @@
 
 use rayon::prelude::*;
 
-use super::Cause;
 use super::ground::Ground;
 use super::refit::Refit;
 use crate::experiment::{Experiment, Model};
@@ -50,8 +49,7 @@ pub fn preferred(ground: &Ground<'_>, fits: &[Refit<'_>]) -> Option<usize> {
     let weights = Weights::of(ground, fits);
     let best = weights.best(fits)?;
     let within = |fit: &Refit<'_>| fit.hypothesis.causes.iter().all(|c| best.hypothesis.causes.contains(c));
-    let is_dear = |cause: &Cause| matches!(cause, Cause::JointHysteretic | Cause::DistributedFlexibility);
-    let simple = |fit: &Refit<'_>| fit.hypothesis.causes.len() < 2 && !fit.hypothesis.causes.iter().any(is_dear);
+    let simple = |fit: &Refit<'_>| fit.hypothesis.causes.len() < 2 && !fit.hypothesis.is_dear();
     let unexplained = weights.scatter > UNEXPLAINED;
     let compared: Vec<&Refit<'_>> = fits.iter().filter(|fit| within(fit) || unexplained && simple(fit)).collect();
     let others = TRIED.map(|pieces| with(ground.experiment, pieces));

@@ -102,9 +102,7 @@ fn from_the_best_single<'a>(ground: &Ground<'a>, fits: Vec<Refit<'a>>) -> Vec<Re
         return fits;
     }
     let again = |fit: &Refit<'a>| {
-        let dear =
-            fit.hypothesis.causes.iter().any(|c| matches!(c, Cause::JointHysteretic | Cause::DistributedFlexibility));
-        if dear || std::ptr::eq(fit, best) {
+        if fit.hypothesis.is_dear() || std::ptr::eq(fit, best) {
             return None;
         }
         elsewhere(ground, fit, &fit.hypothesis, best)

@@ -15,6 +15,11 @@ use crate::statistics::median;
 const FURTHER_RAD: f64 = 0.05;
 const FURTHER_RAD_S: f64 = 2.0;
 
+/// Steps of the integration for each second of a recording before a motion is given up.
+const STEPS_EACH_SECOND: f64 = 300.0;
+/// A motion is given up where it turns this many times as far as the recording, and a turn's sixth.
+const RUNAWAY: f64 = 5.0;
+
 /// A model with free parameters, and recordings of one specimen.
 ///
 /// The variables of a fit are the free parameters, then for each recording the angles between marks at its first row (of a strip also how much there is of
@@ -222,6 +227,18 @@ impl<'a> Problem<'a> {
     pub fn integrate_below_the_noise(&mut self) {
         let least = self.noise.iter().flat_map(|n| &n.sd_rad).copied().fold(f64::INFINITY, f64::min);
         self.accuracy.step_error_rad = (1e-3 * least).clamp(1e-10, 1e-6);
+    }
+
+    /// How exact motions are to be, and when one is given up: where it turns far beyond the recordings, or needs far more steps than a swing does.
+    pub fn accuracy_of(&self, step_error_rad: f64) -> Accuracy {
+        let longest_s = self.records.iter().map(|r| r.t_s[r.len() - 1] - r.t_s[0]).fold(0.0, f64::max);
+        let largest_rad = self.records.iter().map(Record::largest_angle_rad).fold(0.0, f64::max);
+        Accuracy {
+            step_error_rad,
+            most_steps: 1000 + (STEPS_EACH_SECOND * longest_s) as usize,
+            most_angle_rad: RUNAWAY * (1.0 + largest_rad),
+            ..Accuracy::default()
+        }
     }
 
     /// Sets the noise to what some residuals (in units of the present noise) say, robustly.

@@ -12,7 +12,7 @@ use super::descent::{Block, Descent};
 use super::predict::{Request, predict};
 use super::{Problem, Record};
 use crate::error::Result;
-use crate::model::{Accuracy, Camera};
+use crate::model::Camera;
 use crate::statistics::median;
 
 /// Standard deviations of the seams (in units of the noise), from loose to tight.
@@ -90,7 +90,7 @@ pub fn multiple_shooting(problem: &mut Problem<'_>) -> Result<Shot> {
     let mut lower = problem.lower();
     lower.truncate(free);
     lower.resize(x.len(), f64::NEG_INFINITY);
-    problem.accuracy = Accuracy { step_error_rad: 3e-6, ..Accuracy::default() };
+    problem.accuracy = problem.accuracy_of(3e-6);
     let mut left_by_stretches = Vec::new();
     for (round, seam) in SEAMS.iter().enumerate() {
         let descent = Descent { huber: 4.0, most_steps: STEPS_EACH, enough: 0.3, ..Descent::default() };
