@@ -301,7 +301,7 @@ fn p_is_spread_evenly_over_recordings_that_lack_nothing() {
     assert!((0.1..0.9).contains(&p_values[4]) && p_values[8] > 0.5, "{p_values:?}");
 }
 
-/// A table as `track` writes it, from angles without noise: marks 145 px apart, each with noise of its own, and drawn along the links by 0.15 px.
+/// A table as `track` writes it, from angles without noise: marks 145 px apart, each with noise of its own, and drawn along the links by 0.4 px.
 fn tracked(angles: &str) -> String {
     let mut random = StdRng::seed_from_u64(11);
     let normal = Normal::new(0.0, 0.025).unwrap();
@@ -319,7 +319,7 @@ fn tracked(angles: &str) -> String {
             if index > 0 {
                 at = [at[0] + 145.0 * above[0], at[1] + 145.0 * above[1]];
             }
-            marks.push([0, 1].map(|axis| at[axis] + 0.15 * (below[axis] - above[axis]) + noise()));
+            marks.push([0, 1].map(|axis| at[axis] + 0.4 * (below[axis] - above[axis]) + noise()));
         }
         let angle = |i: usize| (marks[i + 1][0] - marks[i][0]).atan2(marks[i + 1][1] - marks[i][1]);
         let pixels: Vec<String> = marks.iter().flatten().map(|v| format!("{v:.4}")).collect();
