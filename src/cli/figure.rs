@@ -73,11 +73,12 @@ impl<'a> Figure<'a> {
     pub fn of(diagnosis: &Diagnosis<'_>, prepared: &Prepared, experiment: &'a Experiment) -> Result<Self> {
         let (null, named) = (diagnosis.null(), diagnosis.named());
         let (model, _) = null.problem.model(0, &null.x[..null.problem.free.len()])?;
+        let ground = diagnosis.ground.plain();
         let not_drawn = || Error::Simulation { detail: "the fitted motion cannot be integrated to be drawn".into() };
         let alone = prepared.records.len() == 1;
         let border_s = diagnosis.held_out.as_ref().filter(|_| alone).map(|held_out| held_out.from_s);
         let left = |fit: &Refit<'_>, border_s: Option<f64>| match border_s {
-            Some(border_s) => predicted(&diagnosis.ground, fit, border_s),
+            Some(border_s) => predicted(&ground, fit, border_s),
             None => locate::residuals(fit, 0),
         };
         let both = |border_s| Some((left(null, border_s)?, left(named, border_s)?));

@@ -295,6 +295,13 @@ impl<'a> Ground<'a> {
         }
     }
 
+    /// The same without errors in step with the swing: a prediction is held against what was seen, whoever erred.
+    #[must_use]
+    pub fn plain(&self) -> Self {
+        let noise = self.noise.iter().map(|noise| RecordNoise { in_step: 0.0, ..noise.clone() }).collect();
+        Self { noise, ..self.clone() }
+    }
+
     /// Largest measured difference of two neighbouring angles; of one link the largest angle.
     pub fn largest_bend_rad(&self) -> f64 {
         let of = |record: &Record| {

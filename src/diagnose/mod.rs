@@ -226,7 +226,7 @@ pub fn diagnose<'a>(
     });
     let null = base_model(&weighed);
     let best = &weighed[0].fit;
-    let held_out = heldout::held_out(&ground, null, best, options.predict_from_s);
+    let held_out = heldout::held_out(&ground.plain(), null, best, options.predict_from_s);
     let adequacy = adequacy::adequacy(&ground, null, &causes, options.bootstraps, progress);
     Ok(Diagnosis {
         verdict: Verdict::of(&weighed, unknown, marks, held_out.as_ref()),

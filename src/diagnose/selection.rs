@@ -171,7 +171,7 @@ pub(super) fn with_refined_noise<'a>(ground: &mut Ground<'a>, fits: Vec<Refit<'a
     fits.into_par_iter().with_max_len(1).map(again).collect()
 }
 
-/// The same fits beside the errors in step with the swing that a tracked angle may have, each gone on from where it is.
+/// The same fits beside the errors in step with the swing that a tracked angle may have; those that are near the noise go on from where they are.
 fn with_errors_in_step<'a>(ground: &mut Ground<'a>, fits: Vec<Refit<'a>>) -> Vec<Refit<'a>> {
     for (noise, record) in ground.noise.iter_mut().zip(ground.records) {
         noise.in_step = record.in_step;
@@ -181,7 +181,7 @@ fn with_errors_in_step<'a>(ground: &mut Ground<'a>, fits: Vec<Refit<'a>>) -> Vec
     }
     let least = fits.iter().map(|fit| fit.chi2).fold(f64::INFINITY, f64::min);
     let again = |fit: Refit<'a>| {
-        let worth = fit.hypothesis.causes.is_empty() || fit.chi2 < HOPELESS * (least + HOPELESS);
+        let worth = fit.chi2 < HOPELESS * (least + HOPELESS);
         ground.again(&fit, if worth { ground::FEW_STEPS } else { 0 }).unwrap_or(fit)
     };
     fits.into_par_iter().with_max_len(1).map(again).collect()
