@@ -66,11 +66,16 @@ impl Folder {
     }
 
     fn swing_of(&self, base: &str, effects: &str, seed: u32) -> PathBuf {
+        self.simulated(base, effects, &["--duration", "15", "--noise-rad", "1e-3", "--seed", &seed.to_string()])
+    }
+
+    fn simulated(&self, base: &str, effects: &str, options: &[&str]) -> PathBuf {
         let heading = if base.contains("[model.effects]") { "" } else { "[model.effects]\n" };
         let config = self.write("simulated.toml", &format!("{base}{heading}{effects}"));
         let out = self.path("angles.csv");
         freeswing("simulate")
-            .args(["--duration", "15", "--rate", "30", "--noise-rad", "1e-3", "--seed", &seed.to_string()])
+            .args(["--rate", "30"])
+            .args(options)
             .arg("--config")
             .arg(config)
             .arg("--out")
@@ -332,15 +337,7 @@ fn tracked(angles: &str) -> String {
 fn what_a_tracker_does_in_step_with_the_swing_is_not_blamed_on_physics() {
     let folder = Folder::new();
     let base = BASE.replace("0.62", "0.9");
-    let config = folder.write("simulated.toml", &base);
-    let exact = folder.path("exact.csv");
-    freeswing("simulate")
-        .args(["--duration", "25", "--rate", "30", "--config"])
-        .arg(config)
-        .arg("--out")
-        .arg(&exact)
-        .assert()
-        .success();
+    let exact = folder.simulated(&base, "", &["--duration", "25"]);
     let table = tracked(&fs::read_to_string(exact).unwrap());
     let angles = folder.write("tracked.csv", &table);
     let known = folder.diagnosis(&angles, &base, &[]);
@@ -351,4 +348,28 @@ fn what_a_tracker_does_in_step_with_the_swing_is_not_blamed_on_physics() {
     let alone = folder.write("alone.csv", &table.replace("m1_x_px", "elsewhere"));
     let unknown = folder.diagnosis(&alone, &base, &[]);
     assert_ne!(unknown["verdict"]["status"], "adequate", "{:#}", unknown["verdict"]);
+}
+
+#[test]
+fn a_swing_that_stops_is_followed_though_no_derivative_tells_where() {
+    let folder = Folder::new();
+    let base = "
+[specimen]
+mass_kg = 1.1e-3
+length_m = 0.284
+width_m = 0.057
+link_lengths_m = [0.284]
+[model]
+release_rad = [-0.83]
+[model.effects]
+hinge_viscous = 6.2e-7
+";
+    let effects = "hinge_coulomb = 8.5e-6\nadded_mass = 7.0e-5\n";
+    let angles = folder.simulated(base, effects, &["--duration", "35", "--noise-rad", "1.7e-3"]);
+    let report = folder.diagnosis(&angles, base, &[]);
+    let best = &report["candidates"][0];
+    assert!(names(&best["effects"]).contains(&"hinge_coulomb"), "{best:#}");
+    let friction_n_m = best["parameters"]["hinge_coulomb"]["value"].as_f64().unwrap();
+    assert!((friction_n_m / 8.5e-6 - 1.0).abs() < 0.03, "{friction_n_m}");
+    assert!(report["verdict"]["unknown_probability"].as_f64().unwrap() < 0.2, "{:#}", report["verdict"]);
 }

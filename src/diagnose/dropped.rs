@@ -111,7 +111,7 @@ fn squares(problem: &Problem<'_>, record: usize, x: &[f64]) -> Option<Vec<f64>> 
     let mut squares = vec![0.0; data.len()];
     for value in problem.predict(record, x, false).ok()?.values {
         if let Some(measured_rad) = data.theta_rad[value.link][value.row] {
-            let sd_rad = problem.noise[record].sd_rad[value.link] * data.relative_sd[value.link][value.row];
+            let sd_rad = problem.sd_rad(record, value.link, value.row);
             squares[value.row] += ((measured_rad - value.predicted_rad) / sd_rad).powi(2);
         }
     }

@@ -190,7 +190,7 @@ impl<'g, 'a> Screen<'g, 'a> {
                 .values
                 .iter()
                 .map(|v| {
-                    let sd = problem.noise[record].sd_rad[v.link] * data.relative_sd[v.link][v.row];
+                    let sd = problem.sd_rad(record, v.link, v.row);
                     (data.t_s[v.row], v.rate_rad_s / sd)
                 })
                 .collect();

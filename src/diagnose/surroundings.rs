@@ -63,7 +63,7 @@ impl Surroundings {
         let gain = 1.0 + fit.value(Parameter::AngleGain).unwrap_or(0.0);
         let mut rows: Vec<Row> = true_s.iter().map(|t| row(chain, &swing, *t, gain)).collect();
         for value in &prediction.values {
-            let sd_rad = problem.noise[record].sd_rad[value.link] * data.relative_sd[value.link][value.row];
+            let sd_rad = problem.sd_rad(record, value.link, value.row);
             let row = &mut rows[value.row];
             row.left_rad[value.link] = data.theta_rad[value.link][value.row].map(|m| m - value.predicted_rad);
             row.sd_rad[value.link] = sd_rad;

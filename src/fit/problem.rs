@@ -229,6 +229,11 @@ impl<'a> Problem<'a> {
         self.accuracy.step_error_rad = (1e-3 * least).clamp(1e-10, 1e-6);
     }
 
+    /// Standard deviation of the noise of one value.
+    pub fn sd_rad(&self, record: usize, link: usize, row: usize) -> f64 {
+        self.noise[record].sd_rad[link] * self.records[record].relative_sd[link][row]
+    }
+
     /// How exact motions are to be, and when one is given up: where it turns far beyond the recordings, or needs far more steps than a swing does.
     pub fn accuracy_of(&self, step_error_rad: f64) -> Accuracy {
         let longest_s = self.records.iter().map(|r| r.t_s[r.len() - 1] - r.t_s[0]).fold(0.0, f64::max);

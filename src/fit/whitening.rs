@@ -68,9 +68,8 @@ impl Whitening {
     /// Of some values of a recording, link after link.
     pub fn of(problem: &Problem<'_>, record: usize, values: &[Value]) -> Self {
         let data = &problem.records[record];
-        let sd_rad = |v: &Value| problem.noise[record].sd_rad[v.link] * data.relative_sd[v.link][v.row];
         let mut whitening = Self {
-            weights: values.iter().map(|v| 1.0 / sd_rad(v)).collect(),
+            weights: values.iter().map(|v| 1.0 / problem.sd_rad(record, v.link, v.row)).collect(),
             foretold: foretold(problem, record, values),
             beside: beside(data, values),
             across: problem.noise[record].across,
