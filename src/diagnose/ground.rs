@@ -103,7 +103,7 @@ impl<'a> Ground<'a> {
             // no more is free at its start than in the rods it is compared with
             problem.further_shapes = 0;
         }
-        problem.accuracy = problem.accuracy_of(self.step_error_rad);
+        problem.accuracy = problem.accuracy_of(problem.longest_s(), self.step_error_rad);
         if let Some((record, at_s)) = hypothesis.dropped {
             problem.dropped_at_s[record] = at_s;
         }

@@ -226,7 +226,7 @@ impl<'a> Problem<'a> {
     /// Sets the accuracy of the integration to a thousandth of the least noise.
     pub fn integrate_below_the_noise(&mut self) {
         let least = self.noise.iter().flat_map(|n| &n.sd_rad).copied().fold(f64::INFINITY, f64::min);
-        self.accuracy.step_error_rad = (1e-3 * least).clamp(1e-10, 1e-6);
+        self.accuracy = Accuracy { step_error_rad: (1e-3 * least).clamp(1e-10, 1e-6), ..Accuracy::default() };
     }
 
     /// Standard deviation of the noise of one value.
@@ -234,9 +234,13 @@ impl<'a> Problem<'a> {
         self.noise[record].sd_rad[link] * self.records[record].relative_sd[link][row]
     }
 
-    /// How exact motions are to be, and when one is given up: where it turns far beyond the recordings, or needs far more steps than a swing does.
-    pub fn accuracy_of(&self, step_error_rad: f64) -> Accuracy {
-        let longest_s = self.records.iter().map(|r| r.t_s[r.len() - 1] - r.t_s[0]).fold(0.0, f64::max);
+    /// The longest recording.
+    pub fn longest_s(&self) -> f64 {
+        self.records.iter().map(|r| r.t_s[r.len() - 1] - r.t_s[0]).fold(0.0, f64::max)
+    }
+
+    /// How exact motions of some length are to be, and when one is given up: where it turns far beyond the recordings, or needs far more steps than a swing.
+    pub fn accuracy_of(&self, longest_s: f64, step_error_rad: f64) -> Accuracy {
         let largest_rad = self.records.iter().map(Record::largest_angle_rad).fold(0.0, f64::max);
         Accuracy {
             step_error_rad,

@@ -90,7 +90,9 @@ pub fn multiple_shooting(problem: &mut Problem<'_>) -> Result<Shot> {
     let mut lower = problem.lower();
     lower.truncate(free);
     lower.resize(x.len(), f64::NEG_INFINITY);
-    problem.accuracy = problem.accuracy_of(3e-6);
+    let longest_s =
+        stretches.iter().map(|s| s.until_s - problem.records[s.record].t_s[s.rows.start]).fold(0.0, f64::max);
+    problem.accuracy = problem.accuracy_of(longest_s, 3e-6);
     let mut left_by_stretches = Vec::new();
     for (round, seam) in SEAMS.iter().enumerate() {
         let descent = Descent { huber: 4.0, most_steps: STEPS_EACH, enough: 0.3, ..Descent::default() };
