@@ -179,15 +179,11 @@ impl<'a> Ground<'a> {
         let x = multiple_shooting(&mut problem).ok()?.x;
         problem.noise.clone_from(&self.noise);
         problem.accuracy = accuracy;
-        self.if_hopeful(self.descend(hypothesis, problem, x, FIRST_STEPS)?, known)
-    }
-
-    /// Goes on with a fit that has begun where its first steps have led below a multiple of `known`.
-    pub fn if_hopeful(&self, begun: Refit<'a>, known: f64) -> Option<Refit<'a>> {
-        match begun.converged || !(begun.chi2 < BEYOND_HOPE * known) {
-            true => Some(begun),
-            false => self.again(&begun, FEW_STEPS - FIRST_STEPS),
+        let begun = self.descend(hypothesis, problem, x, FIRST_STEPS)?;
+        if !begun.converged && begun.chi2 < BEYOND_HOPE * known {
+            return self.again(&begun, FEW_STEPS - FIRST_STEPS);
         }
+        Some(begun)
     }
 
     /// The same hypothesis with the noise as it is known now.

@@ -5,8 +5,8 @@
 //! seen    left = ∂(angle)/∂θ δθ (+ u) + e + Φb + white noise
 //! ```
 //!
-//! e is the noise of each angle where that is correlated from row to row, or from angle to angle (then there is next to no white noise), Φb what a tracked angle may err in step with
-//! the swing ([`crate::fit::whitening`]); a smooth torque must not be blamed for them.
+//! e is the noise of each angle where that is correlated from row to row, or from angle to angle (then there is next to no white noise), Φb what a tracked
+//! angle may err in step with the swing ([`crate::fit::whitening`]); a smooth torque must not be blamed for them.
 //!
 //! The initial state and the base parameters are free as in the fit itself (their prior is wide), so that u holds only what they cannot absorb.
 //! `ln L(σ) − ln L(0)` says how much the recording asks for it.

@@ -39,9 +39,11 @@ pub struct Noise {
 /// How far the noise of two angles goes together: the correlation of their residuals at frequencies at which neither swings; zero where that is no more
 /// than chance, or where they swing nearly everywhere. Each is given as its residual and its motion.
 pub fn across([first, second]: [(&[f64], &[f64]); 2]) -> f64 {
-    let (Some(one), Some(other)) = (between_lines(first), between_lines(second)) else { return 0.0 };
-    let free: Vec<usize> = one.into_iter().filter(|k| other.binary_search(k).is_ok()).collect();
     let (a, b) = (transform(first.0), transform(second.0));
+    let (Some(one), Some(other)) = (between_lines(&power(&a), first.1), between_lines(&power(&b), second.1)) else {
+        return 0.0;
+    };
+    let free: Vec<usize> = one.into_iter().filter(|k| other.binary_search(k).is_ok()).collect();
     let (mut both, mut powers) = (0.0, [0.0; 2]);
     for k in &free {
         both += (a[*k] * b[*k].conj()).re;
@@ -55,7 +57,7 @@ pub fn across([first, second]: [(&[f64], &[f64]); 2]) -> f64 {
 pub fn off_the_lines(residual: &[f64], motion: &[f64]) -> Option<Noise> {
     let noise = spectrum(residual);
     let present = residual.iter().filter(|r| **r != 0.0).count() as f64 / residual.len() as f64;
-    let free = between_lines((residual, motion))?;
+    let free = between_lines(&noise, motion)?;
     let count = free.len() as f64;
     let shape = |rho: f64, k: usize| {
         let angle = std::f64::consts::PI * k as f64 / (noise.len() - 1) as f64;
@@ -73,9 +75,9 @@ pub fn off_the_lines(residual: &[f64], motion: &[f64]) -> Option<Noise> {
     Some(Noise { sd: (variance / present).sqrt(), rho })
 }
 
-/// The frequencies at which neither the motion has power nor the residual a line of its own, in order; `None` where few are left.
-fn between_lines((residual, motion): (&[f64], &[f64])) -> Option<Vec<usize>> {
-    let (noise, lines) = (spectrum(residual), spectrum(motion));
+/// The frequencies at which neither the motion has power nor the residual, of whose spectrum this is, a line of its own, in order; `None` where few are left.
+fn between_lines(noise: &[f64], motion: &[f64]) -> Option<Vec<usize>> {
+    let lines = spectrum(motion);
     let strongest = lines.iter().copied().fold(0.0, f64::max);
     let of_motion = |k: usize| {
         lines[k.saturating_sub(BINS)..(k + BINS + 1).min(lines.len())].iter().any(|p| *p > MOTION * strongest)
@@ -101,7 +103,11 @@ pub fn of_all(residual: &[f64]) -> Noise {
 
 /// Power of each frequency from zero to half the rate, scaled so that white noise has its variance.
 pub(super) fn spectrum(values: &[f64]) -> Vec<f64> {
-    transform(values).iter().map(Complex::norm_sqr).collect()
+    power(&transform(values))
+}
+
+fn power(transformed: &[Complex<f64>]) -> Vec<f64> {
+    transformed.iter().map(Complex::norm_sqr).collect()
 }
 
 /// The transform of windowed values, on the scale of [`spectrum`].

@@ -32,11 +32,7 @@ pub fn second_look<'a>(
     seeds.sort_by(|a, b| a.chi2.total_cmp(&b.chi2));
     seeds.truncate(SEEDS);
     progress.begin("second look", Some((seeds.len() * causes.len()) as u64));
-    let pairs: Vec<Refit<'a>> = seeds
-        .iter()
-        .flat_map(|seed| beside(ground, seed, causes, progress))
-        .filter(|pair| pair.chi2.is_finite())
-        .collect();
+    let pairs: Vec<Refit<'a>> = seeds.iter().flat_map(|seed| beside(ground, seed, causes, progress)).collect();
     let all = merged(fits, pairs);
     let all = from_the_first_part(ground, all);
     selection::with_refined_noise(ground, all)

@@ -191,7 +191,7 @@ fn with_errors_in_step<'a>(ground: &mut Ground<'a>, fits: Vec<Refit<'a>>) -> Vec
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Lacks {
     /// χ² from which on a fit leaves more than noise.
-    pub too_much: f64,
+    too_much: f64,
     /// It leaves more than noise.
     pub unexplained: bool,
     /// Its motion has lost step with a recording.

@@ -57,7 +57,7 @@ pub struct Whitening {
     weights: Vec<f64>,
     /// What the value before foretells; zero where nothing.
     foretold: Vec<f64>,
-    /// The value of the angle above at the same row.
+    /// The value of the angle above at the same row; of no use where κ is zero.
     beside: Vec<Option<usize>>,
     across: f64,
     /// Ψ and λ.
@@ -71,7 +71,7 @@ impl Whitening {
         let mut whitening = Self {
             weights: values.iter().map(|v| 1.0 / problem.sd_rad(record, v.link, v.row)).collect(),
             foretold: foretold(problem, record, values),
-            beside: beside(data, values),
+            beside: if problem.noise[record].across != 0.0 { beside(data, values) } else { Vec::new() },
             across: problem.noise[record].across,
             in_step: None,
         };
@@ -150,7 +150,7 @@ fn foretold(problem: &Problem<'_>, record: usize, values: &[Value]) -> Vec<f64> 
         return foretold;
     }
     let step_s = median_step_s(t_s).unwrap_or(1.0);
-    for (foretold, pair) in foretold[1..].iter_mut().zip(values.windows(2)) {
+    for (foretold, pair) in foretold.iter_mut().skip(1).zip(values.windows(2)) {
         if pair[0].link == pair[1].link {
             let steps = (t_s[pair[1].row] - t_s[pair[0].row]) / step_s;
             *foretold = colour[pair[1].link].powf(steps);
