@@ -227,6 +227,45 @@ fn one_link_is_diagnosed_alone_and_together_with_another_recording_of_it() {
     assert!(left("augmented_rmse_rad") < 0.5 * left("baseline_rmse_rad"), "{}", report["heldout"]);
 }
 
+/// A link that runs into something soft at its hinge beyond 0.3 rad, by the fourth-order method of Runge and Kutta: t_s, theta1_rad.
+fn with_a_soft_stop() -> String {
+    let (inertia_kg_m2, weight_n_m, damper) = (0.1 * 0.66 * 0.66 + 1e-5, 0.1 * 9.80665 * 0.66, 1e-3);
+    let acceleration = |theta: f64, rate: f64| {
+        let beyond_rad = theta - theta.clamp(-0.3, 0.3);
+        (-weight_n_m * theta.sin() - damper * rate - 0.15 * beyond_rad) / inertia_kg_m2
+    };
+    let (mut state, step_s) = ([0.6, 0.0], 1.0 / 600.0);
+    let mut random = StdRng::seed_from_u64(1);
+    let noise = Normal::new(0.0, 1e-3).unwrap();
+    let mut table = "t_s,theta1_rad\n".to_owned();
+    for row in 0..450 {
+        table += &format!("{:.6},{:.9}\n", f64::from(row) / 30.0, state[0] + noise.sample(&mut random));
+        for _ in 0..20 {
+            let slope = |s: [f64; 2]| [s[1], acceleration(s[0], s[1])];
+            let along = |k: [f64; 2], part: f64| [state[0] + part * step_s * k[0], state[1] + part * step_s * k[1]];
+            let a = slope(state);
+            let b = slope(along(a, 0.5));
+            let c = slope(along(b, 0.5));
+            let d = slope(along(c, 1.0));
+            state = [0, 1].map(|i| state[i] + step_s / 6.0 * (a[i] + 2.0 * b[i] + 2.0 * c[i] + d[i]));
+        }
+    }
+    table
+}
+
+#[test]
+fn a_law_that_is_not_in_the_table_is_unknown_and_found_at_its_place() {
+    let folder = Folder::new();
+    let angles = folder.write("angles.csv", &with_a_soft_stop());
+    let report = folder.diagnosis(&angles, ONE_LINK, &[]);
+    assert_eq!(report["verdict"]["status"], "unknown", "{:#}", report["verdict"]);
+    assert!(names(&report["verdict"]["effects"]).is_empty());
+    assert_eq!(report["where"]["place"], "hinge", "{:#}", report["where"]);
+    // it follows the angle, so that a handful of numbers says more than any course in time
+    let unknown = &report["where"]["unknown"];
+    assert_eq!((&unknown[0]["place"], &unknown[0]["form"]), (&"hinge".into(), &"law".into()), "{unknown:#}");
+}
+
 #[test]
 fn one_thread_and_two_write_the_same_bytes() {
     let folder = Folder::new();

@@ -292,16 +292,6 @@ impl Report<'_> {
         }
     }
 
-    fn place(&self) -> Option<Place> {
-        match self.diagnosis.verdict.status {
-            Status::Adequate => None,
-            Status::Unknown if self.diagnosis.unknowns.first().is_some_and(|u| u.gain > 0.0) => {
-                self.diagnosis.unknowns.first().map(|u| u.place)
-            }
-            _ => self.diagnosis.main_effect().map(Cause::place),
-        }
-    }
-
     fn phase(&self) -> Option<Phase> {
         match self.diagnosis.verdict.status {
             Status::Adequate => None,
@@ -315,7 +305,7 @@ impl Report<'_> {
 
     fn where_statement(&self) -> String {
         let departure = &self.diagnosis.departure;
-        let Some(place) = self.place() else { return String::new() };
+        let Some(place) = self.diagnosis.place() else { return String::new() };
         let mut statement = match place {
             Place::Hinge => "It acts at the hinge",
             Place::Joint => "It acts in the joint",
@@ -363,13 +353,14 @@ impl Report<'_> {
                 "parameters": parameters_json(null, &null.problem.free),
                 "rmse_rad": rmse_rad(null),
                 "noise_rad": diagnosis.ground.noise[0].sd_rad,
-                "noise_correlation": diagnosis.ground.noise[0].rho,
+                "noise_correlation": diagnosis.ground.noise[0].colour.iter().map(|c| c.rho).collect::<Vec<_>>(),
+                "noise_share_correlated": diagnosis.ground.noise[0].colour.iter().map(|c| c.share).collect::<Vec<_>>(),
                 "noise_correlation_across": diagnosis.ground.noise[0].across,
                 "adequate": verdict.status == Status::Adequate,
                 "p_value": diagnosis.p_value,
             },
             "where": {
-                "place": self.place().map(Place::id),
+                "place": self.diagnosis.place().map(Place::id),
                 "energy_share": shares,
                 "time_s": departure.time_s,
                 "amplitude_rad": departure.amplitude_rad,
@@ -381,7 +372,7 @@ impl Report<'_> {
                     "frequency_hz": m.frequency_hz, "energy_share": m.energy_share,
                 })),
                 "named_torque_n_m": diagnosis.added_torque_n_m,
-                "unknown": diagnosis.unknowns.iter().map(|u| json!({"place": u.place.id(), "size": u.size, "log_likelihood_gain": u.gain, "tried": u.tried})).collect::<Vec<_>>(),
+                "unknown": diagnosis.unknowns.iter().map(|u| json!({"place": u.place().id(), "form": u.form.id(), "size": u.size, "log_likelihood_gain": u.gain, "tried": u.tried})).collect::<Vec<_>>(),
             },
             "candidates": diagnosis.weighed.iter().take(WRITTEN).map(candidate_json).collect::<Vec<_>>(),
             "verdict": {

@@ -52,7 +52,7 @@ impl Scatter {
     pub fn of(fit: &Refit<'_>, values: usize) -> Self {
         let excess = fit.chi2 / values as f64 - 1.0;
         let Some((left, _)) = (excess > 0.0).then(|| fit.linearised()).flatten() else { return Self::NOISE };
-        let rho = noise::of_all(left.as_slice()).rho.clamp(0.0, 0.99);
+        let rho = noise::of_all(left.as_slice()).colour.rho.clamp(0.0, 0.99);
         Self { of_values: 1.0 + excess, of_all: 1.0 + excess * (1.0 + rho) / (1.0 - rho) }
     }
 }

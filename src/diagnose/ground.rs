@@ -20,6 +20,8 @@ const BEYOND_HOPE: f64 = 10.0;
 pub(super) const HOPEFUL: f64 = 1.2;
 /// Rods between two marks while bending all along the strip is only a candidate.
 const CANDIDATE_PIECES: usize = 3;
+/// Noise that is learnt again from a better fit is at most this many times as large.
+const GROWS: f64 = 1.5;
 /// Losses imitate each other closely: only a weakly damped step goes along the valley between them.
 const FIRST_DAMPING: f64 = 1e-8;
 /// Steps of a dear hypothesis before it is known to be worth any, of a first descent, and of one that is worth it.
@@ -45,6 +47,9 @@ pub struct Ground<'a> {
     pub step_error_rad: f64,
     /// Where the base model's descent began: parameters and starts that short stretches led to. Empty where that is not known.
     pub begun: Vec<f64>,
+    /// Whether a strip that bends everywhere has as many rods, and may start in as many shapes, as one that is the base model: it is dear, and worth it where
+    /// such a strip is the answer ([`super::fine_strip`]).
+    pub fine_strip: bool,
 }
 
 /// The base model with some effects.
@@ -84,7 +89,9 @@ impl<'a> Ground<'a> {
         for cause in &hypothesis.causes {
             if *cause == Cause::DistributedFlexibility {
                 free.retain(|p| *p != Parameter::JointStiffness);
-                experiment.model.pieces = CANDIDATE_PIECES;
+                if !self.fine_strip {
+                    experiment.model.pieces = CANDIDATE_PIECES;
+                }
                 let lengths_m = experiment.specimen.lengths_m();
                 let mark_m = lengths_m.iter().sum::<f64>() / lengths_m.len() as f64;
                 experiment.model.effects.distributed_flexibility = Some(experiment.model.k_eq_n_m_per_rad * mark_m);
@@ -99,7 +106,7 @@ impl<'a> Ground<'a> {
         let mut problem = Problem::new(self.records, &experiment, &free)?;
         problem.noise.clone_from(&self.noise);
         problem.beliefs = beliefs;
-        if hypothesis.causes.contains(&Cause::DistributedFlexibility) {
+        if hypothesis.causes.contains(&Cause::DistributedFlexibility) && !self.fine_strip {
             // no more is free at its start than in the rods it is compared with
             problem.further_shapes = 0;
         }
@@ -164,7 +171,7 @@ impl<'a> Ground<'a> {
         }
         let lower = problem.lower();
         x.iter_mut().zip(&lower).for_each(|(x, low)| *x = x.max(*low));
-        x.extend_from_slice(&near.x[near.problem.free.len()..]);
+        x.extend(problem.starts_from(&near.problem, &near.x));
         Some((problem, x))
     }
 
@@ -202,26 +209,33 @@ impl<'a> Ground<'a> {
             let Ok(prediction) = by.problem.predict(record, &by.x, false) else { return false };
             let Some((model, swing, true_s)) = by.motion(record) else { return false };
             let data = &self.records[record];
-            let chords: Vec<Vec<f64>> =
-                true_s.iter().map(|t| chord_angles_rad(model.chain(), &swing.at(*t).theta_rad)).collect();
-            let mut angles = vec![(vec![0.0; data.len()], Vec::new()); data.links()];
+            let ticks = noise::ticks(&data.t_s);
+            // the motion's own lines, without what a jump of the stamps would make of them
+            let last = data.len() - 1;
+            let tick_s = (true_s[last] - true_s[0]) / ticks[last] as f64;
+            let chords: Vec<Vec<f64>> = (0..=ticks[last])
+                .map(|k| chord_angles_rad(model.chain(), &swing.at(true_s[0] + tick_s * k as f64).theta_rad))
+                .collect();
+            let mut angles = vec![(vec![0.0; chords.len()], Vec::new()); data.links()];
             for value in &prediction.values {
                 let measured_rad = data.theta_rad[value.link][value.row].unwrap_or(value.predicted_rad);
-                angles[value.link].0[value.row] =
+                angles[value.link].0[ticks[value.row]] =
                     (measured_rad - value.predicted_rad) / data.relative_sd[value.link][value.row];
             }
             for (link, (left, motion)) in angles.iter_mut().enumerate() {
                 motion.extend(chords.iter().map(|chord| chord[link]));
-                let (known_rad, known_rho) = (&mut known.sd_rad[link], &mut known.rho[link]);
+                let (known_rad, known_colour) = (&mut known.sd_rad[link], &mut known.colour[link]);
                 let whole = noise::of_all(left);
                 let noise = match noise::off_the_lines(left, motion) {
+                    // a fit that has lost step leaves something at every frequency
+                    Some(noise) if !by.hypothesis.causes.is_empty() && noise.sd > GROWS * *known_rad => continue,
                     Some(noise) => noise,
                     // a motion with power everywhere, as one with a jump has: what is left at most
                     None if whole.sd < *known_rad => whole,
                     None => continue,
                 };
-                changed |= (noise.sd / *known_rad - 1.0).abs() > 0.03 || (noise.rho - *known_rho).abs() > 0.03;
-                (*known_rad, *known_rho) = (noise.sd, noise.rho);
+                changed |= (noise.sd / *known_rad - 1.0).abs() > 0.03 || noise.colour.differs_from(*known_colour);
+                (*known_rad, *known_colour) = (noise.sd, noise.colour);
             }
             if let [first, second] = &angles[..] {
                 let across = noise::across([first, second].map(|(left, motion)| (&left[..], &motion[..])));
@@ -288,6 +302,7 @@ impl<'a> Ground<'a> {
             noise: records.iter().map(|r| self.noise[place(r)].clone()).collect(),
             step_error_rad: self.step_error_rad,
             begun: Vec::new(),
+            fine_strip: self.fine_strip,
         }
     }
 

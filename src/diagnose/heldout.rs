@@ -58,8 +58,8 @@ fn across(ground: &Ground<'_>, null: &Refit<'_>, best: &Refit<'_>) -> Option<Hel
     let last = ground.records.len() - 1;
     let others = ground.on(&ground.records[..last]);
     let alone = ground.on(&ground.records[last..]);
-    let starts = 2 * null.problem.shapes();
     let predicted = |fit: &Refit<'_>| {
+        let starts = 2 * fit.problem.shapes();
         let hypothesis =
             Hypothesis { dropped: fit.hypothesis.dropped.filter(|d| d.0 < last), ..fit.hypothesis.clone() };
         let mut near = fit.clone();

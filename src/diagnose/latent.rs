@@ -5,8 +5,8 @@
 //! seen    left = ∂(angle)/∂θ δθ (+ u) + e + Φb + white noise
 //! ```
 //!
-//! e is the noise of each angle where that is correlated from row to row, or from angle to angle (then there is next to no white noise), Φb what a tracked
-//! angle may err in step with the swing ([`crate::fit::whitening`]); a smooth torque must not be blamed for them.
+//! e is what goes on from row to row of each angle's noise, Φb what a tracked angle may err in step with the swing ([`crate::fit::whitening`]); a smooth
+//! torque must not be blamed for them. White noise that two angles share is taken out of the second by what the first one shows of it.
 //!
 //! The initial state and the base parameters are free as in the fit itself (their prior is wide), so that u holds only what they cannot absorb.
 //! `ln L(σ) − ln L(0)` says how much the recording asks for it.
@@ -23,29 +23,75 @@ use nalgebra::{DMatrix, DVector};
 
 use super::Place;
 use super::refit::Refit;
-use super::surroundings::Surroundings;
-use crate::fit::whitening::{IN_STEP_SHAPES, RecordNoise, in_step_shapes};
+use super::surroundings::{Input, Surroundings};
+use crate::fit::whitening::{Colour, IN_STEP_SHAPES, RecordNoise, in_step_shapes};
 use crate::statistics::median_step_s;
 
 /// Standard deviations of the fitted state and parameters at which their prior stands.
 const WIDE: f64 = 300.0;
-/// White noise beside correlated noise, in units of that one's variance.
+/// Least white noise beside noise that goes on, in units of its variance.
 const WHITE: f64 = 1e-4;
 /// Sizes tried, a factor each.
 const SIZES: usize = 9;
 const SIZE_FACTOR: f64 = 3.0;
 
-/// An unknown torque (or offset) at a place.
+/// What is assumed of an unknown.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Form {
+    /// Any smooth course in time.
+    Course(Input),
+    /// Any law of the state at a place ([`super::any_law`]).
+    Law(Place),
+}
+
+impl Form {
+    /// Where it acts.
+    pub fn place(self) -> Place {
+        match self {
+            Self::Course(input) => input.place(),
+            Self::Law(place) => place,
+        }
+    }
+
+    /// The name in files.
+    pub fn id(self) -> &'static str {
+        match self {
+            Self::Course(_) => "course",
+            Self::Law(_) => "law",
+        }
+    }
+}
+
+/// An unknown torque (or offset).
 #[derive(Debug, Clone)]
 pub struct Latent {
-    /// Where.
-    pub place: Place,
+    /// What it is.
+    pub form: Form,
     /// Its standard deviation: N·m, or rad of the camera.
     pub size: f64,
     /// How much likelier it makes the recordings, in natural logarithm.
     pub gain: f64,
     /// (size, gain) of every size tried, in order of size.
     pub tried: Vec<(f64, f64)>,
+}
+
+impl Latent {
+    /// Of the size with the largest gain, of some (size, gain) beside nothing.
+    pub fn likeliest(form: Form, tried: impl Iterator<Item = (f64, f64)>) -> Self {
+        let tried: Vec<(f64, f64)> = std::iter::once((0.0, 0.0)).chain(tried).collect();
+        let (size, gain) = tried.iter().copied().max_by(|a, b| a.1.total_cmp(&b.1)).unwrap_or((0.0, 0.0));
+        Self { form, size, gain, tried }
+    }
+
+    /// Where it acts.
+    pub fn place(&self) -> Place {
+        self.form.place()
+    }
+}
+
+/// Sizes to try, up to a large one.
+pub fn sizes(typical: f64) -> [f64; SIZES] {
+    std::array::from_fn(|k| typical * SIZE_FACTOR.powi(k as i32 + 1 - SIZES as i32))
 }
 
 /// What the filter comes by.
@@ -64,7 +110,7 @@ struct Seen {
     gain: DVector<f64>,
 }
 
-/// The filter for one recording and place.
+/// The filter for one recording and input.
 pub struct Filter<'a> {
     around: &'a Surroundings,
     /// Of the noise, over what was thought.
@@ -73,7 +119,7 @@ pub struct Filter<'a> {
     noise: &'a RecordNoise,
     /// Errors in step that each angle may have, `[mark][row]`; none of an angle that was not tracked.
     in_step: Vec<Vec<[f64; IN_STEP_SHAPES]>>,
-    place: Place,
+    input: Input,
     /// From each row to the next, the noise included.
     transitions: Vec<DMatrix<f64>>,
     memory_s: f64,
@@ -92,19 +138,37 @@ pub enum Beyond {
     TheBaseModel,
 }
 
+/// What is assumed of an unknown of any course.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Assumed {
+    /// What it has to account for.
+    pub beyond: Beyond,
+    /// T, in units of the time in which the swing goes on by a radian.
+    pub memory: f64,
+}
+
+impl Assumed {
+    /// One that goes with the swing, beside a fit.
+    pub const BESIDE: Self = Self { beyond: Beyond::TheFit, memory: 1.0 };
+    /// All that a base model lacks: a gust or a knock as well, which are sudden.
+    pub const SUDDEN: Self = Self { beyond: Beyond::TheFit, memory: 0.3 };
+    /// The same around another fit, for its course.
+    pub const INSTEAD: Self = Self { beyond: Beyond::TheBaseModel, memory: 1.0 };
+}
+
 impl<'a> Filter<'a> {
-    /// For a recording of a fit.
+    /// For a recording of a fit, and what an unknown pushes at.
     pub fn new(
         fit: &'a Refit<'_>,
         record: usize,
         (around, variance): (&'a Surroundings, f64),
-        place: Place,
-        beyond: Beyond,
+        input: Input,
+        Assumed { beyond, memory }: Assumed,
     ) -> Option<Self> {
         let problem = &fit.problem;
         let (model, _) = problem.model(record, &fit.x[..problem.free.len()]).ok()?;
-        let memory_s = 1.0 / model.pace_rad_s();
-        let pattern = |k: usize| Some(around.pattern(model.chain(), place, k));
+        let memory_s = memory / model.pace_rad_s();
+        let pattern = |k: usize| DMatrix::from_columns(&[around.pattern(input, &around.rows[k].theta_rad)]);
         let mut transitions = around.transitions(memory_s, pattern);
         let sd = |i: usize| 1.0 / fit.normal[(i, i)].max(1e-300).sqrt();
         let (start, marks) = (problem.start_of(record), problem.marks());
@@ -131,12 +195,12 @@ impl<'a> Filter<'a> {
         for (transition, pair) in transitions.iter_mut().zip(around.t_s.windows(2)) {
             *transition = std::mem::take(transition).resize(total, total, 0.0);
             let first = around.state() + 1 + around.parameters;
-            for (of_noise, rho) in (first..).zip(&noise.rho) {
-                transition[(of_noise, of_noise)] = rho.powf((pair[1] - pair[0]) / step_s);
+            for (of_noise, colour) in (first..).zip(&noise.colour) {
+                transition[(of_noise, of_noise)] = colour.rho.powf((pair[1] - pair[0]) / step_s);
             }
             (first + marks..total).for_each(|of_step| transition[(of_step, of_step)] = 1.0);
         }
-        Some(Self { around, variance, noise, in_step, place, transitions, memory_s, begin, wide })
+        Some(Self { around, variance, noise, in_step, input, transitions, memory_s, begin, wide })
     }
 
     /// ln L up to a constant, for a standard deviation of the unknown.
@@ -188,14 +252,15 @@ impl<'a> Filter<'a> {
         course
     }
 
-    /// Adds what of a row's correlated noise the row before does not foretell.
+    /// Adds what is new at a row of the noise that goes on.
     fn add_noise(&self, k: usize, p: &mut DMatrix<f64>) {
-        if !self.noise.is_correlated() {
+        if self.noise.is_white() {
             return;
         }
         let fresh = |(mark, place): (usize, usize)| {
             let rho = if k > 0 { self.transitions[k - 1][(place, place)] } else { 0.0 };
-            self.around.rows[k].sd_rad[mark] * (self.variance * (1.0 - rho * rho)).sqrt()
+            let Colour { share, .. } = self.noise.colour[mark];
+            self.around.rows[k].sd_rad[mark] * (self.variance * share * (1.0 - rho * rho)).sqrt()
         };
         let sd_rad: Vec<f64> = self.of_noise().enumerate().map(fresh).collect();
         for (mark, place) in self.of_noise().enumerate() {
@@ -211,7 +276,7 @@ impl<'a> Filter<'a> {
     /// Where the noise of each angle stands in the state.
     fn of_noise(&self) -> std::ops::Range<usize> {
         let first = self.around.state() + 1 + self.around.parameters;
-        first..first + self.noise.rho.len()
+        first..first + self.noise.colour.len()
     }
 
     /// Runs the filter; `hear` gets all that it comes by.
@@ -223,9 +288,6 @@ impl<'a> Filter<'a> {
         p[(input, input)] = size * size;
         let mut moved = DMatrix::zeros(total, total);
         let (mut slopes, mut gain) = (DVector::zeros(total), DVector::zeros(total));
-        if self.place == Place::Camera {
-            slopes[input] = 1.0;
-        }
         for k in 0..self.around.rows.len() {
             if k > 0 {
                 let transition = &self.transitions[k - 1];
@@ -238,34 +300,54 @@ impl<'a> Filter<'a> {
             self.add_noise(k, &mut p);
             hear(Stage::Row(&z, &p));
             let row = &self.around.rows[k];
+            let mut beside: Option<(f64, DVector<f64>, f64)> = None;
             for (mark, left) in row.left_rad.iter().enumerate() {
-                let Some(left) = left else { continue };
+                let Some(mut left) = *left else {
+                    beside = None;
+                    continue;
+                };
                 (0..n).for_each(|i| slopes[i] = row.observed[(mark, i)]);
+                if self.input == Input::Camera {
+                    slopes[input] = 1.0;
+                }
                 self.of_noise().enumerate().for_each(|(of, i)| slopes[i] = f64::from(u8::from(of == mark)));
                 for (of, shapes) in self.in_step.iter().enumerate() {
                     let first = self.of_noise().end + of * IN_STEP_SHAPES;
                     let own = if of == mark { shapes[k] } else { [0.0; IN_STEP_SHAPES] };
                     slopes.rows_mut(first, IN_STEP_SHAPES).copy_from_slice(&own);
                 }
+                let mut white_rad = self.white_sd_rad(k, mark);
+                if self.noise.across != 0.0 {
+                    let own = (left, slopes.clone(), white_rad);
+                    if let Some((other, of_other, other_rad)) = &beside {
+                        let shared = self.noise.across * white_rad / other_rad;
+                        left -= shared * other;
+                        slopes.axpy(-shared, of_other, 1.0);
+                        white_rad *= (1.0 - self.noise.across * self.noise.across).sqrt();
+                    }
+                    beside = Some(own);
+                }
                 p.mul_to(&slopes, &mut gain);
-                let white = if self.noise.is_correlated() { WHITE } else { 1.0 };
-                let variance = white * self.variance * row.sd_rad[mark].powi(2) + slopes.dot(&gain);
+                let variance = white_rad * white_rad + slopes.dot(&gain);
                 let innovation = left - slopes.dot(&z);
                 hear(Stage::Value { slopes: &slopes, innovation, variance, gain: &gain });
                 z.axpy(innovation / variance, &gain, 1.0);
                 p.ger(-1.0 / variance, &gain, &gain, 1.0);
+                slopes.fill(0.0);
             }
         }
     }
+
+    /// Of the white noise of a mark at a row.
+    fn white_sd_rad(&self, k: usize, mark: usize) -> f64 {
+        let white = (1.0 - self.noise.colour[mark].share).max(WHITE);
+        (white * self.variance).sqrt() * self.around.rows[k].sd_rad[mark]
+    }
 }
 
-/// The unknown at a place, of the size that makes the recordings likeliest. `typical` is a large size: gravity's torque, or the noise.
-pub fn likeliest(filters: &[Filter<'_>], place: Place, typical: f64) -> Latent {
+/// The unknown with any course, of the size that makes the recordings likeliest. `typical` is a large size: gravity's torque, or the noise.
+pub fn likeliest(filters: &[Filter<'_>], input: Input, typical: f64) -> Latent {
     let nothing: f64 = filters.iter().map(|f| f.log_likelihood(0.0)).sum();
     let gain = |size: f64| -> f64 { filters.iter().map(|f| f.log_likelihood(size)).sum::<f64>() - nothing };
-    let mut tried: Vec<(f64, f64)> = vec![(0.0, 0.0)];
-    let least = typical * SIZE_FACTOR.powi(-(SIZES as i32));
-    tried.extend((1..=SIZES).map(|k| least * SIZE_FACTOR.powi(k as i32)).map(|size| (size, gain(size))));
-    let (size, gain) = tried.iter().copied().max_by(|a, b| a.1.total_cmp(&b.1)).unwrap_or((0.0, 0.0));
-    Latent { place, size, gain, tried }
+    Latent::likeliest(Form::Course(input), sizes(typical).into_iter().map(|size| (size, gain(size))))
 }

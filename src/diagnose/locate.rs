@@ -2,9 +2,10 @@
 
 use rayon::prelude::*;
 
-use super::latent::{Beyond, Filter, Latent, likeliest};
+use super::any_law::any_laws;
+use super::latent::{Assumed, Beyond, Filter, Latent, likeliest, sizes};
 use super::refit::Refit;
-use super::surroundings::Surroundings;
+use super::surroundings::{Input, Surroundings};
 use super::torque::Phase;
 use super::{Cause, Place, noise};
 use crate::fit::{Record, Residuals, Verdict, residuals_of};
@@ -12,27 +13,27 @@ use crate::model::observe::chord_angles_rad;
 
 /// Power of the motion at a frequency, over its largest, from which on a torque of that frequency is in step with it.
 const IN_STEP: f64 = 1e-5;
-/// Places of an unknown.
-const PLACES: [Place; 4] = [Place::Hinge, Place::Joint, Place::Air, Place::Camera];
+/// Places are told from one another by this much in ln-likelihood.
+const TOLD: f64 = 3.0;
 
-/// The unknown at each place around a fit, likeliest first; `variance` scales that of the noise.
-pub fn unknowns(fit: &Refit<'_>, variance: f64, beyond: Beyond) -> Vec<Latent> {
+/// The unknown of each form and at each place around a fit, likeliest first; `variance` scales that of the noise.
+pub fn unknowns(fit: &Refit<'_>, variance: f64, assumed: Assumed) -> Vec<Latent> {
     let records = 0..fit.problem.records.len();
     let around: Option<Vec<Surroundings>> = records.map(|record| Surroundings::of(fit, record)).collect();
     let Some(around) = around else { return Vec::new() };
-    let places = PLACES.into_iter().filter(|p| *p != Place::Joint || fit.problem.marks() > 1);
-    let mut unknowns: Vec<Latent> = places
-        .collect::<Vec<_>>()
-        .into_par_iter()
-        .filter_map(|place| {
-            let filters: Option<Vec<Filter<'_>>> = around
-                .iter()
-                .enumerate()
-                .map(|(record, a)| Filter::new(fit, record, (a, variance), place, beyond))
-                .collect();
-            Some(likeliest(&filters?, place, typical(fit, place)))
-        })
-        .collect();
+    let inputs = Input::ALL.into_par_iter().filter(|input| *input != Input::Joint || fit.problem.marks() > 1);
+    let course = |input: Input| {
+        let filters: Option<Vec<Filter<'_>>> = around
+            .iter()
+            .enumerate()
+            .map(|(record, a)| Filter::new(fit, record, (a, variance), input, assumed))
+            .collect();
+        Some(likeliest(&filters?, input, typical(fit, input.place())))
+    };
+    let mut unknowns: Vec<Latent> = inputs.filter_map(course).collect();
+    if assumed.beyond == Beyond::TheFit {
+        unknowns.extend(any_laws(fit, &around, variance, &sizes(typical(fit, Place::Hinge))));
+    }
     unknowns.sort_by(|a, b| b.gain.total_cmp(&a.gain));
     unknowns
 }
@@ -63,6 +64,15 @@ pub fn is_in_step(null: &Refit<'_>, frequency_hz: f64) -> bool {
             power[near.start.min(power.len())..near.end].iter().any(|p| *p > IN_STEP * strongest)
         })
     })
+}
+
+/// Where what a base model lacks would act, whatever it is: where the unknown around it makes the recordings likeliest, or nearly so if that is where the
+/// nearest of the named effects acts.
+pub fn place_of_all(null: &Refit<'_>, of_nearest: Option<Place>) -> Option<Place> {
+    let unknowns = unknowns(null, 1.0, Assumed::SUDDEN);
+    let likeliest = unknowns.first().filter(|likeliest| likeliest.gain > 0.0)?;
+    let is_as_likely = |place: &Place| unknowns.iter().any(|u| u.place() == *place && u.gain > likeliest.gain - TOLD);
+    of_nearest.filter(is_as_likely).or_else(|| Some(likeliest.place()))
 }
 
 /// What a fit leaves of a recording.

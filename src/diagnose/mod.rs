@@ -11,10 +11,12 @@
 //! | [`pieces`] | how many rods stand for a strip |
 //! | [`screen`] | which would lower the residuals |
 //! | [`selection`] | which are fitted in full |
+//! | [`fine_strip`] | a strip that bends everywhere, as finely as it needs |
 //! | [`second_look`] | from further starts, where much is left |
 //! | [`evidence`] | how probable each is |
 //! | [`surroundings`] | what a small torque would have done |
-//! | [`latent`] | the unknown torque |
+//! | [`latent`] | the unknown torque, of any course |
+//! | [`any_law`] | the same, as a law of any form |
 //! | [`torque`] | its course |
 //! | [`energy`] | the work of the laws |
 //! | [`locate`] | place, time, amplitude, phase |
@@ -24,10 +26,12 @@
 //! | [`plan`] | the same before an experiment |
 
 pub mod adequacy;
+pub mod any_law;
 pub mod cause;
 pub mod dropped;
 pub mod energy;
 pub mod evidence;
+pub mod fine_strip;
 pub mod ground;
 pub mod heldout;
 pub mod hysteresis;
@@ -49,7 +53,7 @@ use std::sync::OnceLock;
 use crate::error::{Error, Result};
 use crate::experiment::Experiment;
 use crate::fit::shooting::multiple_shooting;
-use crate::fit::whitening::RecordNoise;
+use crate::fit::whitening::{Colour, RecordNoise};
 use crate::fit::{Belief, Problem, Record, base_parameters};
 use crate::model::{ForwardModel, Parameter};
 use crate::progress::Progress;
@@ -58,7 +62,7 @@ pub use adequacy::Detectable;
 pub use cause::{Cause, Place};
 pub use ground::{Ground, Hypothesis};
 pub use heldout::HeldOut;
-pub use latent::{Beyond, Latent};
+pub use latent::{Assumed, Beyond, Form, Latent};
 pub use locate::Departure;
 pub use plan::{Plan, planned};
 pub use refit::Refit;
@@ -83,7 +87,9 @@ pub struct Diagnosis<'a> {
     pub verdict: Verdict,
     /// Where and when the base model departs.
     pub departure: Departure,
-    /// The torque that the base model lacks, at the place where it explains most.
+    /// Where the unknown acts, where it is at least as likely as any name.
+    pub unknown_at: Option<Place>,
+    /// The torque that the base model lacks, there or where it explains most.
     pub missing_torque: Option<MissingTorque>,
     /// Share of hinge, joint and air in the energy lost, by the likeliest model.
     pub energy_shares: [f64; 3],
@@ -110,14 +116,17 @@ impl<'a> Diagnosis<'a> {
         1.0 - beyond(self.named()) / beyond(self.null()).max(1.0)
     }
 
-    /// Of the effects named, the one that explains most: without which the fit would be worst.
+    /// Of the effects named, the one that explains most.
     pub fn main_effect(&self) -> Option<Cause> {
-        let causes = &self.named().hypothesis.causes;
-        let left_without = |cause: &Cause| {
-            let others: Vec<Cause> = causes.iter().copied().filter(|c| c != cause).collect();
-            self.weighed.iter().find(|w| w.fit.hypothesis.causes == others).map_or(f64::INFINITY, |w| w.fit.chi2)
-        };
-        causes.iter().copied().max_by(|a, b| left_without(a).total_cmp(&left_without(b)))
+        main_effect(&self.weighed, self.named())
+    }
+
+    /// Where what is missing acts.
+    pub fn place(&self) -> Option<Place> {
+        match self.verdict.status {
+            Status::Adequate => None,
+            _ => self.unknown_at.or_else(|| self.main_effect().map(Cause::place)),
+        }
     }
 
     /// The fit that the verdict names; the likeliest of the table where something else is at work; the base model where that is enough.
@@ -192,11 +201,11 @@ fn coloured(residuals: &[(usize, usize, f64)], white: &[RecordNoise]) -> Vec<Rec
         let r: Vec<f64> = residuals.iter().filter(|r| r.0 == record && r.1 == link).map(|r| r.2).collect();
         let power: f64 = r.iter().map(|v| v * v).sum();
         let rho = r.windows(2).map(|w| w[0] * w[1]).sum::<f64>() / power.max(1e-300);
-        if rho > COLOURED { (rho + 0.05).min(0.9) } else { 0.0 }
+        if rho > COLOURED { Colour { rho: (rho + 0.05).min(0.9), share: 1.0 } } else { Colour::default() }
     };
     let with_colour = |(record, white): (usize, &RecordNoise)| {
-        let rho = (0..white.sd_rad.len()).map(|link| of(record, link)).collect();
-        RecordNoise { rho, ..white.clone() }
+        let colour = (0..white.sd_rad.len()).map(|link| of(record, link)).collect();
+        RecordNoise { colour, ..white.clone() }
     };
     white.iter().enumerate().map(with_colour).collect()
 }
@@ -222,16 +231,20 @@ pub fn diagnose<'a>(
     let (ground, causes, fits) = found;
     let marks = prepared.records.first().map_or(0, Record::links);
     let (weighed, unknown, unknowns) = verdict::weigh(fits, ground.values(), causes.len(), |fit, variance| {
-        (locate::unknowns(fit, variance, Beyond::TheFit), energy::added_torque_n_m(fit))
+        (locate::unknowns(fit, variance, Assumed::BESIDE), energy::added_torque_n_m(fit))
     });
     let null = base_model(&weighed);
     let best = &weighed[0].fit;
     let held_out = heldout::held_out(&ground.plain(), null, best, options.predict_from_s);
     let adequacy = adequacy::adequacy(&ground, null, &causes, options.bootstraps, progress);
+    let verdict = Verdict::of(&weighed, unknown, marks, held_out.as_ref());
+    let of_nearest = main_effect(&weighed, best).map(Cause::place);
+    let unknown_at = if verdict.leaves_it_open() { locate::place_of_all(null, of_nearest) } else { None };
     Ok(Diagnosis {
-        verdict: Verdict::of(&weighed, unknown, marks, held_out.as_ref()),
+        verdict,
+        unknown_at,
         departure: locate::departure(null),
-        missing_torque: torque::missing(best, null),
+        missing_torque: torque::missing(best, null, unknown_at),
         added_torque_n_m: energy::added_torque_n_m(best),
         energy_shares: energy::energy_shares(best),
         p_value: adequacy.p_value,
@@ -246,6 +259,16 @@ pub fn diagnose<'a>(
 /// The base model's fit, which every selection holds.
 fn base_model<'w, 'a>(weighed: &'w [Weighed<'a>]) -> &'w Refit<'a> {
     weighed.iter().find(|w| w.fit.hypothesis.causes.is_empty()).map_or(&weighed[0].fit, |w| &w.fit)
+}
+
+/// Of a fit's effects, the one that explains most: without which it would be worst.
+fn main_effect(weighed: &[Weighed<'_>], fit: &Refit<'_>) -> Option<Cause> {
+    let causes = &fit.hypothesis.causes;
+    let left_without = |cause: &Cause| {
+        let others: Vec<Cause> = causes.iter().copied().filter(|c| c != cause).collect();
+        weighed.iter().find(|w| w.fit.hypothesis.causes == others).map_or(f64::INFINITY, |w| w.fit.chi2)
+    };
+    causes.iter().copied().max_by(|a, b| left_without(a).total_cmp(&left_without(b)))
 }
 
 /// Ground, effects and fits of all hypotheses.
@@ -264,6 +287,7 @@ fn fitted<'a>(prepared: &'a Prepared, experiment: &'a Experiment, progress: &dyn
         noise: prepared.noise.clone(),
         step_error_rad: prepared.step_error_rad,
         begun: prepared.x.clone(),
+        fine_strip: false,
     };
     let refused = || Error::Simulation {
         detail: "no motion near the start values follows the recording; check [specimen] and [model]".into(),

@@ -1,17 +1,18 @@
 //! The noise of a recording, from the frequencies at which the motion itself has no power.
 //!
 //! What a model lacks shows where the specimen swings: at its own frequencies and their combinations. Elsewhere the residual of even a poor fit is noise.
-//! Of its power there, after a Hann window, the noise's standard deviation and its correlation from row to row are found by Whittle's
-//! likelihood of a first-order autoregression:
+//! Of its power there, after a Hann window, the noise's standard deviation and how it goes on from row to row are found by Whittle's likelihood of a
+//! first-order autoregression beside white noise:
 //!
 //! ```text
-//! S(f) = σ²(1 − ρ²) / (1 + ρ² − 2ρ cos 2πfΔt)
+//! S(f) = σ²[1 − s + s (1 − ρ²)/(1 + ρ² − 2ρ cos 2πfΔt)]
 //! ```
 
 use rustfft::FftPlanner;
 use rustfft::num_complex::Complex;
 
-use crate::statistics::median;
+use crate::fit::whitening::Colour;
+use crate::statistics::{median, median_step_s};
 
 /// A frequency belongs to the motion where its power exceeds this part of the motion's largest…
 const MOTION: f64 = 1e-7;
@@ -19,10 +20,15 @@ const MOTION: f64 = 1e-7;
 const BINS: usize = 4;
 /// Part of the frequencies that has to be left.
 const ENOUGH: f64 = 0.15;
-/// Correlations tried.
-const RHO_STEPS: usize = 48;
-/// Less correlation than this is none: ln-likelihood it must gain.
+/// Times tried for which noise goes on, in rows: from the shortest by a factor each.
+const ROWS: (f64, f64, usize) = (0.3, 1.12, 48);
+/// Of noise that goes on the frequencies off the lines tell only a part: its variance is at most this multiple of the residual's.
+const MOST: f64 = 1.2;
+/// Shares of the variance tried that go on.
+const SHARES: usize = 20;
+/// Less than this is none: ln-likelihood that colour must gain, and white noise beside it.
 const COLOURED: f64 = 6.0;
+const BESIDE: f64 = 3.0;
 
 /// Two angles' noise goes together where their correlation is this many times what chance makes of it.
 const TOGETHER: f64 = 4.0;
@@ -32,8 +38,8 @@ const TOGETHER: f64 = 4.0;
 pub struct Noise {
     /// Standard deviation.
     pub sd: f64,
-    /// Correlation from row to row.
-    pub rho: f64,
+    /// How it goes on from row to row.
+    pub colour: Colour,
 }
 
 /// How far the noise of two angles goes together: the correlation of their residuals at frequencies at which neither swings; zero where that is no more
@@ -53,26 +59,58 @@ pub fn across([first, second]: [(&[f64], &[f64]); 2]) -> f64 {
     if together.abs() > TOGETHER / (free.len().max(1) as f64).sqrt() { together } else { 0.0 }
 }
 
+/// At which tick of an even clock each stamp is. Rows are missing where it skips some; where more would be missing than there are, each row is a tick.
+pub fn ticks(t_s: &[f64]) -> Vec<usize> {
+    let every_row = || (0..t_s.len()).collect();
+    let Some(step_s) = median_step_s(t_s) else { return every_row() };
+    let mut ticks: Vec<usize> = Vec::with_capacity(t_s.len());
+    for t in t_s {
+        let tick = ((t - t_s[0]) / step_s).round() as usize;
+        ticks.push(ticks.last().map_or(tick, |last| tick.max(last + 1)));
+    }
+    if ticks.last().is_some_and(|last| *last > 2 * t_s.len()) { every_row() } else { ticks }
+}
+
 /// The noise in a residual, given the motion it is the residual of; missing rows are zero in both. `None` where the motion has power nearly everywhere.
 pub fn off_the_lines(residual: &[f64], motion: &[f64]) -> Option<Noise> {
     let noise = spectrum(residual);
     let present = residual.iter().filter(|r| **r != 0.0).count() as f64 / residual.len() as f64;
     let free = between_lines(&noise, motion)?;
     let count = free.len() as f64;
-    let shape = |rho: f64, k: usize| {
-        let angle = std::f64::consts::PI * k as f64 / (noise.len() - 1) as f64;
-        (1.0 - rho * rho) / (1.0 + rho * rho - 2.0 * rho * angle.cos())
+    let cosines: Vec<f64> =
+        free.iter().map(|k| (std::f64::consts::PI * *k as f64 / (noise.len() - 1) as f64).cos()).collect();
+    // ln-likelihood and variance
+    let fitted = |Colour { rho, share }: Colour| {
+        let shape = |cosine: f64| 1.0 - share + share * (1.0 - rho * rho) / (1.0 + rho * rho - 2.0 * rho * cosine);
+        let (mut sum, mut ln) = (0.0, 0.0);
+        for (k, cosine) in free.iter().zip(&cosines) {
+            let shape = shape(*cosine);
+            sum += noise[*k] / shape;
+            ln += shape.ln();
+        }
+        let variance = sum / count;
+        (-ln - count * variance.ln(), variance)
     };
-    let fitted = |rho: f64| {
-        let variance = free.iter().map(|k| noise[*k] / shape(rho, *k)).sum::<f64>() / count;
-        let ln: f64 = free.iter().map(|k| shape(rho, *k).ln()).sum::<f64>() + count * variance.ln();
-        (-ln, variance)
+    // there is no more noise than there is residual
+    let most = MOST * residual.iter().map(|r| r * r).sum::<f64>() / residual.len() as f64;
+    let likeliest = |colours: &mut dyn Iterator<Item = Colour>| {
+        let fitted = colours.map(|colour| (colour, fitted(colour))).filter(|fitted| fitted.1.1 < most);
+        fitted.max_by(|a, b| a.1.0.total_cmp(&b.1.0))
     };
-    let (white, variance) = fitted(0.0);
-    let tried = (1..RHO_STEPS).map(|k| 0.02 * k as f64).map(|rho| (rho, fitted(rho)));
-    let (rho, (likelihood, coloured)) = tried.max_by(|a, b| a.1.0.total_cmp(&b.1.0))?;
-    let (rho, variance) = if likelihood > white + COLOURED { (rho, coloured) } else { (0.0, variance) };
-    Some(Noise { sd: (variance / present).sqrt(), rho })
+    let (shortest, factor, steps) = ROWS;
+    let rhos: Vec<f64> = (0..steps).map(|k| (-1.0 / (shortest * factor.powi(k as i32))).exp()).collect();
+    let mut best = (Colour::default(), fitted(Colour::default()));
+    let alone = likeliest(&mut rhos.iter().map(|rho| Colour { rho: *rho, share: 1.0 }));
+    if let Some(alone) = alone.filter(|alone| alone.1.0 > best.1.0 + COLOURED) {
+        best = alone;
+    }
+    let shares = (1..SHARES).map(|k| k as f64 / SHARES as f64);
+    let beside = likeliest(&mut shares.flat_map(|share| rhos.iter().map(move |rho| Colour { rho: *rho, share })));
+    let more = if best.0.is_white() { COLOURED } else { BESIDE };
+    if let Some(beside) = beside.filter(|beside| beside.1.0 > best.1.0 + more) {
+        best = beside;
+    }
+    Some(Noise { sd: (best.1.1 / present).sqrt(), colour: best.0 })
 }
 
 /// The frequencies at which neither the motion has power nor the residual, of whose spectrum this is, a line of its own, in order; `None` where few are left.
@@ -98,7 +136,8 @@ pub fn of_all(residual: &[f64]) -> Noise {
     let power: f64 = present.iter().map(|r| r * r).sum();
     let rho = present.windows(2).map(|pair| pair[0] * pair[1]).sum::<f64>() / power.max(1e-300);
     let told_from_none = 3.0 / (present.len().max(1) as f64).sqrt();
-    Noise { sd: (power / present.len().max(1) as f64).sqrt(), rho: if rho > told_from_none { rho } else { 0.0 } }
+    let colour = if rho > told_from_none { Colour { rho, share: 1.0 } } else { Colour::default() };
+    Noise { sd: (power / present.len().max(1) as f64).sqrt(), colour }
 }
 
 /// Power of each frequency from zero to half the rate, scaled so that white noise has its variance.
@@ -128,7 +167,7 @@ mod tests {
     use rand_distr::{Distribution, StandardNormal};
 
     /// A decaying swing, and a residual of noise with a misfit of the swing ten times as large.
-    fn case(rho: f64) -> Option<Noise> {
+    fn case(rho: f64, share: f64) -> Option<Noise> {
         let mut random = rand::rngs::StdRng::seed_from_u64(3);
         let swing = |i: usize, phase: f64| (-0.001 * i as f64).exp() * (0.28 * i as f64 + phase).sin();
         let mut noise = 0.0;
@@ -136,7 +175,8 @@ mod tests {
             .map(|i| {
                 let white: f64 = StandardNormal.sample(&mut random);
                 noise = rho * noise + (1.0 - rho * rho).sqrt() * white;
-                1e-3 * noise + 1e-2 * swing(i, 1.0)
+                let beside: f64 = StandardNormal.sample(&mut random);
+                1e-3 * (share.sqrt() * noise + (1.0 - share).sqrt() * beside) + 1e-2 * swing(i, 1.0)
             })
             .collect();
         let motion: Vec<f64> = (0..1800).map(|i| 0.5 * swing(i, 0.0)).collect();
@@ -145,8 +185,8 @@ mod tests {
 
     #[test]
     fn a_misfit_of_the_swing_is_not_taken_for_noise() {
-        let noise = case(0.0).unwrap();
-        assert!((noise.sd / 1e-3 - 1.0).abs() < 0.06 && noise.rho == 0.0, "{noise:?}");
+        let noise = case(0.0, 1.0).unwrap();
+        assert!((noise.sd / 1e-3 - 1.0).abs() < 0.06 && noise.colour.is_white(), "{noise:?}");
     }
 
     #[test]
@@ -166,8 +206,26 @@ mod tests {
     }
 
     #[test]
+    fn rows_that_are_missing_leave_their_ticks() {
+        let t_s = [10.0, 10.1, 10.2, 10.5, 10.61, 10.7];
+        assert_eq!(ticks(&t_s), [0, 1, 2, 5, 6, 7]);
+        assert_eq!(ticks(&[0.0, 0.1, 0.2, 9.0]), [0, 1, 2, 3]);
+    }
+
+    #[test]
     fn coloured_noise_is_told_from_white() {
-        let noise = case(0.6).unwrap();
-        assert!((noise.rho - 0.6).abs() < 0.08 && (noise.sd / 1e-3 - 1.0).abs() < 0.15, "{noise:?}");
+        let noise = case(0.6, 1.0).unwrap();
+        assert!(
+            (noise.colour.rho - 0.6).abs() < 0.1 && noise.colour.share > 0.7 && (noise.sd / 1e-3 - 1.0).abs() < 0.15,
+            "{noise:?}"
+        );
+    }
+
+    #[test]
+    fn white_noise_beside_coloured_noise_is_found() {
+        let noise = case(0.92, 0.6).unwrap();
+        let Colour { rho, share } = noise.colour;
+        assert!((rho - 0.92).abs() < 0.08 && (share - 0.6).abs() < 0.15, "{noise:?}");
+        assert!((noise.sd / 1e-3 - 1.0).abs() < 0.15, "{noise:?}");
     }
 }

@@ -39,6 +39,7 @@ pub fn planned(experiment: &Experiment, plan: &Plan) -> Result<Vec<Detectable>> 
         noise: vec![RecordNoise::white(vec![plan.noise_rad; marks])],
         step_error_rad: (1e-3 * plan.noise_rad).clamp(1e-10, 1e-6),
         begun: Vec::new(),
+        fine_strip: false,
     };
     let nothing = Hypothesis::default();
     let problem = ground.problem(&nothing)?;

@@ -242,10 +242,11 @@ impl<'g, 'a> Screen<'g, 'a> {
         for record in 0..records {
             let (model, _) = problem.model(record, &self.fit.x[..problem.free.len()]).ok()?;
             let surroundings = Surroundings::of(self.fit, record)?;
-            let chain = model.chain();
             let transitions = surroundings.transitions(f64::INFINITY, |k| {
                 let theta_rad = &surroundings.rows[k].theta_rad;
-                Some(DVector::from_fn(chain.count(), |i, _| -chain.static_moment_kg_m(i) * theta_rad[i].cos()))
+                DMatrix::from_fn(theta_rad.len(), 1, |i, _| {
+                    -surroundings.chain.static_moment_kg_m(i) * theta_rad[i].cos()
+                })
             });
             around.push((surroundings, transitions, model.pace_rad_s()));
         }
@@ -287,25 +288,16 @@ impl<'g, 'a> Screen<'g, 'a> {
         let rate = std::f64::consts::TAU * frequency_hz;
         let mut columns = DMatrix::zeros(self.projection.residual.len(), 2);
         let mut first = 0;
-        for (record, (surroundings, transitions, _)) in around.iter().enumerate() {
-            let data = &self.fit.problem.records[record];
+        for (surroundings, transitions, _) in around {
             // the pivot's acceleration for one metre of sine, and of cosine
-            let course = |t: f64| {
-                let (sin, cos) = (rate * t).sin_cos();
-                [-rate * rate * sin, -rate * rate * cos]
+            let course = |pair: &[f64]| {
+                let (sin, cos) = (rate * 0.5 * (pair[0] + pair[1])).sin_cos();
+                [[-rate * rate * sin, -rate * rate * cos]]
             };
-            let responses = surroundings.responses(transitions, course);
-            let seen = |mark: usize| {
-                let rows = (0..data.len()).filter(move |row| data.theta_rad[mark][*row].is_some());
-                rows.map(move |row| row * data.links() + mark)
-            };
-            let places: Vec<usize> = (0..data.links()).flat_map(seen).collect();
-            for c in 0..2 {
-                let mut column: Vec<f64> = places.iter().map(|place| responses[*place][c]).collect();
-                surroundings.whitening.whiten(&mut column);
-                columns.view_mut((first, c), (column.len(), 1)).copy_from_slice(&column);
-            }
-            first += places.len();
+            let held: Vec<[[f64; 2]; 1]> = surroundings.t_s.windows(2).map(course).collect();
+            let seen = surroundings.seen(&surroundings.responses(transitions, &held));
+            columns.rows_mut(first, seen.nrows()).copy_from(&seen);
+            first += seen.nrows();
         }
         columns
     }

@@ -14,8 +14,9 @@ use crate::progress::Progress;
 const SEEDS: usize = 2;
 /// The best fits, which are made anew from the first part of the recordings.
 const ANEW: usize = 4;
-/// That part.
+/// That part: of the rows, and while the swing is still this large a part of its largest.
 const FIRST_PART: f64 = 0.5;
+const STILL_SWINGS: f64 = 0.25;
 
 /// The fits, and better ones of the same hypotheses or of further pairs, where the best of them leaves more than noise.
 pub fn second_look<'a>(
@@ -28,18 +29,31 @@ pub fn second_look<'a>(
     if ground.is_strip() || !lacks.is_some_and(|lacks| lacks.unexplained) {
         return fits;
     }
-    let mut seeds: Vec<&Refit<'a>> = fits.iter().filter(|fit| fit.hypothesis.causes.len() == 1).collect();
+    let is_single = |fit: &Refit<'a>| fit.hypothesis.causes.len() == 1;
+    let fits = from_the_first_part(ground, fits, |fits| best(fits, SEEDS, is_single));
+    let mut seeds: Vec<&Refit<'a>> = fits.iter().filter(|fit| is_single(fit)).collect();
     seeds.sort_by(|a, b| a.chi2.total_cmp(&b.chi2));
     seeds.truncate(SEEDS);
     progress.begin("second look", Some((seeds.len() * causes.len()) as u64));
     let pairs: Vec<Refit<'a>> = seeds.iter().flat_map(|seed| beside(ground, seed, causes, progress)).collect();
     let all = merged(fits, pairs);
-    let all = from_the_first_part(ground, all);
+    let all = from_the_first_part(ground, all, |fits| {
+        let mut chosen = best(fits, ANEW, |_| true);
+        if ground.records.iter().any(comes_to_rest) {
+            chosen.extend(best(fits, fits.len(), |fit| fit.hypothesis.causes.contains(&Cause::HingeCoulomb)));
+        }
+        chosen
+    });
     selection::with_refined_noise(ground, all)
 }
 
 /// Every other effect beside a fit.
-fn beside<'a>(ground: &Ground<'a>, seed: &Refit<'a>, causes: &[Cause], progress: &dyn Progress) -> Vec<Refit<'a>> {
+pub(super) fn beside<'a>(
+    ground: &Ground<'a>,
+    seed: &Refit<'a>,
+    causes: &[Cause],
+    progress: &dyn Progress,
+) -> Vec<Refit<'a>> {
     let Some(screen) = Screen::at(ground, seed) else { return Vec::new() };
     let scores: Vec<Score> = screen.scores(causes);
     let lacks = Lacks::of(ground, seed, &scores);
@@ -65,21 +79,47 @@ fn merged<'a>(mut fits: Vec<Refit<'a>>, others: Vec<Refit<'a>>) -> Vec<Refit<'a>
     fits
 }
 
-/// The best fits anew from where the first part of each recording leads: when a dry hinge stops, and where, no derivative tells, and early on it has not.
-fn from_the_first_part<'a>(ground: &Ground<'a>, fits: Vec<Refit<'a>>) -> Vec<Refit<'a>> {
-    let early: Vec<Record> = ground.records.iter().map(|r| r.until((FIRST_PART * r.len() as f64) as usize)).collect();
+/// The best fits of a kind anew from where the first part of each recording leads: when a dry hinge stops, and where, no derivative tells, and early on it
+/// has not.
+fn from_the_first_part<'a>(
+    ground: &Ground<'a>,
+    fits: Vec<Refit<'a>>,
+    choose: impl Fn(&[Refit<'a>]) -> Vec<usize>,
+) -> Vec<Refit<'a>> {
+    let early: Vec<Record> = ground.records.iter().map(|r| r.until(first_part(r))).collect();
     if early.iter().any(|record| record.len() < crate::series::FEWEST_ROWS) {
         return fits;
     }
     let part = ground.on(&early);
-    let mut order: Vec<usize> = (0..fits.len()).collect();
-    order.sort_by(|a, b| fits[*a].chi2.total_cmp(&fits[*b].chi2));
-    order.truncate(ANEW);
+    let mut chosen = choose(&fits);
+    chosen.sort_unstable();
+    chosen.dedup();
     let again = |index: &usize| {
         let fit = &fits[*index];
         let x = part.refit(&fit.hypothesis, fit, &[])?.x;
         ground.descend_from(&fit.hypothesis, x, ground::MOST_STEPS)
     };
-    let others: Vec<Refit<'a>> = order.par_iter().with_max_len(1).filter_map(again).collect();
+    let others: Vec<Refit<'a>> = chosen.par_iter().with_max_len(1).filter_map(again).collect();
     merged(fits, others)
+}
+
+/// The best fits of a kind.
+fn best<'a>(fits: &[Refit<'a>], count: usize, is_meant: impl Fn(&Refit<'a>) -> bool) -> Vec<usize> {
+    let mut order: Vec<usize> = (0..fits.len()).filter(|i| is_meant(&fits[*i])).collect();
+    order.sort_by(|a, b| fits[*a].chi2.total_cmp(&fits[*b].chi2));
+    order.truncate(count);
+    order
+}
+
+/// Whether the swing has died away long before the recording ends.
+fn comes_to_rest(record: &Record) -> bool {
+    first_part(record) + 1 < (FIRST_PART * record.len() as f64) as usize
+}
+
+fn first_part(record: &Record) -> usize {
+    let still = STILL_SWINGS * record.largest_angle_rad();
+    let swings =
+        |row: usize| record.theta_rad.iter().any(|angles| angles[row].is_some_and(|angle| angle.abs() > still));
+    let last = (0..record.len()).rev().find(|row| swings(*row)).unwrap_or(0);
+    last.min((FIRST_PART * record.len() as f64) as usize)
 }

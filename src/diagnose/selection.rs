@@ -5,7 +5,7 @@ use rayon::prelude::*;
 use super::ground::{self, Ground, Hypothesis};
 use super::refit::{OUT_OF_STEP, Refit};
 use super::screen::{Score, Screen};
-use super::{Cause, dropped, hysteresis, second_look};
+use super::{Cause, dropped, fine_strip, hysteresis, second_look};
 use crate::model::Parameter;
 use crate::progress::Progress;
 
@@ -66,6 +66,7 @@ pub fn fits<'a>(ground: &mut Ground<'a>, null: Refit<'a>, causes: &[Cause], prog
     all.extend(pairs);
     let all = with_refined_noise(ground, all);
     let all = without_stragglers(ground, all);
+    let all = fine_strip::with_fine_strip(ground, all, causes, progress);
     let all = second_look::second_look(ground, all, causes, progress);
     with_errors_in_step(ground, all)
 }

@@ -16,9 +16,41 @@ use crate::fit::whitening::Whitening;
 use crate::model::observe::{chord_angles_rad, chord_slopes};
 use crate::model::{Chain, ForwardModel, Hinge, Motion, Parameter, Partials, Trajectory};
 
+/// What an unknown torque (or offset) pushes at.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Input {
+    /// The hinge.
+    Hinge,
+    /// The joint: a torque on the first link, and back on the last.
+    Joint,
+    /// The strip, from outside, the more the farther from the hinge, as a drag does.
+    Drag,
+    /// The strip, from outside, every piece by its mass, as light or a draught does; a pivot that is shaken as well.
+    Push,
+    /// The camera: an offset of every angle.
+    Camera,
+}
+
+impl Input {
+    /// Every one.
+    pub const ALL: [Self; 5] = [Self::Hinge, Self::Joint, Self::Drag, Self::Push, Self::Camera];
+
+    /// Where it acts.
+    pub fn place(self) -> Place {
+        match self {
+            Self::Hinge => Place::Hinge,
+            Self::Joint => Place::Joint,
+            Self::Drag | Self::Push => Place::Air,
+            Self::Camera => Place::Camera,
+        }
+    }
+}
+
 /// One recording's motion, linearised.
 #[derive(Debug, Clone)]
 pub struct Surroundings {
+    /// The links.
+    pub chain: Chain,
     /// Stamps of the rows.
     pub t_s: Vec<f64>,
     /// Links, and further rates of the laws.
@@ -30,7 +62,7 @@ pub struct Surroundings {
     /// At each row, what happens there.
     pub rows: Vec<Row>,
     /// Of the values seen, link after link.
-    pub whitening: Whitening,
+    whitening: Whitening,
     /// From each row to the next: d(δθ, δrate)/dt with δθ, δrate, then the parameters, then the torque on each rate's equation.
     flows: Vec<DMatrix<f64>>,
 }
@@ -70,6 +102,7 @@ impl Surroundings {
         }
         let flows = true_s.windows(2).map(|pair| flow(&model, &problem.free, &swing, 0.5 * (pair[0] + pair[1])));
         Some(Self {
+            chain: chain.clone(),
             flows: flows.collect::<Option<Vec<_>>>()?,
             t_s: true_s,
             links: chain.count(),
@@ -85,67 +118,78 @@ impl Surroundings {
         self.links + self.rates
     }
 
-    /// From each row to the next, in the order state, input, parameters. The input is a torque on the links that fades within `memory_s`
-    /// (an Ornstein–Uhlenbeck process; infinite where it is held); without a pattern there is none.
-    pub fn transitions(&self, memory_s: f64, pattern: impl Fn(usize) -> Option<DVector<f64>>) -> Vec<DMatrix<f64>> {
-        (0..self.flows.len()).map(|k| self.transition(k, pattern(k).as_ref(), memory_s)).collect()
+    /// From each row to the next, in the order state, inputs, parameters. Each column of `inputs` is a torque on the links that fades within `memory_s`
+    /// (an Ornstein–Uhlenbeck process; infinite where it is held).
+    pub fn transitions(&self, memory_s: f64, inputs: impl Fn(usize) -> DMatrix<f64>) -> Vec<DMatrix<f64>> {
+        (0..self.flows.len()).map(|k| self.transition(k, &inputs(k), memory_s)).collect()
     }
 
-    fn transition(&self, k: usize, pattern: Option<&DVector<f64>>, memory_s: f64) -> DMatrix<f64> {
-        let (state, inputs) = (self.state(), usize::from(pattern.is_some()));
-        let total = state + inputs + self.parameters;
+    fn transition(&self, k: usize, inputs: &DMatrix<f64>, memory_s: f64) -> DMatrix<f64> {
+        let (state, count) = (self.state(), inputs.ncols());
+        let total = state + count + self.parameters;
         let flow = &self.flows[k];
         let mut matrix = DMatrix::zeros(total, total);
         matrix.view_mut((0, 0), (state, state)).copy_from(&flow.columns(0, state));
-        matrix.view_mut((0, state + inputs), (state, self.parameters)).copy_from(&flow.columns(state, self.parameters));
-        if let Some(pattern) = pattern {
-            let torque = flow.columns(state + self.parameters, self.links) * pattern;
-            matrix.view_mut((0, state), (state, 1)).copy_from(&torque);
-            matrix[(state, state)] = -1.0 / memory_s;
-        }
+        matrix.view_mut((0, state + count), (state, self.parameters)).copy_from(&flow.columns(state, self.parameters));
+        let torques = flow.columns(state + self.parameters, self.links) * inputs;
+        matrix.view_mut((0, state), (state, count)).copy_from(&torques);
+        (state..state + count).for_each(|i| matrix[(i, i)] = -1.0 / memory_s);
         (matrix * (self.t_s[k + 1] - self.t_s[k])).exp()
     }
 
-    /// What inputs that follow two courses would add to the angles seen, row after row, mark after mark; `transitions` are those of a held
-    /// input.
-    pub fn responses(&self, transitions: &[DMatrix<f64>], course: impl Fn(f64) -> [f64; 2]) -> Vec<[f64; 2]> {
+    /// What inputs add to the angles, row after row, mark after mark, each following several courses; `held` is what they are between a row
+    /// and the next, of each input; `transitions` those of held inputs.
+    pub fn responses<const C: usize>(
+        &self,
+        transitions: &[DMatrix<f64>],
+        held: &[impl AsRef<[[f64; C]]>],
+    ) -> Vec<[f64; C]> {
         let (state, marks) = (self.state(), self.rows[0].observed.nrows());
-        let mut z = vec![[0.0; 2]; state];
+        let mut z = vec![[0.0; C]; state];
         let mut next = z.clone();
-        let mut seen = Vec::with_capacity(self.rows.len() * marks);
+        let mut all = Vec::with_capacity(self.rows.len() * marks);
         for (k, row) in self.rows.iter().enumerate() {
             if k > 0 {
-                let transition = &transitions[k - 1];
-                let input = course(0.5 * (self.t_s[k - 1] + self.t_s[k]));
+                let (transition, held) = (&transitions[k - 1], held[k - 1].as_ref());
                 for (i, next) in next.iter_mut().enumerate() {
-                    *next = input.map(|u| u * transition[(i, state)]);
-                    for (j, z) in z.iter().enumerate() {
-                        (0..2).for_each(|c| next[c] += transition[(i, j)] * z[c]);
+                    *next = [0.0; C];
+                    for (j, from) in z.iter().chain(held).enumerate() {
+                        (0..C).for_each(|c| next[c] += transition[(i, j)] * from[c]);
                     }
                 }
                 std::mem::swap(&mut z, &mut next);
             }
             for mark in 0..marks {
-                let angle = |c: usize| (0..self.links).map(|i| row.observed[(mark, i)] * z[i][c]).sum();
-                seen.push([angle(0), angle(1)]);
+                all.push(std::array::from_fn(|c| (0..self.links).map(|i| row.observed[(mark, i)] * z[i][c]).sum()));
             }
         }
-        seen
+        all
     }
 
-    /// The pattern of torques on the links of a unit input at a place, at row k.
-    pub fn pattern(&self, chain: &Chain, place: Place, k: usize) -> DVector<f64> {
-        let n = self.links;
+    /// Of responses those of the values seen, link after link, whitened; one column a course.
+    pub fn seen<const C: usize>(&self, responses: &[[f64; C]]) -> DMatrix<f64> {
+        let marks = self.rows[0].observed.nrows();
+        let of_mark = |mark: usize| {
+            let rows = (0..self.rows.len()).filter(move |row| self.rows[*row].left_rad[mark].is_some());
+            rows.map(move |row| row * marks + mark)
+        };
+        let values: Vec<usize> = (0..marks).flat_map(of_mark).collect();
+        let mut columns = DMatrix::from_fn(values.len(), C, |i, c| responses[values[i]][c]);
+        self.whitening.apply(&mut columns);
+        columns
+    }
+
+    /// The torques on the links of a unit input, where the links stand at these angles.
+    pub fn pattern(&self, input: Input, theta_rad: &[f64]) -> DVector<f64> {
+        let (n, chain) = (self.links, &self.chain);
         let mut pattern = DVector::zeros(n);
-        match place {
-            Place::Hinge => pattern[0] = 1.0,
-            Place::Joint => {
+        match input {
+            Input::Hinge => pattern[0] = 1.0,
+            Input::Joint => {
                 pattern[0] = 1.0;
                 pattern[n - 1] -= 1.0;
             }
-            Place::Air => {
-                // a push across the strip that grows with the distance from the hinge, as a drag does
-                let theta_rad = &self.rows[k].theta_rad;
+            Input::Drag => {
                 let mut above_m = 0.0;
                 for j in 0..n {
                     let length_m = chain.length_m(j);
@@ -156,10 +200,13 @@ impl Surroundings {
                     pattern[j] += length_m * length_m * (0.5 * above_m + length_m / 3.0);
                     above_m += length_m;
                 }
-                let size = pattern.norm();
-                pattern /= size;
+                pattern.normalize_mut();
             }
-            Place::Camera => {}
+            Input::Push => {
+                (0..n).for_each(|i| pattern[i] = chain.static_moment_kg_m(i) * theta_rad[i].cos());
+                pattern.normalize_mut();
+            }
+            Input::Camera => {}
         }
         pattern
     }

@@ -1,9 +1,9 @@
 //! The course of the torque that a model lacks, at the place where it explains most: what to add to the fitted motion, row by row, for the
 //! recording to follow.
 
-use super::latent::{Beyond, Filter, Latent};
+use super::latent::{Assumed, Filter, Form, Latent};
 use super::refit::Refit;
-use super::surroundings::Surroundings;
+use super::surroundings::{Input, Surroundings};
 use super::{Place, energy, locate, noise};
 
 /// A torque that works less than this part of what it could, with the angle or with its rate, has no phase.
@@ -51,31 +51,31 @@ impl Phase {
     }
 }
 
-/// The torque that the base model lacks, at the place where it explains most, in the recording that the base model reproduces worst; `fit` is the
+/// The torque that the base model lacks, at a place, or where it explains most, in the recording that the base model reproduces worst; `fit` is the
 /// likeliest one of the table, whose motion follows the recordings.
-pub fn missing(fit: &Refit<'_>, null: &Refit<'_>) -> Option<MissingTorque> {
+pub fn missing(fit: &Refit<'_>, null: &Refit<'_>, at: Option<Place>) -> Option<MissingTorque> {
     let values = fit.problem.records.iter().map(|r| r.values(0..r.len())).sum::<usize>() as f64;
     let variance = (fit.chi2 / values).max(1.0);
     let worst = |record: &usize| null.left_share_of(*record);
     let record = (0..fit.problem.records.len()).max_by(|a, b| worst(a).total_cmp(&worst(b)))?;
-    let unknowns = locate::unknowns(fit, variance, Beyond::TheBaseModel);
-    let likeliest = unknowns.first().filter(|u| u.gain > 0.0)?;
+    let unknowns = locate::unknowns(fit, variance, Assumed::INSTEAD);
+    let likeliest = unknowns.iter().find(|u| u.gain > 0.0 && at.is_none_or(|place| u.place() == place))?;
     MissingTorque::of(fit, record, likeliest, variance)
 }
 
 impl MissingTorque {
     /// Beside a fit, in one of its recordings; `variance` scales that of the noise.
     pub fn of(fit: &Refit<'_>, record: usize, unknown: &Latent, variance: f64) -> Option<Self> {
+        let Form::Course(input) = unknown.form else { return None };
         let around = Surroundings::of(fit, record)?;
-        let course =
-            Filter::new(fit, record, (&around, variance), unknown.place, Beyond::TheBaseModel)?.course(unknown.size);
+        let course = Filter::new(fit, record, (&around, variance), input, Assumed::INSTEAD)?.course(unknown.size);
         let rms = (course.iter().map(|c| c.0 * c.0).sum::<f64>() / course.len().max(1) as f64).sqrt();
         let torque: Vec<f64> = course.iter().map(|c| c.0).collect();
         let span_s = around.t_s.last()? - around.t_s.first()?;
         let power = noise::spectrum(&torque);
         let strongest = (1..power.len()).max_by(|a, b| power[*a].total_cmp(&power[*b]));
         let mut missing = Self {
-            place: unknown.place,
+            place: input.place(),
             record,
             rms,
             phase: None,
@@ -85,19 +85,18 @@ impl MissingTorque {
             t_s: around.t_s.clone(),
             course,
         };
-        if unknown.place != Place::Camera {
-            missing.work(fit, &around);
+        if input != Input::Camera {
+            missing.work(fit, &around, input);
         }
         Some(missing)
     }
 
     /// What it does with the angle and the rate that are conjugate to it.
-    fn work(&mut self, fit: &Refit<'_>, around: &Surroundings) {
-        let Ok((model, _)) = fit.problem.model(self.record, &fit.x[..fit.problem.free.len()]) else { return };
+    fn work(&mut self, fit: &Refit<'_>, around: &Surroundings, input: Input) {
         let (mut torque, mut angle, mut rate, mut with_angle, mut with_rate, mut taken_j) =
             (0.0, 0.0, 0.0, 0.0, 0.0, 0.0);
         for (k, row) in around.rows.iter().enumerate() {
-            let pattern = around.pattern(model.chain(), self.place, k);
+            let pattern = around.pattern(input, &row.theta_rad);
             let along = |values: &[f64]| pattern.iter().zip(values).map(|(p, v)| p * v).sum::<f64>();
             let (u, q, v) = (self.course[k].0, along(&row.theta_rad), along(&row.rate[..around.links]));
             self.works_on.push((q, v));

@@ -17,6 +17,8 @@ const IMITATED: f64 = 0.06;
 const TOLD_APART: f64 = 0.05;
 /// A named law may be wrong by this part of its own torque before something unknown is suspected beside it.
 const LAW_SHARE: f64 = 0.002;
+/// An offset of the camera that wanders may be noise of another colour than was learnt: it must gain this much more, in ln-likelihood.
+const COLOUR: f64 = 6.0;
 /// A support in step with the swing can be what it seems to be, or stand for a torque that is not known: the odds are about even.
 const IN_STEP: f64 = 0.6;
 /// The same beside a law of physics, where it gains less than this many standard deviations: three free numbers complete a law that is only nearly right, and
@@ -158,10 +160,10 @@ fn slow_errors_rad(fit: &Refit<'_>) -> f64 {
 fn unknown_gain(latents: &[Latent], added_n_m: f64, slow_errors_rad: f64) -> f64 {
     let within =
         |latent: &Latent, allowed: f64| latent.tried.iter().filter(|t| t.0 <= allowed).map(|t| t.1).fold(0.0, f64::max);
-    let is_camera = |latent: &&Latent| latent.place == Place::Camera;
+    let is_camera = |latent: &&Latent| latent.place() == Place::Camera;
     let wander = latents.iter().find(is_camera).map_or(0.0, |camera| within(camera, slow_errors_rad));
     let of = |latent: &Latent| {
-        let own = if is_camera(&latent) { 0.0 } else { within(latent, LAW_SHARE * added_n_m) };
+        let own = if is_camera(&latent) { COLOUR } else { within(latent, LAW_SHARE * added_n_m) };
         latent.gain - own.max(wander)
     };
     // any size is as likely as any other, at any place
@@ -195,6 +197,11 @@ impl Verdict {
             return nothing(Status::Adequate, adequate);
         }
         Self::naming(weighed, |w| w.probability, unknown, marks)
+    }
+
+    /// Whether something outside the table is at least as likely as the names that are given.
+    pub fn leaves_it_open(&self) -> bool {
+        self.status == Status::Unknown || self.unknown >= self.class_probability && self.status != Status::Adequate
     }
 
     /// The likeliest names and their class.

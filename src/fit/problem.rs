@@ -112,6 +112,12 @@ impl<'a> Problem<'a> {
         self.free.len() + record * 2 * self.shapes()
     }
 
+    /// The starts that variables of another problem hold, in the shapes of this one: what that one lacks is at rest.
+    pub fn starts_from(&self, other: &Problem<'_>, x: &[f64]) -> Vec<f64> {
+        let halves = x[other.free.len()..].chunks(other.shapes());
+        halves.flat_map(|half| (0..self.shapes()).map(|i| half.get(i).copied().unwrap_or(0.0))).collect()
+    }
+
     /// Angles between marks and their rates where a recording's motion starts.
     pub fn seen_start(&self, x: &[f64], record: usize) -> Vec<f64> {
         let (start, marks, shapes) = (self.start_of(record), self.marks(), self.shapes());

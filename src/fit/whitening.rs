@@ -1,12 +1,13 @@
 //! Residuals in units of their noise: divided by it, less what the noise before and beside foretells, and with errors in step with the swing discounted.
 //!
-//! A value's noise has the standard deviation σ and the correlation ρ from row to row, and that of the next angle goes with it by κ: the mark between
-//! them is seen once, so that what tilts one tilts the other back. Beside it a tracked angle has errors that come again whenever the
+//! A value's noise has the standard deviation σ. The share s of its variance goes on from row to row with the correlation ρ, the rest is white; what is
+//! new in it goes with that of the next angle by κ: the mark between them is seen once, so that what tilts one tilts the other back. Beside it a tracked angle has errors that come again whenever the
 //! specimen is where it was: what a mark stands on shifts it by a hundredth of a pixel, and turns with the strip. They are Φb, b normal of unit variance:
 //!
 //! ```text
 //! r ← r/σ                                       of every value
-//! r ← (r − ρ r_before)/√(1 − ρ²)                from row to row
+//! r ← (r − ρĉ)/√S,  ĉ ← ρĉ + K(r − ρĉ)          from row to row (ĉ: what goes on, as seen so far; S = P + 1 − s, K = P/S,
+//!                                               P ← ρ²(P − KP) + s(1 − ρ²), at first s)
 //! r ← (r − κ r_beside)/√(1 − κ²)                from angle to angle
 //! r ← (1 + ΦΦᵀ)^(−1/2) r                        Φ with its rows like r's
 //! Φ of an angle: share · σ · [1, u, u³, w]      u: the angle,  w: the next link's less it;  each of root mean square 1
@@ -25,13 +26,35 @@ use crate::statistics::median_step_s;
 /// Shapes of an error in step with the swing, of each angle.
 pub const IN_STEP_SHAPES: usize = 4;
 
+/// How noise goes on from row to row: a part of it as a first-order autoregression, beside white noise.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub struct Colour {
+    /// Correlation of that part from row to row.
+    pub rho: f64,
+    /// Its share of the variance.
+    pub share: f64,
+}
+
+impl Colour {
+    /// Whether no row says anything of the next.
+    pub fn is_white(self) -> bool {
+        self.rho * self.share == 0.0
+    }
+
+    /// Whether it makes a difference which of the two it is: in the variance that goes on, or for how long.
+    pub fn differs_from(self, other: Self) -> bool {
+        let first = |colour: Self| colour.rho * colour.share;
+        (first(self) - first(other)).abs() > 0.03 || first(self) > 0.0 && (self.rho - other.rho).abs() > 0.03
+    }
+}
+
 /// Noise of one recording's angles.
 #[derive(Debug, Clone, PartialEq)]
 pub struct RecordNoise {
     /// Standard deviation of each angle.
     pub sd_rad: Vec<f64>,
-    /// Correlation of each angle's noise from row to row (first-order autoregression).
-    pub rho: Vec<f64>,
+    /// How each angle's noise goes on from row to row.
+    pub colour: Vec<Colour>,
     /// Correlation of the noise of an angle and the next one's (κ), after that from row to row.
     pub across: f64,
     /// Errors in step with the swing that each angle may have, as a share of its noise.
@@ -41,13 +64,24 @@ pub struct RecordNoise {
 impl RecordNoise {
     /// White and independent.
     pub fn white(sd_rad: Vec<f64>) -> Self {
-        Self { rho: vec![0.0; sd_rad.len()], sd_rad, across: 0.0, in_step: 0.0 }
+        Self { colour: vec![Colour::default(); sd_rad.len()], sd_rad, across: 0.0, in_step: 0.0 }
     }
 
-    /// Whether a value foretells another.
-    pub fn is_correlated(&self) -> bool {
-        self.across != 0.0 || self.rho.iter().any(|rho| *rho > 0.0)
+    /// Whether every row is new.
+    pub fn is_white(&self) -> bool {
+        self.colour.iter().all(|colour| colour.is_white())
     }
+}
+
+/// A step of the filter for what goes on in a link's noise.
+#[derive(Debug, Clone, Copy)]
+struct Foretold {
+    /// ρ^(rows since the value before); zero at the first of a link.
+    fade: f64,
+    /// K.
+    gain: f64,
+    /// √S.
+    sd: f64,
 }
 
 /// What makes residuals of some rows of a recording independent and of unit variance.
@@ -55,8 +89,8 @@ impl RecordNoise {
 pub struct Whitening {
     /// 1/σ.
     weights: Vec<f64>,
-    /// What the value before foretells; zero where nothing.
-    foretold: Vec<f64>,
+    /// What the values before say of each; nothing where the noise is white.
+    foretold: Vec<Foretold>,
     /// The value of the angle above at the same row; of no use where κ is zero.
     beside: Vec<Option<usize>>,
     across: f64,
@@ -97,11 +131,12 @@ impl Whitening {
     /// Whitens one column.
     pub fn whiten(&self, column: &mut [f64]) {
         column.iter_mut().zip(&self.weights).for_each(|(value, weight)| *value *= weight);
-        for i in (1..column.len()).rev() {
-            let rho = self.foretold[i];
-            if rho > 0.0 {
-                column[i] = (column[i] - rho * column[i - 1]) / (1.0 - rho * rho).sqrt();
-            }
+        let mut goes_on = 0.0;
+        for (value, of) in column.iter_mut().zip(&self.foretold) {
+            goes_on *= of.fade;
+            let new = *value - goes_on;
+            goes_on += of.gain * new;
+            *value = new / of.sd;
         }
         if self.across != 0.0 {
             // the last angle first, so that those beside are as they were
@@ -124,9 +159,12 @@ impl Whitening {
                 }
             }
         }
-        for i in 1..column.len() {
-            let rho = self.foretold[i];
-            column[i] = (1.0 - rho * rho).sqrt() * column[i] + rho * column[i - 1];
+        let mut goes_on = 0.0;
+        for (value, of) in column.iter_mut().zip(&self.foretold) {
+            goes_on *= of.fade;
+            let new = of.sd * *value;
+            *value = goes_on + new;
+            goes_on += of.gain * new;
         }
         column.iter_mut().zip(&self.weights).for_each(|(value, weight)| *value /= weight);
     }
@@ -142,21 +180,27 @@ impl Whitening {
     }
 }
 
-/// ρ^(steps between the two rows) of each value and the one before it.
-fn foretold(problem: &Problem<'_>, record: usize, values: &[Value]) -> Vec<f64> {
-    let (colour, t_s) = (&problem.noise[record].rho, &problem.records[record].t_s);
-    let mut foretold = vec![0.0; values.len()];
-    if colour.iter().all(|rho| *rho == 0.0) {
-        return foretold;
+/// What the values before say of each.
+fn foretold(problem: &Problem<'_>, record: usize, values: &[Value]) -> Vec<Foretold> {
+    let (noise, t_s) = (&problem.noise[record], &problem.records[record].t_s);
+    if noise.is_white() {
+        return Vec::new();
     }
     let step_s = median_step_s(t_s).unwrap_or(1.0);
-    for (foretold, pair) in foretold.iter_mut().skip(1).zip(values.windows(2)) {
-        if pair[0].link == pair[1].link {
-            let steps = (t_s[pair[1].row] - t_s[pair[0].row]) / step_s;
-            *foretold = colour[pair[1].link].powf(steps);
-        }
-    }
-    foretold
+    let mut spread = 0.0;
+    let of = |i: usize| {
+        let Value { link, row, .. } = values[i];
+        let Colour { rho, share } = noise.colour[link];
+        let before = i.checked_sub(1).map(|before| &values[before]).filter(|before| before.link == link);
+        let fade = before.map_or(0.0, |before| rho.powf((t_s[row] - t_s[before.row]) / step_s));
+        // P before the value, S, K, and P after it
+        let expected = fade * fade * spread + share * (1.0 - fade * fade);
+        let variance = expected + 1.0 - share;
+        let gain = expected / variance;
+        spread = expected * (1.0 - gain);
+        Foretold { fade, gain, sd: variance.sqrt() }
+    };
+    (0..values.len()).map(of).collect()
 }
 
 /// Of each value, where the one of the angle above at the same row stands.
@@ -209,7 +253,8 @@ mod tests {
     fn whitened_errors_have_unit_variance_in_every_direction() {
         let records = [record()];
         let mut problem = Problem::new(&records, &Experiment::default(), &[]).unwrap();
-        let noise = RecordNoise { sd_rad: vec![1e-3, 2e-3], rho: vec![0.3, 0.0], across: -0.6, in_step: 0.25 };
+        let colour = vec![Colour { rho: 0.3, share: 1.0 }, Colour::default()];
+        let noise = RecordNoise { sd_rad: vec![1e-3, 2e-3], colour, across: -0.6, in_step: 0.25 };
         problem.noise = vec![noise.clone()];
         let values: Vec<Value> = (0..2)
             .flat_map(|link| (0..200).map(move |row| Value { link, row, predicted_rad: 0.0, rate_rad_s: 0.0 }))
@@ -226,7 +271,7 @@ mod tests {
             if a.link == b.link {
                 let (one, other) = (shapes[a.link][a.row], shapes[b.link][b.row]);
                 let in_step: f64 = one.iter().zip(&other).map(|(x, y)| x * y).sum();
-                return sizes * noise.rho[a.link].powi(steps) + in_step;
+                return sizes * noise.colour[a.link].rho.powi(steps) + in_step;
             }
             // the first angle remembers what both had at an earlier row, the second one forgets
             let at_once = if b.row == 0 { noise.across } else { stationary };
@@ -244,5 +289,38 @@ mod tests {
         whitening.colour(&mut back);
         whitening.whiten(&mut back);
         assert!(given.iter().zip(&back).all(|(a, b)| (a - b).abs() < 1e-9));
+    }
+
+    #[test]
+    fn white_noise_beside_coloured_noise_is_whitened_across_a_gap() {
+        let mut record = record();
+        record.theta_rad[0][70..95].fill(None);
+        let records = [record];
+        let mut problem = Problem::new(&records, &Experiment::default(), &[]).unwrap();
+        let colour = vec![Colour { rho: 0.9, share: 0.6 }, Colour { rho: 0.97, share: 0.3 }];
+        problem.noise =
+            vec![RecordNoise { sd_rad: vec![1e-3, 2e-3], colour: colour.clone(), across: 0.0, in_step: 0.0 }];
+        let seen = |link: usize, row: usize| link == 1 || !(70..95).contains(&row);
+        let values: Vec<Value> = (0..2)
+            .flat_map(|link| (0..200).map(move |row| Value { link, row, predicted_rad: 0.0, rate_rad_s: 0.0 }))
+            .filter(|v| seen(v.link, v.row))
+            .collect();
+        let covariance = DMatrix::from_fn(values.len(), values.len(), |i, j| {
+            let (a, b) = (&values[i], &values[j]);
+            if a.link != b.link {
+                return 0.0;
+            }
+            let Colour { rho, share } = colour[a.link];
+            let white = if a.row == b.row { 1.0 - share } else { 0.0 };
+            let sd_rad: f64 = [1e-3, 2e-3][a.link];
+            sd_rad.powi(2) * (share * rho.powi(a.row.abs_diff(b.row) as i32) + white)
+        });
+        let whitening = Whitening::of(&problem, 0, &values);
+        let mut once = covariance;
+        whitening.apply(&mut once);
+        let mut twice = once.transpose();
+        whitening.apply(&mut twice);
+        let off = (&twice - DMatrix::identity(values.len(), values.len())).amax();
+        assert!(off < 1e-9, "{off}");
     }
 }

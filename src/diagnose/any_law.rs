@@ -1,0 +1,186 @@
+//! A law of no particular form at one place, as an unknown: whatever torque the angle and the rate there determine, and what of it drifts.
+//!
+//! The process of [`super::latent`] takes any course in time, and pays for it row after row; something that follows the swing, as most that acts in a
+//! laboratory does, needs a handful of numbers. They are the coefficients b of some functions f of the state, their torques all of the size s:
+//!
+//! ```text
+//! torque = Σ bₖ fₖ(angle, rate, time)      bₖ ~ N(0, s²),  fₖ of root mean square 1 along the fitted motion
+//! r̃ = C̃b + noise                           r̃: residuals, C̃: what each fₖ adds to the angles, both whitened, what is free projected out
+//! ln L(s) − ln L(0) = ½ Σᵢ [aᵢ² s²/(1 + s²λᵢ) − ln(1 + s²λᵢ)]      C̃ᵀC̃ = VΛVᵀ,  a = VᵀC̃ᵀr̃
+//! ```
+
+use nalgebra::{DMatrix, DVector};
+use rayon::prelude::*;
+
+use super::Place;
+use super::latent::{Form, Latent};
+use super::refit::Refit;
+use super::screen::Projection;
+use super::surroundings::{Input, Row, Surroundings};
+
+/// Below this part of the largest rate dry friction turns round.
+const DRY: f64 = 0.05;
+/// Functions of an angle and its rate.
+const OF_STATE: usize = 14;
+/// Functions of a speed across the strip.
+const OF_SPEED: usize = 8;
+/// Gauss–Legendre nodes on 0..1 with their weights.
+const NODES: [(f64, f64); 3] =
+    [(0.112_701_665_379_258_3, 5.0 / 18.0), (0.5, 8.0 / 18.0), (0.887_298_334_620_741_7, 5.0 / 18.0)];
+
+/// Of an angle x and its rate v, both over their largest, and of the time τ from −½ to ½.
+fn of_state(x: f64, v: f64, tau: f64) -> [f64; OF_STATE] {
+    let (dry, drag) = ((v / DRY).tanh(), v * v.abs());
+    let cubic = [x * x * x, x * x * v, x * v * v, v * v * v];
+    let [a, b, c, d] = cubic;
+    [x, v, dry, drag, x * x, x * v, v * v, a, b, c, d, tau * x, tau * v, tau * dry]
+}
+
+/// Forces per length, of a speed over its largest and of the time.
+fn of_speed(v: f64, tau: f64) -> [f64; OF_SPEED] {
+    [1.0, v, (v / DRY).tanh(), v * v.abs(), v * v, v * v * v, tau, tau * v]
+}
+
+/// The middle between two rows of a recording.
+struct Instant {
+    theta_rad: Vec<f64>,
+    rate_rad_s: Vec<f64>,
+    tau: f64,
+}
+
+/// A recording's motion, ready for any torque.
+struct Swing<'s> {
+    around: &'s Surroundings,
+    instants: Vec<Instant>,
+    /// From row to row, with a torque on each link.
+    transitions: Vec<DMatrix<f64>>,
+}
+
+impl<'s> Swing<'s> {
+    fn of(around: &'s Surroundings) -> Self {
+        let n = around.links;
+        let middle = |a: &[f64], b: &[f64]| (0..n).map(|i| 0.5 * (a[i] + b[i])).collect();
+        let last = around.rows.len().max(2) - 1;
+        let instant = |(k, pair): (usize, &[Row])| Instant {
+            theta_rad: middle(&pair[0].theta_rad, &pair[1].theta_rad),
+            rate_rad_s: middle(&pair[0].rate, &pair[1].rate),
+            tau: (k as f64 + 0.5) / last as f64 - 0.5,
+        };
+        let each_link = DMatrix::identity(n, n);
+        Self {
+            around,
+            instants: around.rows.windows(2).enumerate().map(instant).collect(),
+            transitions: around.transitions(f64::INFINITY, |_| each_link.clone()),
+        }
+    }
+
+    /// The torques on the links of each function of the angle and the rate on which an input works.
+    fn of_input(&self, input: Input, at: &Instant, largest: [f64; 2]) -> Vec<[f64; OF_STATE]> {
+        let (pattern, [x, v]) = self.conjugate(input, at);
+        let f = of_state(x / largest[0], v / largest[1], at.tau);
+        pattern.iter().map(|lever| f.map(|f| lever * f)).collect()
+    }
+
+    /// Angle and rate on which an input works, and its torque on each link.
+    fn conjugate(&self, input: Input, at: &Instant) -> (DVector<f64>, [f64; 2]) {
+        let pattern = self.around.pattern(input, &at.theta_rad);
+        let along = |values: &[f64]| pattern.iter().zip(values).map(|(p, v)| p * v).sum::<f64>();
+        let works_on = [along(&at.theta_rad), along(&at.rate_rad_s)];
+        (pattern, works_on)
+    }
+
+    /// The torques on the links of each function of the speed across the strip.
+    fn of_air(&self, at: &Instant, largest_m_s: f64) -> Vec<[f64; OF_SPEED]> {
+        let mut torques = vec![[0.0; OF_SPEED]; self.around.links];
+        self.stations(at, |speed_m_s, weight_m, arms_m| {
+            let f = of_speed(speed_m_s / largest_m_s, at.tau);
+            for (torque, arm_m) in torques.iter_mut().zip(arms_m) {
+                torque.iter_mut().zip(f).for_each(|(torque, f)| *torque += f * weight_m * arm_m);
+            }
+        });
+        torques
+    }
+
+    /// Points along the strip: speed across it, length that it stands for, ∂(displacement across)/∂θ of each link down to it.
+    fn stations(&self, at: &Instant, mut visit: impl FnMut(f64, f64, &[f64])) {
+        let chain = &self.around.chain;
+        for j in 0..self.around.links {
+            for (part, weight) in NODES {
+                let length_m = |k: usize| chain.length_m(k) * if k < j { 1.0 } else { part };
+                let arms_m: Vec<f64> =
+                    (0..=j).map(|k| length_m(k) * (at.theta_rad[k] - at.theta_rad[j]).cos()).collect();
+                let speed_m_s = arms_m.iter().zip(&at.rate_rad_s).map(|(arm, rate)| arm * rate).sum();
+                visit(speed_m_s, weight * chain.length_m(j), &arms_m);
+            }
+        }
+    }
+}
+
+/// What each function of a law adds to the values seen of all recordings, whitened, for a torque of root mean square 1; and nothing to what else there
+/// is in as many rows, the beliefs.
+fn columns<const C: usize>(
+    swings: &[Swing<'_>],
+    rows: usize,
+    torques: impl Fn(&Swing<'_>, &Instant) -> Vec<[f64; C]>,
+) -> DMatrix<f64> {
+    let (mut square, mut count) = ([0.0; C], 0usize);
+    let mut all = DMatrix::zeros(rows, C);
+    let mut first = 0;
+    for swing in swings {
+        let held: Vec<Vec<[f64; C]>> = swing.instants.iter().map(|at| torques(swing, at)).collect();
+        for torque in held.iter().flatten() {
+            square.iter_mut().zip(torque).for_each(|(square, torque)| *square += torque * torque);
+        }
+        count += held.len();
+        let seen = swing.around.seen(&swing.around.responses(&swing.transitions, &held));
+        all.rows_mut(first, seen.nrows()).copy_from(&seen);
+        first += seen.nrows();
+    }
+    for (mut column, square) in all.column_iter_mut().zip(square) {
+        column /= (square / count.max(1) as f64).sqrt().max(f64::MIN_POSITIVE);
+    }
+    all
+}
+
+/// A law of any form around a fit, at each place that can have one, of the likeliest of some sizes (N·m); `variance` scales that of the noise.
+pub fn any_laws(fit: &Refit<'_>, around: &[Surroundings], variance: f64, sizes_n_m: &[f64]) -> Vec<Latent> {
+    let Some(projection) = Projection::of(fit) else { return Vec::new() };
+    let rows = projection.residual.len();
+    let swings: Vec<Swing<'_>> = around.iter().map(Swing::of).collect();
+    let largest = |of: &dyn Fn(&Swing<'_>, &Instant) -> f64| {
+        let all = swings.iter().flat_map(|swing| swing.instants.iter().map(|at| of(swing, at).abs()));
+        all.fold(f64::MIN_POSITIVE, f64::max)
+    };
+    let of_input = |input: Input| {
+        let largest = [0, 1].map(|i| largest(&|swing, at| swing.conjugate(input, at).1[i]));
+        columns(&swings, rows, |swing, at| swing.of_input(input, at, largest))
+    };
+    let of_air = || {
+        let largest_m_s = largest(&|swing, at| {
+            let mut fastest = 0.0f64;
+            swing.stations(at, |speed_m_s, _, _| fastest = fastest.max(speed_m_s.abs()));
+            fastest
+        });
+        columns(&swings, rows, |swing, at| swing.of_air(at, largest_m_s))
+    };
+    let places = Place::OF_LOSSES.into_iter().filter(|p| *p != Place::Joint || fit.problem.marks() > 1);
+    let likeliest = |place: Place| {
+        let columns = match place {
+            Place::Joint => of_input(Input::Joint),
+            Place::Air => of_air(),
+            _ => of_input(Input::Hinge),
+        };
+        let columns = projection.out(&columns);
+        let eigen = columns.tr_mul(&columns).symmetric_eigen();
+        let along = eigen.eigenvectors.tr_mul(&columns.tr_mul(&projection.residual));
+        let gain = |size_n_m: f64| {
+            let of = |(along, lambda): (&f64, &f64)| {
+                let seen = size_n_m * size_n_m * lambda.max(0.0) / variance;
+                along * along * size_n_m * size_n_m / (variance * variance * (1.0 + seen)) - seen.ln_1p()
+            };
+            0.5 * along.iter().zip(&eigen.eigenvalues).map(of).sum::<f64>()
+        };
+        Latent::likeliest(Form::Law(place), sizes_n_m.iter().map(|size| (*size, gain(*size))))
+    };
+    places.collect::<Vec<_>>().into_par_iter().map(likeliest).collect()
+}
