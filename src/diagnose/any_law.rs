@@ -17,6 +17,8 @@ use super::latent::{Form, Latent};
 use super::refit::Refit;
 use super::screen::Projection;
 use super::surroundings::{Input, Row, Surroundings};
+use crate::model::effects::air::stations;
+use crate::model::{ForwardModel, Motion};
 
 /// Below this part of the largest rate dry friction turns round.
 const DRY: f64 = 0.05;
@@ -24,15 +26,10 @@ const DRY: f64 = 0.05;
 const OF_STATE: usize = 14;
 /// Functions of a speed across the strip.
 const OF_SPEED: usize = 8;
-/// Gauss–Legendre nodes on 0..1 with their weights.
-const NODES: [(f64, f64); 3] =
-    [(0.112_701_665_379_258_3, 5.0 / 18.0), (0.5, 8.0 / 18.0), (0.887_298_334_620_741_7, 5.0 / 18.0)];
-
 /// Of an angle x and its rate v, both over their largest, and of the time τ from −½ to ½.
 fn of_state(x: f64, v: f64, tau: f64) -> [f64; OF_STATE] {
     let (dry, drag) = ((v / DRY).tanh(), v * v.abs());
-    let cubic = [x * x * x, x * x * v, x * v * v, v * v * v];
-    let [a, b, c, d] = cubic;
+    let [a, b, c, d] = [x * x * x, x * x * v, x * v * v, v * v * v];
     [x, v, dry, drag, x * x, x * v, v * v, a, b, c, d, tau * x, tau * v, tau * dry]
 }
 
@@ -43,8 +40,7 @@ fn of_speed(v: f64, tau: f64) -> [f64; OF_SPEED] {
 
 /// The middle between two rows of a recording.
 struct Instant {
-    theta_rad: Vec<f64>,
-    rate_rad_s: Vec<f64>,
+    motion: Motion,
     tau: f64,
 }
 
@@ -57,16 +53,16 @@ struct Swing<'s> {
 }
 
 impl<'s> Swing<'s> {
-    fn of(around: &'s Surroundings) -> Self {
-        let n = around.links;
-        let middle = |a: &[f64], b: &[f64]| (0..n).map(|i| 0.5 * (a[i] + b[i])).collect();
+    fn of(around: &'s Surroundings, model: &ForwardModel) -> Self {
+        let middle = |a: &[f64], b: &[f64]| -> Vec<f64> { a.iter().zip(b).map(|(a, b)| 0.5 * (a + b)).collect() };
         let last = around.rows.len().max(2) - 1;
-        let instant = |(k, pair): (usize, &[Row])| Instant {
-            theta_rad: middle(&pair[0].theta_rad, &pair[1].theta_rad),
-            rate_rad_s: middle(&pair[0].rate, &pair[1].rate),
-            tau: (k as f64 + 0.5) / last as f64 - 0.5,
+        let instant = |(k, pair): (usize, &[Row])| {
+            let t_s = 0.5 * (around.t_s[k] + around.t_s[k + 1]);
+            let (theta_rad, rate) =
+                (middle(&pair[0].theta_rad, &pair[1].theta_rad), middle(&pair[0].rate, &pair[1].rate));
+            Instant { motion: model.motion(t_s, &theta_rad, &rate), tau: (k as f64 + 0.5) / last as f64 - 0.5 }
         };
-        let each_link = DMatrix::identity(n, n);
+        let each_link = DMatrix::identity(around.links, around.links);
         Self {
             around,
             instants: around.rows.windows(2).enumerate().map(instant).collect(),
@@ -81,38 +77,31 @@ impl<'s> Swing<'s> {
         pattern.iter().map(|lever| f.map(|f| lever * f)).collect()
     }
 
-    /// Angle and rate on which an input works, and its torque on each link.
+    /// An input's torque on each link, and the angle and the rate on which it works.
     fn conjugate(&self, input: Input, at: &Instant) -> (DVector<f64>, [f64; 2]) {
-        let pattern = self.around.pattern(input, &at.theta_rad);
+        let pattern = self.around.pattern(input, &at.motion.theta_rad);
         let along = |values: &[f64]| pattern.iter().zip(values).map(|(p, v)| p * v).sum::<f64>();
-        let works_on = [along(&at.theta_rad), along(&at.rate_rad_s)];
+        let works_on = [along(&at.motion.theta_rad), along(&at.motion.rate)];
         (pattern, works_on)
     }
 
     /// The torques on the links of each function of the speed across the strip.
     fn of_air(&self, at: &Instant, largest_m_s: f64) -> Vec<[f64; OF_SPEED]> {
         let mut torques = vec![[0.0; OF_SPEED]; self.around.links];
-        self.stations(at, |speed_m_s, weight_m, arms_m| {
-            let f = of_speed(speed_m_s / largest_m_s, at.tau);
-            for (torque, arm_m) in torques.iter_mut().zip(arms_m) {
-                torque.iter_mut().zip(f).for_each(|(torque, f)| *torque += f * weight_m * arm_m);
+        stations(&self.around.chain, &at.motion, |station| {
+            let f = of_speed(station.speed_m_s / largest_m_s, at.tau);
+            for (torque, arm_m) in torques.iter_mut().zip(station.arms_m) {
+                torque.iter_mut().zip(f).for_each(|(torque, f)| *torque += f * station.weight_m * arm_m);
             }
         });
         torques
     }
 
-    /// Points along the strip: speed across it, length that it stands for, ∂(displacement across)/∂θ of each link down to it.
-    fn stations(&self, at: &Instant, mut visit: impl FnMut(f64, f64, &[f64])) {
-        let chain = &self.around.chain;
-        for j in 0..self.around.links {
-            for (part, weight) in NODES {
-                let length_m = |k: usize| chain.length_m(k) * if k < j { 1.0 } else { part };
-                let arms_m: Vec<f64> =
-                    (0..=j).map(|k| length_m(k) * (at.theta_rad[k] - at.theta_rad[j]).cos()).collect();
-                let speed_m_s = arms_m.iter().zip(&at.rate_rad_s).map(|(arm, rate)| arm * rate).sum();
-                visit(speed_m_s, weight * chain.length_m(j), &arms_m);
-            }
-        }
+    /// The largest speed across the strip at an instant.
+    fn fastest_m_s(&self, at: &Instant) -> f64 {
+        let mut fastest_m_s = 0.0f64;
+        stations(&self.around.chain, &at.motion, |station| fastest_m_s = fastest_m_s.max(station.speed_m_s.abs()));
+        fastest_m_s
     }
 }
 
@@ -146,7 +135,13 @@ fn columns<const C: usize>(
 pub fn any_laws(fit: &Refit<'_>, around: &[Surroundings], variance: f64, sizes_n_m: &[f64]) -> Vec<Latent> {
     let Some(projection) = Projection::of(fit) else { return Vec::new() };
     let rows = projection.residual.len();
-    let swings: Vec<Swing<'_>> = around.iter().map(Swing::of).collect();
+    let swing = |(record, around)| {
+        let (model, _) = fit.problem.model(record, &fit.x[..fit.problem.free.len()]).ok()?;
+        Some(Swing::of(around, &model))
+    };
+    let Some(swings) = around.iter().enumerate().map(swing).collect::<Option<Vec<Swing<'_>>>>() else {
+        return Vec::new();
+    };
     let largest = |of: &dyn Fn(&Swing<'_>, &Instant) -> f64| {
         let all = swings.iter().flat_map(|swing| swing.instants.iter().map(|at| of(swing, at).abs()));
         all.fold(f64::MIN_POSITIVE, f64::max)
@@ -156,11 +151,7 @@ pub fn any_laws(fit: &Refit<'_>, around: &[Surroundings], variance: f64, sizes_n
         columns(&swings, rows, |swing, at| swing.of_input(input, at, largest))
     };
     let of_air = || {
-        let largest_m_s = largest(&|swing, at| {
-            let mut fastest = 0.0f64;
-            swing.stations(at, |speed_m_s, _, _| fastest = fastest.max(speed_m_s.abs()));
-            fastest
-        });
+        let largest_m_s = largest(&|swing, at| swing.fastest_m_s(at));
         columns(&swings, rows, |swing, at| swing.of_air(at, largest_m_s))
     };
     let places = Place::OF_LOSSES.into_iter().filter(|p| *p != Place::Joint || fit.problem.marks() > 1);

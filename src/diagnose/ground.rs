@@ -2,12 +2,13 @@
 
 use super::hysteresis::Straightened;
 use super::refit::Refit;
+use super::verdict::BEYOND_NOISE;
 use super::{Cause, noise};
 use crate::error::Result;
 use crate::experiment::{Experiment, Hysteresis};
 use crate::fit::descent::Descent;
 use crate::fit::shooting::multiple_shooting;
-use crate::fit::whitening::RecordNoise;
+use crate::fit::whitening::{Colour, RecordNoise};
 use crate::fit::{Belief, Problem, Record};
 use crate::model::Parameter;
 use crate::model::observe::chord_angles_rad;
@@ -234,8 +235,10 @@ impl<'a> Ground<'a> {
                     None if whole.sd < *known_rad => whole,
                     None => continue,
                 };
-                changed |= (noise.sd / *known_rad - 1.0).abs() > 0.03 || noise.colour.differs_from(*known_colour);
-                (*known_rad, *known_colour) = (noise.sd, noise.colour);
+                // where far more is left its colour is no weight for the rows
+                let colour = if whole.sd > BEYOND_NOISE * noise.sd { Colour::default() } else { noise.colour };
+                changed |= (noise.sd / *known_rad - 1.0).abs() > 0.03 || colour.differs_from(*known_colour);
+                (*known_rad, *known_colour) = (noise.sd, colour);
             }
             if let [first, second] = &angles[..] {
                 let across = noise::across([first, second].map(|(left, motion)| (&left[..], &motion[..])));

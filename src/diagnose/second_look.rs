@@ -7,6 +7,7 @@ use super::ground::{self, Ground};
 use super::refit::Refit;
 use super::screen::{Score, Screen};
 use super::selection::{self, Lacks};
+use super::verdict::BEYOND_NOISE;
 use crate::fit::Record;
 use crate::progress::Progress;
 
@@ -29,18 +30,16 @@ pub fn second_look<'a>(
     if ground.is_strip() || !lacks.is_some_and(|lacks| lacks.unexplained) {
         return fits;
     }
-    let is_single = |fit: &Refit<'a>| fit.hypothesis.causes.len() == 1;
-    let fits = from_the_first_part(ground, fits, |fits| best(fits, SEEDS, is_single));
-    let mut seeds: Vec<&Refit<'a>> = fits.iter().filter(|fit| is_single(fit)).collect();
-    seeds.sort_by(|a, b| a.chi2.total_cmp(&b.chi2));
-    seeds.truncate(SEEDS);
+    let fits = from_the_first_part(ground, fits, |fits| seeds(ground, fits));
+    let seeds: Vec<&Refit<'a>> = seeds(ground, &fits).into_iter().map(|i| &fits[i]).collect();
     progress.begin("second look", Some((seeds.len() * causes.len()) as u64));
     let pairs: Vec<Refit<'a>> = seeds.iter().flat_map(|seed| beside(ground, seed, causes, progress)).collect();
     let all = merged(fits, pairs);
     let all = from_the_first_part(ground, all, |fits| {
-        let mut chosen = best(fits, ANEW, |_| true);
+        let mut chosen = best(fits, ANEW, |_| true, |fit| fit.chi2);
         if ground.records.iter().any(comes_to_rest) {
-            chosen.extend(best(fits, fits.len(), |fit| fit.hypothesis.causes.contains(&Cause::HingeCoulomb)));
+            let can_stop = |fit: &Refit<'a>| fit.hypothesis.causes.contains(&Cause::HingeCoulomb);
+            chosen.extend((0..fits.len()).filter(|i| can_stop(&fits[*i])));
         }
         chosen
     });
@@ -103,12 +102,26 @@ fn from_the_first_part<'a>(
     merged(fits, others)
 }
 
-/// The best fits of a kind.
-fn best<'a>(fits: &[Refit<'a>], count: usize, is_meant: impl Fn(&Refit<'a>) -> bool) -> Vec<usize> {
-    let mut order: Vec<usize> = (0..fits.len()).filter(|i| is_meant(&fits[*i])).collect();
-    order.sort_by(|a, b| fits[*a].chi2.total_cmp(&fits[*b].chi2));
+/// The fits of a kind that leave least.
+fn best<'a>(
+    fits: &[Refit<'a>],
+    count: usize,
+    is_meant: impl Fn(&Refit<'a>) -> bool,
+    left: impl Fn(&Refit<'a>) -> f64,
+) -> Vec<usize> {
+    let mut order: Vec<(f64, usize)> =
+        (0..fits.len()).filter(|i| is_meant(&fits[*i])).map(|i| (left(&fits[i]), i)).collect();
+    order.sort_by(|a, b| a.0.total_cmp(&b.0));
     order.truncate(count);
-    order
+    order.into_iter().map(|(_, i)| i).collect()
+}
+
+/// The single effects that leave least; where that is far more than noise, its colour does not count.
+fn seeds(ground: &Ground<'_>, fits: &[Refit<'_>]) -> Vec<usize> {
+    let least = fits.iter().map(|fit| fit.chi2).fold(f64::INFINITY, f64::min);
+    let beyond_noise = least > BEYOND_NOISE * BEYOND_NOISE * ground.values() as f64;
+    let left = |fit: &Refit<'_>| if beyond_noise { fit.left_share() } else { fit.chi2 };
+    best(fits, SEEDS, |fit| fit.hypothesis.causes.len() == 1, left)
 }
 
 /// Whether the swing has died away long before the recording ends.

@@ -26,7 +26,7 @@ const IN_STEP: f64 = 0.6;
 const BESIDE_A_LAW: f64 = 0.35;
 const SLIGHT: f64 = 25.0;
 /// Where the best of the table leaves this many times the noise, noise is no yardstick for the model any more…
-const BEYOND_NOISE: f64 = 5.0;
+pub(super) const BEYOND_NOISE: f64 = 5.0;
 /// … and the best are named if they leave at most this part of what the base model leaves of what was not fitted. Of what a rig does they may be the
 /// largest part, or the nearest relatives of what is not in the table: the odds are even.
 const PROVEN: f64 = 0.5;

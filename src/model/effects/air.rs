@@ -130,16 +130,17 @@ impl Law for AddedMass {
 }
 
 /// A point of the strip, at distance s down link i.
-struct Station<'a> {
+pub struct Station<'a> {
     motion: &'a Motion,
     i: usize,
-    weight_m: f64,
+    /// The length that it stands for.
+    pub weight_m: f64,
     /// Jₖ, k = 0 … i.
-    arms_m: &'a [f64],
+    pub arms_m: &'a [f64],
     /// Lₖ sin(θᵢ−θₖ), k = 0 … i.
     crosses_m: &'a [f64],
     /// vₙ.
-    speed_m_s: f64,
+    pub speed_m_s: f64,
     /// U.
     slip_m_s: f64,
 }
@@ -147,7 +148,8 @@ struct Station<'a> {
 /// Up to so many links the arms need no memory of their own.
 const FEW_LINKS: usize = 8;
 
-fn stations(chain: &Chain, motion: &Motion, mut visit: impl FnMut(&Station<'_>)) {
+/// Visits the points of the strip at which a force per length is taken.
+pub fn stations(chain: &Chain, motion: &Motion, mut visit: impl FnMut(&Station<'_>)) {
     let n = chain.count();
     let (mut few, mut many) = ([0.0; 2 * FEW_LINKS], Vec::new());
     let both = if n <= FEW_LINKS {
