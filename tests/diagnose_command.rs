@@ -227,6 +227,34 @@ fn one_link_is_diagnosed_alone_and_together_with_another_recording_of_it() {
     assert!(left("augmented_rmse_rad") < 0.5 * left("baseline_rmse_rad"), "{}", report["heldout"]);
 }
 
+#[test]
+fn a_swing_that_goes_far_from_frame_to_frame_is_named_all_the_same() {
+    let folder = Folder::new();
+    // 2.4 Hz and 7.5 Hz at 30 frames a second: linearised from row to row in one piece, the motion would grow of its own
+    let base = "
+[[specimen.links]]
+length_m = 0.0256
+mass_kg = 0.0004233
+com_m = 0.01723
+inertia_kg_m2 = 2.468e-08
+[[specimen.links]]
+length_m = 0.0256
+mass_kg = 0.0005827
+com_m = 0.01999
+inertia_kg_m2 = 3.495e-08
+[model]
+k_eq_n_m_per_rad = 9.2e-6
+c_eq_n_m_s_per_rad = 1.0e-8
+release_rad = [0.56, 0.51]
+";
+    let angles = folder.swing(base, "air_quadratic = 2.6e-3\n");
+    let report = folder.diagnosis(&angles, base, &[]);
+    assert_eq!(names(&report["verdict"]["effects"]), ["air_quadratic"], "{:#}", report["verdict"]);
+    for unknown in report["where"]["unknown"].as_array().unwrap() {
+        assert!(unknown["log_likelihood_gain"].as_f64().unwrap() < 6.0, "{unknown:#}");
+    }
+}
+
 /// A link that runs into something soft at its hinge beyond 0.3 rad, by the fourth-order method of Runge and Kutta: t_s, theta1_rad.
 fn with_a_soft_stop() -> String {
     let (inertia_kg_m2, weight_n_m, damper) = (0.1 * 0.66 * 0.66 + 1e-5, 0.1 * 9.80665 * 0.66, 1e-3);

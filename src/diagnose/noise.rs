@@ -14,10 +14,15 @@ use rustfft::num_complex::Complex;
 use crate::fit::whitening::Colour;
 use crate::statistics::{median, median_step_s};
 
-/// A frequency belongs to the motion where its power exceeds this part of the motion's largest…
+/// A frequency belongs to the motion where the motion has more than this part of its largest power, and as much of it as the residual may hold would be more
+/// than this part of the noise…
 const MOTION: f64 = 1e-7;
+const LEAKS: f64 = 0.1;
 /// … or lies this many bins from such a one.
 const BINS: usize = 4;
+/// A line of the residual's own has this many times the power of so many frequencies to either side.
+const LINE: f64 = 25.0;
+const AROUND: usize = 12;
 /// Part of the frequencies that has to be left.
 const ENOUGH: f64 = 0.15;
 /// Times tried for which noise goes on, in rows: from the shortest by a factor each.
@@ -116,18 +121,30 @@ pub fn off_the_lines(residual: &[f64], motion: &[f64]) -> Option<Noise> {
 /// The frequencies at which neither the motion has power nor the residual, of whose spectrum this is, a line of its own, in order; `None` where few are left.
 fn between_lines(noise: &[f64], motion: &[f64]) -> Option<Vec<usize>> {
     let lines = spectrum(motion);
-    let strongest = lines.iter().copied().fold(0.0, f64::max);
-    let of_motion = |k: usize| {
-        lines[k.saturating_sub(BINS)..(k + BINS + 1).min(lines.len())].iter().any(|p| *p > MOTION * strongest)
-    };
+    let peak = (1..lines.len()).max_by(|a, b| lines[*a].total_cmp(&lines[*b]))?;
+    let near = |k: usize| k.saturating_sub(BINS)..(k + BINS + 1).min(lines.len());
+    // as much of the motion as the residual has where that is strongest, it may have everywhere: it must stay below the noise
+    let least = usual(&mut noise[1..].to_vec())?;
+    let share = noise[near(peak)].iter().sum::<f64>() / lines[near(peak)].iter().sum::<f64>().max(f64::MIN_POSITIVE);
+    let bound = (MOTION * lines[peak]).max(LEAKS * least / share);
+    let of_motion = |k: usize| lines[near(k)].iter().any(|p| *p > bound);
     let free: Vec<usize> = (1..noise.len()).filter(|k| !of_motion(*k)).collect();
     if (free.len() as f64) < ENOUGH * noise.len() as f64 {
         return None;
     }
     // a line that the motion does not have, as of a moving support, must not count as noise
-    let mut sorted: Vec<f64> = free.iter().map(|k| noise[*k]).collect();
-    let usual = median(&mut sorted)? / std::f64::consts::LN_2;
-    Some(free.into_iter().filter(|k| noise[*k] < 25.0 * usual).collect())
+    let power: Vec<f64> = free.iter().map(|k| noise[*k]).collect();
+    let stands_out = |i: usize| {
+        let first = i.saturating_sub(AROUND).min(power.len().saturating_sub(2 * AROUND + 1));
+        let around = &power[first..power.len().min(first + 2 * AROUND + 1)];
+        usual(&mut around.to_vec()).is_some_and(|usual| power[i] > LINE * usual)
+    };
+    Some((0..free.len()).filter(|i| !stands_out(*i)).map(|i| free[i]).collect())
+}
+
+/// The mean power of which these are chance samples, whatever the few large ones are.
+fn usual(power: &mut [f64]) -> Option<f64> {
+    Some(median(power)? / std::f64::consts::LN_2)
 }
 
 /// The noise in a residual that is nothing but noise; missing rows are zero.
@@ -210,6 +227,24 @@ mod tests {
         let t_s = [10.0, 10.1, 10.2, 10.5, 10.61, 10.7];
         assert_eq!(ticks(&t_s), [0, 1, 2, 5, 6, 7]);
         assert_eq!(ticks(&[0.0, 0.1, 0.2, 9.0]), [0, 1, 2, 3]);
+    }
+
+    #[test]
+    fn noise_that_drifts_as_slowly_as_the_swing_is_seen_below_its_line() {
+        let mut random = rand::rngs::StdRng::seed_from_u64(7);
+        let mut white = || -> f64 { StandardNormal.sample(&mut random) };
+        let (rho, share): (f64, f64) = (0.955, 0.8);
+        let mut drift = white();
+        let residual: Vec<f64> = (0..3600)
+            .map(|_| {
+                drift = rho * drift + (1.0 - rho * rho).sqrt() * white();
+                4e-3 * (share.sqrt() * drift + (1.0 - share).sqrt() * white())
+            })
+            .collect();
+        let motion: Vec<f64> = (0..3600).map(|i| (-3e-4 * f64::from(i)).exp() * (0.08 * f64::from(i)).cos()).collect();
+        let noise = off_the_lines(&residual, &motion).unwrap();
+        assert!((noise.colour.rho - rho).abs() < 0.02 && (noise.colour.share - share).abs() < 0.1, "{noise:?}");
+        assert!((noise.sd / 4e-3 - 1.0).abs() < 0.12, "{noise:?}");
     }
 
     #[test]

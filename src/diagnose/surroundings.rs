@@ -6,7 +6,8 @@
 //! δα = −(∂Q/∂α)⁻¹ [∂Q/∂θ δθ + ∂Q/∂rate δrate + ∂Q/∂p δp + B u]
 //! ```
 //!
-//! from one row of the recording to the next, by the exponential of the matrix in the middle between them.
+//! from one row of the recording to the next, by the exponential of the matrix in the middle between them; where the swing goes far from row to row, in the
+//! middle of several parts.
 
 use nalgebra::{DMatrix, DVector};
 
@@ -46,6 +47,11 @@ impl Input {
     }
 }
 
+/// The swing goes on by at most this much while the matrix is held: with more, the linear motion would grow of its own.
+const HELD_RAD: f64 = 0.15;
+/// A gap is not cut into more parts than this.
+const MOST_PARTS: f64 = 64.0;
+
 /// One recording's motion, linearised.
 #[derive(Debug, Clone)]
 pub struct Surroundings {
@@ -63,8 +69,8 @@ pub struct Surroundings {
     pub rows: Vec<Row>,
     /// Of the values seen, link after link.
     whitening: Whitening,
-    /// From each row to the next: d(δθ, δrate)/dt with δθ, δrate, then the parameters, then the torque on each rate's equation.
-    flows: Vec<DMatrix<f64>>,
+    /// From each row to the next, part after part: d(δθ, δrate)/dt with δθ, δrate, then the parameters, then the torque on each link.
+    flows: Vec<Vec<DMatrix<f64>>>,
 }
 
 /// One row of the recording beside the motion.
@@ -100,7 +106,12 @@ impl Surroundings {
             row.left_rad[value.link] = data.theta_rad[value.link][value.row].map(|m| m - value.predicted_rad);
             row.sd_rad[value.link] = sd_rad;
         }
-        let flows = true_s.windows(2).map(|pair| flow(&model, &problem.free, &swing, 0.5 * (pair[0] + pair[1])));
+        let flows = true_s.windows(2).map(|pair| {
+            let length_s = pair[1] - pair[0];
+            let parts = (model.pace_rad_s() * length_s / HELD_RAD).ceil().clamp(1.0, MOST_PARTS) as usize;
+            let middle_s = |part: usize| pair[0] + length_s * (part as f64 + 0.5) / parts as f64;
+            (0..parts).map(|part| flow(&model, &problem.free, &swing, middle_s(part))).collect()
+        });
         Some(Self {
             chain: chain.clone(),
             flows: flows.collect::<Option<Vec<_>>>()?,
@@ -125,16 +136,21 @@ impl Surroundings {
     }
 
     fn transition(&self, k: usize, inputs: &DMatrix<f64>, memory_s: f64) -> DMatrix<f64> {
+        let part_s = (self.t_s[k + 1] - self.t_s[k]) / self.flows[k].len() as f64;
+        let parts = self.flows[k].iter().map(|flow| self.part(flow, inputs, memory_s, part_s));
+        parts.reduce(|before, after| after * before).unwrap_or_default()
+    }
+
+    fn part(&self, flow: &DMatrix<f64>, inputs: &DMatrix<f64>, memory_s: f64, length_s: f64) -> DMatrix<f64> {
         let (state, count) = (self.state(), inputs.ncols());
         let total = state + count + self.parameters;
-        let flow = &self.flows[k];
         let mut matrix = DMatrix::zeros(total, total);
         matrix.view_mut((0, 0), (state, state)).copy_from(&flow.columns(0, state));
         matrix.view_mut((0, state + count), (state, self.parameters)).copy_from(&flow.columns(state, self.parameters));
         let torques = flow.columns(state + self.parameters, self.links) * inputs;
         matrix.view_mut((0, state), (state, count)).copy_from(&torques);
         (state..state + count).for_each(|i| matrix[(i, i)] = -1.0 / memory_s);
-        (matrix * (self.t_s[k + 1] - self.t_s[k])).exp()
+        (matrix * length_s).exp()
     }
 
     /// What inputs add to the angles, row after row, mark after mark, each following several courses; `held` is what they are between a row

@@ -17,6 +17,8 @@ const IMITATED: f64 = 0.06;
 const TOLD_APART: f64 = 0.05;
 /// A named law may be wrong by this part of its own torque before something unknown is suspected beside it.
 const LAW_SHARE: f64 = 0.002;
+/// A hysteresis by more: how it goes over from spring to slip has as many forms as there are authors.
+const HYSTERESIS_SHARE: f64 = 0.05;
 /// An offset of the camera that wanders may be noise of another colour than was learnt: it must gain this much more, in ln-likelihood.
 const COLOUR: f64 = 6.0;
 /// A support in step with the swing can be what it seems to be, or stand for a torque that is not known: the odds are about even.
@@ -115,7 +117,7 @@ pub fn weigh<'a>(
     posterior.push(
         posterior[best]
             + evidence::PRIOR_UNKNOWN.ln()
-            + unknown_gain(&latents, added_n_m, slow_errors_rad(&fits[best])),
+            + unknown_gain(&latents, law_error_n_m(&fits[best], added_n_m), slow_errors_rad(&fits[best])),
     );
     let if_named = normalised(&posterior[..fits.len()]);
     let mut probability = normalised(&posterior);
@@ -150,6 +152,12 @@ fn genuine(fit: &Refit<'_>, fits: &[Refit<'_>]) -> f64 {
     if fit_of(&[]).is_some_and(|null| locate::is_in_step(null, hz)) { IN_STEP * named } else { named }
 }
 
+/// By how much the torque of a fit's laws may be wrong.
+fn law_error_n_m(fit: &Refit<'_>, added_n_m: f64) -> f64 {
+    let is_hysteretic = fit.hypothesis.causes.contains(&Cause::JointHysteretic);
+    if is_hysteretic { HYSTERESIS_SHARE * added_n_m } else { LAW_SHARE * added_n_m }
+}
+
 /// The errors that tracked angles may have from one swing to the next, as large as those in step with it.
 fn slow_errors_rad(fit: &Refit<'_>) -> f64 {
     let of_record = |noise: &RecordNoise| noise.in_step * noise.sd_rad.iter().copied().fold(0.0, f64::max);
@@ -157,13 +165,13 @@ fn slow_errors_rad(fit: &Refit<'_>) -> f64 {
 }
 
 /// How much likelier an unknown of any size makes the recordings than one that a law's own error, or the tracker's, allows.
-fn unknown_gain(latents: &[Latent], added_n_m: f64, slow_errors_rad: f64) -> f64 {
+fn unknown_gain(latents: &[Latent], law_error_n_m: f64, slow_errors_rad: f64) -> f64 {
     let within =
         |latent: &Latent, allowed: f64| latent.tried.iter().filter(|t| t.0 <= allowed).map(|t| t.1).fold(0.0, f64::max);
     let is_camera = |latent: &&Latent| latent.place() == Place::Camera;
     let wander = latents.iter().find(is_camera).map_or(0.0, |camera| within(camera, slow_errors_rad));
     let of = |latent: &Latent| {
-        let own = if is_camera(&latent) { COLOUR } else { within(latent, LAW_SHARE * added_n_m) };
+        let own = if is_camera(&latent) { COLOUR } else { within(latent, law_error_n_m) };
         latent.gain - own.max(wander)
     };
     // any size is as likely as any other, at any place
