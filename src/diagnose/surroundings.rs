@@ -48,7 +48,7 @@ impl Input {
 }
 
 /// The swing goes on by at most this much while the matrix is held: with more, the linear motion would grow of its own.
-const HELD_RAD: f64 = 0.15;
+const HELD_RAD: f64 = 0.3;
 /// A gap is not cut into more parts than this.
 const MOST_PARTS: f64 = 64.0;
 
