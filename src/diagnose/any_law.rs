@@ -26,6 +26,7 @@ const DRY: f64 = 0.05;
 const OF_STATE: usize = 14;
 /// Functions of a speed across the strip.
 const OF_SPEED: usize = 8;
+
 /// Of an angle x and its rate v, both over their largest, and of the time τ from −½ to ½.
 fn of_state(x: f64, v: f64, tau: f64) -> [f64; OF_STATE] {
     let (dry, drag) = ((v / DRY).tanh(), v * v.abs());

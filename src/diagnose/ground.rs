@@ -1,8 +1,8 @@
 //! What every fit of one diagnosis shares, and the ways to make one: near another fit, anew, again.
 
 use super::hysteresis::Straightened;
+use super::noise::BEYOND_NOISE;
 use super::refit::Refit;
-use super::verdict::BEYOND_NOISE;
 use super::{Cause, noise};
 use crate::error::Result;
 use crate::experiment::{Experiment, Hysteresis};

@@ -4,10 +4,10 @@ use rayon::prelude::*;
 
 use super::Cause;
 use super::ground::{self, Ground};
+use super::noise::BEYOND_NOISE;
 use super::refit::Refit;
 use super::screen::{Score, Screen};
 use super::selection::{self, Lacks};
-use super::verdict::BEYOND_NOISE;
 use crate::fit::Record;
 use crate::progress::Progress;
 

@@ -17,6 +17,11 @@ use crate::fit::whitening::Whitening;
 use crate::model::observe::{chord_angles_rad, chord_slopes};
 use crate::model::{Chain, ForwardModel, Hinge, Motion, Parameter, Partials, Trajectory};
 
+/// The swing goes on by at most this much while the matrix is held: with more, the linear motion would grow of its own.
+const HELD_RAD: f64 = 0.3;
+/// A gap is not cut into more parts than this.
+const MOST_PARTS: f64 = 64.0;
+
 /// What an unknown torque (or offset) pushes at.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Input {
@@ -46,11 +51,6 @@ impl Input {
         }
     }
 }
-
-/// The swing goes on by at most this much while the matrix is held: with more, the linear motion would grow of its own.
-const HELD_RAD: f64 = 0.3;
-/// A gap is not cut into more parts than this.
-const MOST_PARTS: f64 = 64.0;
 
 /// One recording's motion, linearised.
 #[derive(Debug, Clone)]

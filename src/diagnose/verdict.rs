@@ -3,6 +3,7 @@
 use super::evidence::{self, Scatter, normalised};
 use super::heldout::HeldOut;
 use super::latent::Latent;
+use super::noise::{BEYOND_NOISE, COLOURED};
 use super::refit::Refit;
 use super::{Cause, Place, locate};
 use crate::fit::whitening::RecordNoise;
@@ -19,17 +20,13 @@ const TOLD_APART: f64 = 0.05;
 const LAW_SHARE: f64 = 0.002;
 /// A hysteresis by more: how it goes over from spring to slip has as many forms as there are authors.
 const HYSTERESIS_SHARE: f64 = 0.05;
-/// An offset of the camera that wanders may be noise of another colour than was learnt: it must gain this much more, in ln-likelihood.
-const COLOUR: f64 = 6.0;
 /// A support in step with the swing can be what it seems to be, or stand for a torque that is not known: the odds are about even.
 const IN_STEP: f64 = 0.6;
 /// The same beside a law of physics, where it gains less than this many standard deviations: three free numbers complete a law that is only nearly right, and
 /// a law outside the table that has a near relative in it is more often what has been filmed.
 const BESIDE_A_LAW: f64 = 0.35;
 const SLIGHT: f64 = 25.0;
-/// Where the best of the table leaves this many times the noise, noise is no yardstick for the model any more…
-pub(super) const BEYOND_NOISE: f64 = 5.0;
-/// … and the best are named if they leave at most this part of what the base model leaves of what was not fitted. Of what a rig does they may be the
+/// Where the best of the table leaves far more than noise, its names stand if they leave at most this part of what the base model leaves of what was not fitted. Of what a rig does they may be the
 /// largest part, or the nearest relatives of what is not in the table: the odds are even.
 const PROVEN: f64 = 0.5;
 const NEAREST: f64 = 0.5;
@@ -171,7 +168,8 @@ fn unknown_gain(latents: &[Latent], law_error_n_m: f64, slow_errors_rad: f64) ->
     let is_camera = |latent: &&Latent| latent.place() == Place::Camera;
     let wander = latents.iter().find(is_camera).map_or(0.0, |camera| within(camera, slow_errors_rad));
     let of = |latent: &Latent| {
-        let own = if is_camera(&latent) { COLOUR } else { within(latent, law_error_n_m) };
+        // an offset that wanders may be noise of another colour than was learnt
+        let own = if is_camera(&latent) { COLOURED } else { within(latent, law_error_n_m) };
         latent.gain - own.max(wander)
     };
     // any size is as likely as any other, at any place
