@@ -178,6 +178,26 @@ fn a_joint_parameter_of_one_link_is_refused() {
 }
 
 #[test]
+fn the_bending_stiffness_of_a_strip_is_fitted() {
+    let folder = Folder::new();
+    let strip = "
+[model]
+c_eq_n_m_s_per_rad = 5.0e-7
+release_rad = [0.5, 0.62]
+[model.effects]
+distributed_flexibility = 2.0e-5
+";
+    let angles = folder.angles(strip);
+    let config = folder.write("start.toml", &strip.replace("2.0e-5", "2.6e-5"));
+    let json = folder.path("fit.json");
+    freeswing("fit").arg(&angles).arg("--config").arg(config).arg("--json").arg(&json).assert().success();
+    let report: serde_json::Value = serde_json::from_str(&fs::read_to_string(json).unwrap()).unwrap();
+    let stiffness = &report["parameters"]["distributed_flexibility"];
+    let (value, sd) = (stiffness["value"].as_f64().unwrap(), stiffness["sd"].as_f64().unwrap());
+    assert!((value - 2.0e-5).abs() < 4.0 * sd && sd < 1e-6, "{value} {sd}");
+}
+
+#[test]
 fn the_published_model_of_a_real_pendulum_is_told_where_it_fails() {
     let table = PathBuf::from("../shared/data/multiarm_double.csv");
     if !table.exists() {

@@ -20,18 +20,18 @@ use super::surroundings::{Input, Row, Surroundings};
 use crate::model::effects::air::stations;
 use crate::model::{ForwardModel, Motion};
 
-/// Below this part of the largest rate dry friction turns round.
+/// Below this part of the largest rate dry friction turns round, and of the largest angle play does.
 const DRY: f64 = 0.05;
 /// Functions of an angle and its rate.
-const OF_STATE: usize = 14;
+const OF_STATE: usize = 15;
 /// Functions of a speed across the strip.
 const OF_SPEED: usize = 8;
 
 /// Of an angle x and its rate v, both over their largest, and of the time τ from −½ to ½.
 fn of_state(x: f64, v: f64, tau: f64) -> [f64; OF_STATE] {
-    let (dry, drag) = ((v / DRY).tanh(), v * v.abs());
+    let (play, dry, drag) = ((x / DRY).tanh(), (v / DRY).tanh(), v * v.abs());
     let [a, b, c, d] = [x * x * x, x * x * v, x * v * v, v * v * v];
-    [x, v, dry, drag, x * x, x * v, v * v, a, b, c, d, tau * x, tau * v, tau * dry]
+    [x, v, play, dry, drag, x * x, x * v, v * v, a, b, c, d, tau * x, tau * v, tau * dry]
 }
 
 /// Forces per length, of a speed over its largest and of the time.

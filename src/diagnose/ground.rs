@@ -15,8 +15,8 @@ use crate::model::observe::chord_angles_rad;
 
 /// A yield angle of the joint's hysteresis to start from, as a part of the largest bend.
 const YIELD_SHARE: f64 = 0.2;
-/// A fit from short stretches goes on where its first steps lead below this multiple of the base model's χ².
-const BEYOND_HOPE: f64 = 10.0;
+/// A fit from short stretches, or of a strip, goes on where its first steps lead below this multiple of the base model's χ².
+pub(super) const BEYOND_HOPE: f64 = 10.0;
 /// A dear hypothesis goes on where its first steps lead below this multiple of the base model's χ².
 pub(super) const HOPEFUL: f64 = 1.2;
 /// Rods between two marks while bending all along the strip is only a candidate.
@@ -48,9 +48,9 @@ pub struct Ground<'a> {
     pub step_error_rad: f64,
     /// Where the base model's descent began: parameters and starts that short stretches led to. Empty where that is not known.
     pub begun: Vec<f64>,
-    /// Whether a strip that bends everywhere has as many rods, and may start in as many shapes, as one that is the base model: it is dear, and worth it where
-    /// such a strip is the answer ([`super::fine_strip`]).
-    pub fine_strip: bool,
+    /// Rods between two marks of a strip that bends everywhere, which may then start in as many shapes as one that is the base model: it is dear, and worth it
+    /// where such a strip is the answer ([`super::fine_strip`]). Few, and no further shapes, where it is only a candidate.
+    pub fine_strip: Option<usize>,
 }
 
 /// The base model with some effects.
@@ -90,9 +90,7 @@ impl<'a> Ground<'a> {
         for cause in &hypothesis.causes {
             if *cause == Cause::DistributedFlexibility {
                 free.retain(|p| *p != Parameter::JointStiffness);
-                if !self.fine_strip {
-                    experiment.model.pieces = CANDIDATE_PIECES;
-                }
+                experiment.model.pieces = self.fine_strip.unwrap_or(CANDIDATE_PIECES);
                 let lengths_m = experiment.specimen.lengths_m();
                 let mark_m = lengths_m.iter().sum::<f64>() / lengths_m.len() as f64;
                 experiment.model.effects.distributed_flexibility = Some(experiment.model.k_eq_n_m_per_rad * mark_m);
@@ -107,7 +105,7 @@ impl<'a> Ground<'a> {
         let mut problem = Problem::new(self.records, &experiment, &free)?;
         problem.noise.clone_from(&self.noise);
         problem.beliefs = beliefs;
-        if hypothesis.causes.contains(&Cause::DistributedFlexibility) && !self.fine_strip {
+        if hypothesis.causes.contains(&Cause::DistributedFlexibility) && self.fine_strip.is_none() {
             // no more is free at its start than in the rods it is compared with
             problem.further_shapes = 0;
         }

@@ -51,7 +51,8 @@ fn along(ground: &Ground<'_>, null: &Refit<'_>, best: &Refit<'_>, from_s: Option
         let whole = ground.problem(&fit.hypothesis).ok()?;
         errors(&whole.predict(0, &refitted.x, false).ok()?.values, record, rows)
     };
-    Some(HeldOut { record: 0, from_s: border_s, baseline_rad: predicted(null)?, augmented_rad: predicted(best)? })
+    let (baseline, augmented) = rayon::join(|| predicted(null), || predicted(best));
+    Some(HeldOut { record: 0, from_s: border_s, baseline_rad: baseline?, augmented_rad: augmented? })
 }
 
 fn across(ground: &Ground<'_>, null: &Refit<'_>, best: &Refit<'_>) -> Option<HeldOut> {
@@ -78,7 +79,8 @@ fn across(ground: &Ground<'_>, null: &Refit<'_>, best: &Refit<'_>) -> Option<Hel
         errors(&seen.problem.predict(0, &seen.x, false).ok()?.values, &ground.records[last], 0)
     };
     let from_s = ground.records[last].t_s[0];
-    Some(HeldOut { record: last, from_s, baseline_rad: predicted(null)?, augmented_rad: predicted(best)? })
+    let (baseline, augmented) = rayon::join(|| predicted(null), || predicted(best));
+    Some(HeldOut { record: last, from_s, baseline_rad: baseline?, augmented_rad: augmented? })
 }
 
 /// Root mean square error of each angle from a row on.

@@ -25,6 +25,9 @@ const LINE: f64 = 25.0;
 const AROUND: usize = 12;
 /// Part of the frequencies that has to be left.
 const ENOUGH: f64 = 0.15;
+/// Noise that goes on for longer than the swing takes for so much must be the same in so many parts of a recording.
+const SLOW_RAD: f64 = std::f64::consts::PI;
+const PARTS: usize = 3;
 /// Times tried for which noise goes on, in rows: from the shortest by a factor each.
 const ROWS: (f64, f64, usize) = (0.3, 1.12, 48);
 /// Of noise that goes on the frequencies off the lines tell only a part: its variance is at most this multiple of the residual's.
@@ -53,9 +56,8 @@ pub struct Noise {
 /// than chance, or where they swing nearly everywhere. Each is given as its residual and its motion.
 pub fn across([first, second]: [(&[f64], &[f64]); 2]) -> f64 {
     let (a, b) = (transform(first.0), transform(second.0));
-    let (Some(one), Some(other)) = (between_lines(&power(&a), first.1), between_lines(&power(&b), second.1)) else {
-        return 0.0;
-    };
+    let between = |noise: &[Complex<f64>], motion: &[f64]| Lines::of(motion)?.between(&power(noise));
+    let (Some(one), Some(other)) = (between(&a, first.1), between(&b, second.1)) else { return 0.0 };
     let free: Vec<usize> = one.into_iter().filter(|k| other.binary_search(k).is_ok()).collect();
     let (mut both, mut powers) = (0.0, [0.0; 2]);
     for k in &free {
@@ -80,68 +82,115 @@ pub fn ticks(t_s: &[f64]) -> Vec<usize> {
 
 /// The noise in a residual, given the motion it is the residual of; missing rows are zero in both. `None` where the motion has power nearly everywhere.
 pub fn off_the_lines(residual: &[f64], motion: &[f64]) -> Option<Noise> {
-    let noise = spectrum(residual);
     let present = residual.iter().filter(|r| **r != 0.0).count() as f64 / residual.len() as f64;
-    let free = between_lines(&noise, motion)?;
-    let count = free.len() as f64;
-    let cosines: Vec<f64> =
-        free.iter().map(|k| (std::f64::consts::PI * *k as f64 / (noise.len() - 1) as f64).cos()).collect();
-    // ln-likelihood and variance
-    let fitted = |Colour { rho, share }: Colour| {
-        let shape = |cosine: f64| 1.0 - share + share * (1.0 - rho * rho) / (1.0 + rho * rho - 2.0 * rho * cosine);
-        let (mut sum, mut ln) = (0.0, 0.0);
-        for (k, cosine) in free.iter().zip(&cosines) {
-            let shape = shape(*cosine);
-            sum += noise[*k] / shape;
-            ln += shape.ln();
-        }
-        let variance = sum / count;
-        (-ln - count * variance.ln(), variance)
+    let seen = Between::of(residual, motion)?;
+    let length = residual.len().div_ceil(PARTS);
+    let parts: Vec<Between> =
+        residual.chunks(length).zip(motion.chunks(length)).filter_map(|(r, m)| Between::of(r, m)).collect();
+    // what is slower than the swing and comes once, as a gust does, or fades, as a joint that settles, is no noise: without the part that says most for it
+    // the others must say so, too
+    let throughout = |colour: Colour| {
+        let gains: Vec<f64> = parts.iter().map(|part| part.gains(colour)).collect();
+        let is_slow = seen.swing_rad > -SLOW_RAD * colour.rho.ln();
+        !is_slow || gains.len() < PARTS || gains.iter().sum::<f64>() > gains.iter().copied().fold(0.0, f64::max)
     };
     // there is no more noise than there is residual
     let most = MOST * residual.iter().map(|r| r * r).sum::<f64>() / residual.len() as f64;
     let likeliest = |colours: &mut dyn Iterator<Item = Colour>| {
-        let fitted = colours.map(|colour| (colour, fitted(colour))).filter(|fitted| fitted.1.1 < most);
+        let fitted = colours.map(|colour| (colour, seen.likelihood(colour))).filter(|(_, (_, v))| *v < most);
         fitted.max_by(|a, b| a.1.0.total_cmp(&b.1.0))
     };
     let (shortest, factor, steps) = ROWS;
     let rhos: Vec<f64> = (0..steps).map(|k| (-1.0 / (shortest * factor.powi(k as i32))).exp()).collect();
-    let mut best = (Colour::default(), fitted(Colour::default()));
+    let mut best = (Colour::default(), seen.likelihood(Colour::default()));
     let alone = likeliest(&mut rhos.iter().map(|rho| Colour { rho: *rho, share: 1.0 }));
-    if let Some(alone) = alone.filter(|alone| alone.1.0 > best.1.0 + COLOURED) {
+    if let Some(alone) = alone.filter(|alone| alone.1.0 > best.1.0 + COLOURED && throughout(alone.0)) {
         best = alone;
     }
     let shares = (1..SHARES).map(|k| k as f64 / SHARES as f64);
     let beside = likeliest(&mut shares.flat_map(|share| rhos.iter().map(move |rho| Colour { rho: *rho, share })));
     let more = if best.0.is_white() { COLOURED } else { BESIDE };
-    if let Some(beside) = beside.filter(|beside| beside.1.0 > best.1.0 + more) {
+    if let Some(beside) = beside.filter(|beside| beside.1.0 > best.1.0 + more && throughout(beside.0)) {
         best = beside;
     }
     Some(Noise { sd: (best.1.1 / present).sqrt(), colour: best.0 })
 }
 
-/// The frequencies at which neither the motion has power nor the residual, of whose spectrum this is, a line of its own, in order; `None` where few are left.
-fn between_lines(noise: &[f64], motion: &[f64]) -> Option<Vec<usize>> {
-    let lines = spectrum(motion);
-    let peak = (1..lines.len()).max_by(|a, b| lines[*a].total_cmp(&lines[*b]))?;
-    let near = |k: usize| k.saturating_sub(BINS)..(k + BINS + 1).min(lines.len());
-    // as much of the motion as the residual has where that is strongest, it may have everywhere: it must stay below the noise
-    let least = usual(&mut noise[1..].to_vec())?;
-    let share = noise[near(peak)].iter().sum::<f64>() / lines[near(peak)].iter().sum::<f64>().max(f64::MIN_POSITIVE);
-    let bound = (MOTION * lines[peak]).max(LEAKS * least / share);
-    let of_motion = |k: usize| lines[near(k)].iter().any(|p| *p > bound);
-    let free: Vec<usize> = (1..noise.len()).filter(|k| !of_motion(*k)).collect();
-    if (free.len() as f64) < ENOUGH * noise.len() as f64 {
-        return None;
+/// A residual's power at the frequencies at which there is nothing but noise.
+struct Between {
+    /// cos 2πfΔt and power of each.
+    powers: Vec<(f64, f64)>,
+    /// By how much the swing goes on from row to row.
+    swing_rad: f64,
+}
+
+impl Between {
+    fn of(residual: &[f64], motion: &[f64]) -> Option<Self> {
+        let power = spectrum(residual);
+        let angle_rad = |k: usize| std::f64::consts::PI * k as f64 / (power.len() - 1) as f64;
+        let lines = Lines::of(motion)?;
+        let free = lines.between(&power)?;
+        let powers = free.into_iter().map(|k| (angle_rad(k).cos(), power[k])).collect();
+        Some(Self { powers, swing_rad: angle_rad(lines.peak) })
     }
-    // a line that the motion does not have, as of a moving support, must not count as noise
-    let power: Vec<f64> = free.iter().map(|k| noise[*k]).collect();
-    let stands_out = |i: usize| {
-        let first = i.saturating_sub(AROUND).min(power.len().saturating_sub(2 * AROUND + 1));
-        let around = &power[first..power.len().min(first + 2 * AROUND + 1)];
-        usual(&mut around.to_vec()).is_some_and(|usual| power[i] > LINE * usual)
-    };
-    Some((0..free.len()).filter(|i| !stands_out(*i)).map(|i| free[i]).collect())
+
+    /// ln-likelihood of a colour, up to a constant, with the variance that makes it likeliest.
+    fn likelihood(&self, Colour { rho, share }: Colour) -> (f64, f64) {
+        let shape = |cosine: f64| 1.0 - share + share * (1.0 - rho * rho) / (1.0 + rho * rho - 2.0 * rho * cosine);
+        let (mut sum, mut ln) = (0.0, 0.0);
+        for (cosine, power) in &self.powers {
+            let shape = shape(*cosine);
+            sum += power / shape;
+            ln += shape.ln();
+        }
+        let count = self.powers.len() as f64;
+        let variance = sum / count;
+        (-ln - count * variance.ln(), variance)
+    }
+
+    /// How much likelier a colour is than none.
+    fn gains(&self, colour: Colour) -> f64 {
+        self.likelihood(colour).0 - self.likelihood(Colour::default()).0
+    }
+}
+
+/// The motion's own power, and where it is strongest.
+struct Lines {
+    power: Vec<f64>,
+    peak: usize,
+}
+
+impl Lines {
+    fn of(motion: &[f64]) -> Option<Self> {
+        let power = spectrum(motion);
+        let peak = (1..power.len()).max_by(|a, b| power[*a].total_cmp(&power[*b]))?;
+        Some(Self { power, peak })
+    }
+
+    /// The frequencies at which neither the motion has power nor the residual, of whose spectrum this is, a line of its own, in order; `None` where few are
+    /// left.
+    fn between(&self, noise: &[f64]) -> Option<Vec<usize>> {
+        let Self { power: lines, peak } = self;
+        let near = |k: usize| k.saturating_sub(BINS)..(k + BINS + 1).min(lines.len());
+        // as much of the motion as the residual has where that is strongest, it may have everywhere: it must stay below the noise
+        let least = usual(&mut noise[1..].to_vec())?;
+        let share =
+            noise[near(*peak)].iter().sum::<f64>() / lines[near(*peak)].iter().sum::<f64>().max(f64::MIN_POSITIVE);
+        let bound = (MOTION * lines[*peak]).max(LEAKS * least / share);
+        let of_motion = |k: usize| lines[near(k)].iter().any(|p| *p > bound);
+        let free: Vec<usize> = (1..noise.len()).filter(|k| !of_motion(*k)).collect();
+        if (free.len() as f64) < ENOUGH * noise.len() as f64 {
+            return None;
+        }
+        // a line that the motion does not have, as of a moving support, must not count as noise
+        let power: Vec<f64> = free.iter().map(|k| noise[*k]).collect();
+        let stands_out = |i: usize| {
+            let first = i.saturating_sub(AROUND).min(power.len().saturating_sub(2 * AROUND + 1));
+            let around = &power[first..power.len().min(first + 2 * AROUND + 1)];
+            usual(&mut around.to_vec()).is_some_and(|usual| power[i] > LINE * usual)
+        };
+        Some((0..free.len()).filter(|i| !stands_out(*i)).map(|i| free[i]).collect())
+    }
 }
 
 /// The mean power of which these are chance samples, whatever the few large ones are.

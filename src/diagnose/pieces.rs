@@ -14,7 +14,7 @@ const TRIED: [usize; 2] = [6, 12];
 const FEWEST: usize = 5;
 const MOST: usize = 20;
 /// Another count must lower χ² by so many variances of the best fit.
-const WORTH: f64 = 25.0;
+pub(super) const WORTH: f64 = 25.0;
 /// An effect must lower it by this to stand beside fewer.
 const OF_AN_EFFECT: f64 = 9.0;
 /// Where the best fit leaves this many variances of the noise, a wrong count may have led to it, and every effect is tried with other counts.
@@ -54,15 +54,14 @@ pub fn preferred(ground: &Ground<'_>, fits: &[Refit<'_>]) -> Option<usize> {
     let compared: Vec<&Refit<'_>> = fits.iter().filter(|fit| within(fit) || unexplained && simple(fit)).collect();
     let others = TRIED.map(|pieces| with(ground.experiment, pieces));
     let promised = compared.par_iter().with_max_len(1).filter_map(|fit| {
-        let mut points = vec![(epsilon(usual), weights.weight(fit))];
+        let mut points = vec![(usual, weights.weight(fit))];
         for (experiment, pieces) in others.iter().zip(TRIED) {
             let other = Ground { experiment, ..ground.clone() };
-            points.push((epsilon(pieces), weights.weight(&other.refit(&fit.hypothesis, fit, &[])?)));
+            points.push((pieces, weights.weight(&other.refit(&fit.hypothesis, fit, &[])?)));
         }
-        lowest_point(&points, epsilon(MOST)..=epsilon(FEWEST))
+        likeliest_count(&points, FEWEST)
     });
-    let (lowest, value) = promised.min_by(|a, b| a.1.total_cmp(&b.1))?;
-    let pieces = (1.0 / lowest.sqrt()).round() as usize;
+    let (pieces, value) = promised.min_by(|a, b| a.1.total_cmp(&b.1))?;
     (pieces != usual && value < weights.weight(best) - WORTH).then_some(pieces)
 }
 
@@ -78,6 +77,13 @@ pub fn with(experiment: &Experiment, pieces: usize) -> Experiment {
     let mut experiment = experiment.clone();
     experiment.model.pieces = pieces;
     experiment
+}
+
+/// The count, of at least `fewest`, at which what three counts leave promises to be least, and how much that is.
+pub(super) fn likeliest_count(left: &[(usize, f64)], fewest: usize) -> Option<(usize, f64)> {
+    let points: Vec<(f64, f64)> = left.iter().map(|(pieces, left)| (epsilon(*pieces), *left)).collect();
+    let (lowest, left) = lowest_point(&points, epsilon(MOST)..=epsilon(fewest))?;
+    Some(((1.0 / lowest.sqrt()).round() as usize, left))
 }
 
 fn epsilon(pieces: usize) -> f64 {

@@ -3,7 +3,7 @@
 use super::adequacy::{Detectable, detectable};
 use super::ground::{Ground, Hypothesis};
 use super::screen::Screen;
-use super::{Cause, base_of};
+use super::{Cause, Taken, base_of};
 use crate::error::{Error, Result};
 use crate::experiment::Experiment;
 use crate::fit::Record;
@@ -29,7 +29,7 @@ pub struct Plan {
 pub fn planned(experiment: &Experiment, plan: &Plan) -> Result<Vec<Detectable>> {
     let record = [recorded(experiment, plan)?];
     let marks = record[0].links();
-    let (base, beliefs) = base_of(experiment, marks)?;
+    let (base, beliefs) = base_of(experiment, marks, Taken::AtItsWord)?;
     let causes: Vec<Cause> = Cause::ALL.into_iter().filter(|c| c.may_be_missing(experiment, &base, marks)).collect();
     let ground = Ground {
         records: &record,
@@ -39,7 +39,7 @@ pub fn planned(experiment: &Experiment, plan: &Plan) -> Result<Vec<Detectable>> 
         noise: vec![RecordNoise::white(vec![plan.noise_rad; marks])],
         step_error_rad: (1e-3 * plan.noise_rad).clamp(1e-10, 1e-6),
         begun: Vec::new(),
-        fine_strip: false,
+        fine_strip: None,
     };
     let nothing = Hypothesis::default();
     let problem = ground.problem(&nothing)?;

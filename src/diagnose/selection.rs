@@ -233,8 +233,10 @@ pub(super) fn single<'a>(
             // many links are dear: only where there is something to explain
             if unexplained {
                 let hypothesis = null.hypothesis.and(cause, None);
-                let begun = ground.begin(&hypothesis, null, &[]).filter(|b| b.chi2 < ground::HOPEFUL * null.chi2);
-                tries.push(begun.and_then(|begun| ground.again(&begun, ground::FEW_STEPS)));
+                let begun = ground.begin(&hypothesis, null, &[]).filter(|b| b.chi2 < ground::BEYOND_HOPE * null.chi2);
+                let begun = begun.and_then(|b| ground.again(&b, ground::FEW_STEPS));
+                let begun = begun.filter(|b| b.chi2 < ground::HOPEFUL * null.chi2);
+                tries.push(begun.and_then(|b| if b.converged { Some(b) } else { ground.again(&b, ground::FEW_STEPS) }));
                 if out_of_step && tries.iter().flatten().all(Refit::is_out_of_step) {
                     tries.push(ground.refit_anew(&hypothesis, &[], null.chi2));
                 }

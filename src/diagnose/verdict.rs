@@ -234,9 +234,14 @@ impl Verdict {
     }
 }
 
-/// Whether a fit with names leaves so much that the noise does not matter.
+/// Whether a fit leaves so much that the noise does not matter.
+pub fn leaves_more_than_noise(fit: &Refit<'_>) -> bool {
+    over_noise(fit) > BEYOND_NOISE
+}
+
+/// The same of a fit with names.
 pub fn is_beyond_noise(fit: &Refit<'_>) -> bool {
-    !fit.hypothesis.causes.is_empty() && over_noise(fit) > BEYOND_NOISE
+    !fit.hypothesis.causes.is_empty() && leaves_more_than_noise(fit)
 }
 
 /// What a fit leaves of the angles, over their noise: root mean squares, of the worst recording.

@@ -47,11 +47,14 @@ impl Experiment {
     /// # Errors
     /// [`Error::Config`].
     pub fn parse(text: &str, path: &Path) -> Result<Self> {
-        let experiment: Self = toml::from_str(text).map_err(|e| Error::Config {
+        let wrong = |e: toml::de::Error| Error::Config {
             path: path.to_owned(),
             line: e.span().map(|s| text[..s.start.min(text.len())].matches('\n').count() + 1),
             message: with_nearest_key(e.message()),
-        })?;
+        };
+        let mut experiment: Self = toml::from_str(text).map_err(wrong)?;
+        let keys: toml::Table = toml::from_str(text).map_err(wrong)?;
+        experiment.model.states_damping = keys.get("model").is_some_and(|m| m.get("c_eq_n_m_s_per_rad").is_some());
         let invalid = |message: String| Error::Config { path: path.to_owned(), line: None, message };
         experiment.specimen.validate().map_err(invalid)?;
         experiment.rig.validate().map_err(invalid)?;

@@ -75,6 +75,9 @@ pub struct Model {
     pub k_eq_n_m_per_rad: f64,
     /// Damping of the joint.
     pub c_eq_n_m_s_per_rad: f64,
+    /// Whether the file states that damping. Of one link, which has no joint, it stands for the hinge's, which a base model has or has not.
+    #[serde(skip)]
+    pub states_damping: bool,
     /// Angles at release, at rest.
     pub release_rad: Vec<f64>,
     /// Rods between two marks, where the strip bends everywhere (`distributed_flexibility`).
@@ -88,6 +91,7 @@ impl Default for Model {
         Self {
             k_eq_n_m_per_rad: 2.0e-4,
             c_eq_n_m_s_per_rad: 2.0e-6,
+            states_damping: false,
             release_rad: vec![0.5, 0.6],
             pieces: 8,
             effects: Effects::default(),

@@ -3,7 +3,7 @@
 use nalgebra::{DMatrix, DVector, SymmetricEigen};
 
 use super::Problem;
-use super::descent::{Descent, Ending, Outcome};
+use super::descent::{Block, Descent, Ending, Outcome};
 use super::problem::stacked;
 use crate::model::Parameter;
 
@@ -99,7 +99,7 @@ fn inverse_of(normal: &DMatrix<f64>) -> DMatrix<f64> {
 
 /// Ljung and Box's test of the residuals of every angle, at 0.1 %.
 fn is_coloured(problem: &Problem<'_>, outcome: &Outcome) -> bool {
-    outcome.blocks.iter().enumerate().any(|(record, block)| {
+    blocks_of_recordings(problem, outcome).any(|(record, block)| {
         links_of(problem, record).into_iter().any(|rows| {
             let r: Vec<f64> = rows.map(|row| block.residual[row]).collect();
             let n = r.len();
@@ -112,6 +112,11 @@ fn is_coloured(problem: &Problem<'_>, outcome: &Outcome) -> bool {
             q > CHI2_LAGS
         })
     })
+}
+
+/// The block of each recording. After them stand those of what is known beforehand, which are no residuals in time.
+fn blocks_of_recordings<'o>(problem: &Problem<'_>, outcome: &'o Outcome) -> impl Iterator<Item = (usize, &'o Block)> {
+    outcome.blocks.iter().take(problem.records.len()).enumerate()
 }
 
 /// The rows of each angle in a recording's block.
@@ -133,7 +138,7 @@ fn widened(problem: &Problem<'_>, outcome: &Outcome, inverse: &DMatrix<f64>, whi
     let (residual, slopes) = stacked(&outcome.blocks, variables);
     let mut middle = DMatrix::zeros(variables, variables);
     let mut first = 0;
-    for (record, block) in outcome.blocks.iter().enumerate() {
+    for (record, block) in blocks_of_recordings(problem, outcome) {
         let data = &problem.records[record];
         let step_s = (data.t_s[data.len() - 1] - data.t_s[0]) / (data.len() - 1).max(1) as f64;
         let pace_rad_s =

@@ -7,6 +7,7 @@
 use std::ops::Range;
 
 use nalgebra::{DMatrix, DVector};
+use rayon::prelude::*;
 
 use super::descent::{Block, Descent};
 use super::predict::{Request, predict};
@@ -151,36 +152,47 @@ fn cut(index: usize, record: &Record, length_s: f64, wanted: usize) -> Vec<Stret
 }
 
 fn blocks(problem: &Problem<'_>, stretches: &[Stretch], x: &[f64], seam: f64, pace_rad_s: f64) -> Option<Vec<Block>> {
+    let of = |index: usize| of_stretch(problem, stretches, index, x, seam, pace_rad_s);
+    let of_stretches: Option<Vec<_>> = (0..stretches.len()).into_par_iter().map(of).collect();
+    let seams_beside = of_stretches?.into_iter().flat_map(|(own, seam)| std::iter::once(own).chain(seam));
+    Some(problem.belief_block(x).into_iter().chain(seams_beside).collect())
+}
+
+/// The residuals of one stretch, and of the seam after it.
+fn of_stretch(
+    problem: &Problem<'_>,
+    stretches: &[Stretch],
+    index: usize,
+    x: &[f64],
+    seam: f64,
+    pace_rad_s: f64,
+) -> Option<(Block, Option<Block>)> {
     let (free, marks) = (problem.free.len(), problem.marks());
-    let mut blocks = Vec::with_capacity(2 * stretches.len() + 1);
-    blocks.extend(problem.belief_block(x));
-    for (index, stretch) in stretches.iter().enumerate() {
-        let (model, camera) = problem.model(stretch.record, &x[..free]).ok()?;
-        let start = free + index * 2 * marks;
-        let request = stretch.request(problem, &camera, &x[start..start + 2 * marks], true);
-        let prediction = predict(&model, &request).ok()?;
-        let own: Vec<usize> = (0..free).chain(start..start + 2 * marks).collect();
-        blocks.push(problem.block(stretch.record, &prediction, own.clone()));
-        if stretch.last {
-            continue;
-        }
-        let (end, end_slopes) = prediction.end;
-        let next = start + 2 * marks;
-        let mut columns = own;
-        columns.extend(next..next + 2 * marks);
-        let mut slopes = DMatrix::zeros(2 * marks, columns.len());
-        slopes.columns_mut(0, end_slopes.ncols()).copy_from(&end_slopes);
-        let mut residual = DVector::zeros(2 * marks);
-        for row in 0..2 * marks {
-            let noise_rad = problem.noise[stretch.record].sd_rad[row % marks];
-            let weight = 1.0 / (seam * noise_rad * if row < marks { 1.0 } else { pace_rad_s });
-            residual[row] = weight * (end[row] - x[next + row]);
-            slopes[(row, free + 2 * marks + row)] = -1.0;
-            slopes.row_mut(row).scale_mut(weight);
-        }
-        blocks.push(Block { columns, residual, slopes, robust: false });
+    let stretch = &stretches[index];
+    let (model, camera) = problem.model(stretch.record, &x[..free]).ok()?;
+    let start = free + index * 2 * marks;
+    let request = stretch.request(problem, &camera, &x[start..start + 2 * marks], true);
+    let prediction = predict(&model, &request).ok()?;
+    let own: Vec<usize> = (0..free).chain(start..start + 2 * marks).collect();
+    let block = problem.block(stretch.record, &prediction, own.clone());
+    if stretch.last {
+        return Some((block, None));
     }
-    Some(blocks)
+    let (end, end_slopes) = prediction.end;
+    let next = start + 2 * marks;
+    let mut columns = own;
+    columns.extend(next..next + 2 * marks);
+    let mut slopes = DMatrix::zeros(2 * marks, columns.len());
+    slopes.columns_mut(0, end_slopes.ncols()).copy_from(&end_slopes);
+    let mut residual = DVector::zeros(2 * marks);
+    for row in 0..2 * marks {
+        let noise_rad = problem.noise[stretch.record].sd_rad[row % marks];
+        let weight = 1.0 / (seam * noise_rad * if row < marks { 1.0 } else { pace_rad_s });
+        residual[row] = weight * (end[row] - x[next + row]);
+        slopes[(row, free + 2 * marks + row)] = -1.0;
+        slopes.row_mut(row).scale_mut(weight);
+    }
+    Some((block, Some(Block { columns, residual, slopes, robust: false })))
 }
 
 /// The data's residuals in units of the noise, with recording and link.
