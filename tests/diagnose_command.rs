@@ -228,6 +228,36 @@ fn one_link_is_diagnosed_alone_and_together_with_another_recording_of_it() {
 }
 
 #[test]
+fn one_link_lacks_a_damper_where_its_file_states_none() {
+    let folder = Folder::new();
+    let undamped = ONE_LINK.replace("hinge_viscous = 1e-3\n", "");
+    let angles = folder.swing(&undamped, "hinge_viscous = 1e-3\n");
+    let report = folder.diagnosis(&angles, &undamped, &[]);
+    assert!(names(&report["verdict"]["class"]).contains(&"hinge_viscous"), "{:#}", report["verdict"]);
+    let stated = undamped.replace("[model]", "[model]\nc_eq_n_m_s_per_rad = 1e-4");
+    let report = folder.diagnosis(&angles, &stated, &[]);
+    assert_eq!(report["verdict"]["status"], "adequate", "{:#}", report["verdict"]);
+}
+
+#[test]
+fn a_spring_at_the_hinge_is_not_taken_for_a_wrong_inertia() {
+    let folder = Folder::new();
+    let angles = folder.swing(ONE_LINK, "hinge_stiffness = 5e-3\n");
+    let report = folder.diagnosis(&angles, ONE_LINK, &[]);
+    assert!(names(&report["verdict"]["class"]).contains(&"hinge_stiffness"), "{:#}", report["verdict"]);
+}
+
+#[test]
+fn a_start_far_from_the_truth_leads_to_it() {
+    let folder = Folder::new();
+    let angles = folder.swing(BASE, "");
+    let report = folder.diagnosis(&angles, &BASE.replace("2.0e-4", "1.0"), &[]);
+    assert_eq!(report["verdict"]["status"], "adequate", "{:#}", report["verdict"]);
+    let k_eq = report["baseline"]["parameters"]["k_eq_n_m_per_rad"]["value"].as_f64().unwrap();
+    assert!((k_eq / 2.0e-4 - 1.0).abs() < 0.01, "{k_eq}");
+}
+
+#[test]
 fn a_swing_that_goes_far_from_frame_to_frame_is_named_all_the_same() {
     let folder = Folder::new();
     // 2.4 Hz and 7.5 Hz at 30 frames a second: linearised from row to row in one piece, the motion would grow of its own

@@ -34,7 +34,7 @@ Examples:
   freeswing diagnose --detectable --config experiment.toml --duration 60 --rate 30 --noise-rad 3e-4
 
 The base model is that of `fit`: the joint's spring and damper, every effect named in [model.effects], and each recording's start; of one link
-the hinge's viscous damper. All other effects are candidates, those of the camera first.")]
+the hinge's viscous damper, if the file states it or c_eq_n_m_s_per_rad. All other effects are candidates, those of the camera first.")]
 pub struct DiagnoseArgs {
     /// Tables of angles of one specimen; `-` is standard input.
     #[arg(required_unless_present = "detectable", conflicts_with = "detectable", value_name = "ANGLES")]

@@ -1,4 +1,5 @@
-//! A law of no particular form at one place, as an unknown: whatever torque the angle and the rate there determine, and what of it drifts.
+//! A law of no particular form at one place, as an unknown: whatever torque the angle and the rate there determine, and what of it drifts; of the camera
+//! whatever offset of an angle that angle determines, as a lens does, and one that drifts.
 //!
 //! The process of [`super::latent`] takes any course in time, and pays for it row after row; something that follows the swing, as most that acts in a
 //! laboratory does, needs a handful of numbers. They are the coefficients b of some functions f of the state, their torques all of the size s:
@@ -13,10 +14,11 @@ use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
 use super::Place;
-use super::latent::{Form, Latent};
+use super::latent::{Form, Latent, SIZES};
 use super::refit::Refit;
 use super::screen::Projection;
 use super::surroundings::{Input, Row, Surroundings};
+use crate::fit::Record;
 use crate::model::effects::air::stations;
 use crate::model::{ForwardModel, Motion};
 
@@ -26,6 +28,8 @@ const DRY: f64 = 0.05;
 const OF_STATE: usize = 15;
 /// Functions of a speed across the strip.
 const OF_SPEED: usize = 8;
+/// Functions of an angle as it is seen.
+const OF_VIEW: usize = 8;
 
 /// Of an angle x and its rate v, both over their largest, and of the time τ from −½ to ½.
 fn of_state(x: f64, v: f64, tau: f64) -> [f64; OF_STATE] {
@@ -37,6 +41,12 @@ fn of_state(x: f64, v: f64, tau: f64) -> [f64; OF_STATE] {
 /// Forces per length, of a speed over its largest and of the time.
 fn of_speed(v: f64, tau: f64) -> [f64; OF_SPEED] {
     [1.0, v, (v / DRY).tanh(), v * v.abs(), v * v, v * v * v, tau, tau * v]
+}
+
+/// Offsets, of an angle over its largest and of the time. Not of the rate, nor of both: a clock and a gain that drift do what a spring and a damper do that
+/// drift, and those are more common.
+fn of_view(x: f64, tau: f64) -> [f64; OF_VIEW] {
+    [1.0, x, x * x, x * x * x, tau, tau * tau, tau * tau * tau, tau.powi(4)]
 }
 
 /// The middle between two rows of a recording.
@@ -98,6 +108,16 @@ impl<'s> Swing<'s> {
         torques
     }
 
+    /// What each function of the angles seen adds to them, row after row, mark after mark.
+    fn of_camera(&self, largest_rad: f64) -> Vec<[f64; OF_VIEW]> {
+        let last = self.around.rows.len().max(2) - 1;
+        let of_row = |(k, row): (usize, &Row)| {
+            let tau = k as f64 / last as f64 - 0.5;
+            row.chord_rad.iter().map(|x| of_view(x / largest_rad, tau)).collect::<Vec<_>>()
+        };
+        self.around.rows.iter().enumerate().flat_map(of_row).collect()
+    }
+
     /// The largest speed across the strip at an instant.
     fn fastest_m_s(&self, at: &Instant) -> f64 {
         let mut fastest_m_s = 0.0f64;
@@ -106,23 +126,22 @@ impl<'s> Swing<'s> {
     }
 }
 
-/// What each function of a law adds to the values seen of all recordings, whitened, for a torque of root mean square 1; and nothing to what else there
-/// is in as many rows, the beliefs.
+/// What each function of a law adds to the values seen of all recordings, whitened, for a torque of root mean square 1 (of the camera an offset); and nothing
+/// to what else there is in as many rows, the beliefs. `acts` are the torques of a swing, or what it adds to the angles, and what that does to the values.
 fn columns<const C: usize>(
     swings: &[Swing<'_>],
     rows: usize,
-    torques: impl Fn(&Swing<'_>, &Instant) -> Vec<[f64; C]>,
+    acts: impl Fn(&Swing<'_>) -> (Vec<[f64; C]>, DMatrix<f64>),
 ) -> DMatrix<f64> {
     let (mut square, mut count) = ([0.0; C], 0usize);
     let mut all = DMatrix::zeros(rows, C);
     let mut first = 0;
     for swing in swings {
-        let held: Vec<Vec<[f64; C]>> = swing.instants.iter().map(|at| torques(swing, at)).collect();
-        for torque in held.iter().flatten() {
-            square.iter_mut().zip(torque).for_each(|(square, torque)| *square += torque * torque);
+        let (held, seen) = acts(swing);
+        for size in &held {
+            square.iter_mut().zip(size).for_each(|(square, size)| *square += size * size);
         }
-        count += held.len();
-        let seen = swing.around.seen(&swing.around.responses(&swing.transitions, &held));
+        count += swing.instants.len();
         all.rows_mut(first, seen.nrows()).copy_from(&seen);
         first += seen.nrows();
     }
@@ -132,8 +151,21 @@ fn columns<const C: usize>(
     all
 }
 
-/// A law of any form around a fit, at each place that can have one, of the likeliest of some sizes (N·m); `variance` scales that of the noise.
-pub fn any_laws(fit: &Refit<'_>, around: &[Surroundings], variance: f64, sizes_n_m: &[f64]) -> Vec<Latent> {
+/// The torques on the links at all instants, and what they do to the values seen.
+fn torques<const C: usize>(swing: &Swing<'_>, of: impl Fn(&Instant) -> Vec<[f64; C]>) -> (Vec<[f64; C]>, DMatrix<f64>) {
+    let held: Vec<Vec<[f64; C]>> = swing.instants.iter().map(of).collect();
+    let seen = swing.around.seen(&swing.around.responses(&swing.transitions, &held));
+    (held.into_iter().flatten().collect(), seen)
+}
+
+/// A law of any form around a fit, at each place that can have one, of the likeliest of the place's sizes (N·m, of the camera rad); `variance` scales that of
+/// the noise.
+pub fn any_laws(
+    fit: &Refit<'_>,
+    around: &[Surroundings],
+    variance: f64,
+    sizes: impl Fn(Place) -> [f64; SIZES] + Sync,
+) -> Vec<Latent> {
     let Some(projection) = Projection::of(fit) else { return Vec::new() };
     let rows = projection.residual.len();
     let swing = |(record, around)| {
@@ -149,30 +181,40 @@ pub fn any_laws(fit: &Refit<'_>, around: &[Surroundings], variance: f64, sizes_n
     };
     let of_input = |input: Input| {
         let largest = [0, 1].map(|i| largest(&|swing, at| swing.conjugate(input, at).1[i]));
-        columns(&swings, rows, |swing, at| swing.of_input(input, at, largest))
+        columns(&swings, rows, |swing| torques(swing, |at| swing.of_input(input, at, largest)))
     };
     let of_air = || {
         let largest_m_s = largest(&|swing, at| swing.fastest_m_s(at));
-        columns(&swings, rows, |swing, at| swing.of_air(at, largest_m_s))
+        columns(&swings, rows, |swing| torques(swing, |at| swing.of_air(at, largest_m_s)))
     };
-    let places = Place::OF_LOSSES.into_iter().filter(|p| *p != Place::Joint || fit.problem.marks() > 1);
+    let of_camera = || {
+        let largest_rad = fit.problem.records.iter().map(Record::largest_angle_rad).fold(f64::MIN_POSITIVE, f64::max);
+        columns(&swings, rows, |swing| {
+            let offsets = swing.of_camera(largest_rad);
+            let seen = swing.around.seen(&offsets);
+            (offsets, seen)
+        })
+    };
+    let places = [Place::Hinge, Place::Joint, Place::Air, Place::Camera];
+    let places = places.into_iter().filter(|p| *p != Place::Joint || fit.problem.marks() > 1);
     let likeliest = |place: Place| {
         let columns = match place {
             Place::Joint => of_input(Input::Joint),
             Place::Air => of_air(),
-            _ => of_input(Input::Hinge),
+            Place::Camera => of_camera(),
+            Place::Hinge => of_input(Input::Hinge),
         };
         let columns = projection.out(&columns);
         let eigen = columns.tr_mul(&columns).symmetric_eigen();
         let along = eigen.eigenvectors.tr_mul(&columns.tr_mul(&projection.residual));
-        let gain = |size_n_m: f64| {
+        let gain = |size: f64| {
             let of = |(along, lambda): (&f64, &f64)| {
-                let seen = size_n_m * size_n_m * lambda.max(0.0) / variance;
-                along * along * size_n_m * size_n_m / (variance * variance * (1.0 + seen)) - seen.ln_1p()
+                let seen = size * size * lambda.max(0.0) / variance;
+                along * along * size * size / (variance * variance * (1.0 + seen)) - seen.ln_1p()
             };
             0.5 * along.iter().zip(&eigen.eigenvalues).map(of).sum::<f64>()
         };
-        Latent::likeliest(Form::Law(place), sizes_n_m.iter().map(|size| (*size, gain(*size))))
+        Latent::likeliest(Form::Law(place), sizes(place).into_iter().map(|size| (size, gain(size))))
     };
     places.collect::<Vec<_>>().into_par_iter().map(likeliest).collect()
 }

@@ -12,6 +12,7 @@
 
 use super::ground::Hypothesis;
 use super::refit::Refit;
+use super::screen::LOWEST;
 use super::{Cause, Place, noise};
 use crate::model::Parameter;
 
@@ -87,6 +88,7 @@ pub fn ln_evidence(fit: &Refit<'_>, scatter: Scatter, least_without: impl Fn(Cau
     for cause in &fit.hypothesis.causes {
         let (value, sd) = match cause {
             Cause::DistributedFlexibility => continue,
+            Cause::SupportMotion if only_leans(fit) => return f64::NEG_INFINITY,
             Cause::SupportMotion => {
                 let ((sine, sd), (cosine, _)) = (of(Parameter::SupportSine), of(Parameter::SupportCosine));
                 (sine.hypot(cosine), sd)
@@ -121,6 +123,13 @@ pub fn ln_evidence(fit: &Refit<'_>, scatter: Scatter, least_without: impl Fn(Cau
         }
     }
     likelihood + ln_volume
+}
+
+/// Whether the support of a fit moves so slowly beside the swing that nothing moves but the angles' zero.
+fn only_leans(fit: &Refit<'_>) -> bool {
+    let Ok((model, _)) = fit.problem.model(0, &fit.x[..fit.problem.free.len()]) else { return false };
+    let swing_hz = model.pace_rad_s() / std::f64::consts::TAU;
+    fit.value(Parameter::SupportFrequency).is_some_and(|hz| hz < LOWEST * swing_hz)
 }
 
 /// Probabilities from logarithms, which need not be normalised.

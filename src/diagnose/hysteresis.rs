@@ -3,8 +3,10 @@
 //! Before it yields, a hysteresis is a spring of stiffness T_h/Δ_y beside the joint's K, and their sum is what a recording tells best. In (K, T_h, Δ_y)
 //! the valley of equal sums is bent, and a descent creeps along it; in (K, T_h/Δ_y, Δ_y) it is straight.
 
+use rayon::prelude::*;
+
 use super::Cause;
-use super::ground::Ground;
+use super::ground::{self, Ground};
 use super::refit::Refit;
 use super::screen::Score;
 use super::selection::Lacks;
@@ -15,6 +17,12 @@ use crate::model::Parameter;
 /// Starts: yield angles as parts of the largest bend, and the hysteresis' part of the spring.
 const YIELD_SHARES: [f64; 3] = [0.05, 0.2, 0.6];
 const SPRING_SHARES: [f64; 2] = [0.4, 0.9];
+/// The same where everything else has failed, and how much stiffer the joint may then be; how many of them begin a descent, and how many end it.
+const EVERY_YIELD: [f64; 5] = [0.03, 0.1, 0.25, 0.5, 0.9];
+const EVERY_SHARE: [f64; 4] = [0.1, 0.4, 0.7, 0.95];
+const STIFFER: [f64; 2] = [1.0, 2.0];
+const BEGUN: usize = 8;
+const ENDED: usize = 3;
 
 /// Where T_h and Δ_y stand among a problem's variables.
 #[derive(Debug, Clone, Copy)]
@@ -96,28 +104,57 @@ pub(super) fn alone<'a>(
 
 /// The hysteresis where it makes up a part of what the base model takes for the spring: from the best of several such starts.
 fn softened<'a>(ground: &Ground<'a>, null: &Refit<'a>) -> Option<Refit<'a>> {
-    let spring =
-        [Parameter::JointStiffness, Parameter::BendingStiffness].into_iter().find(|p| null.value(*p).is_some())?;
     let hypothesis = null.hypothesis.and(Cause::JointHysteretic, None);
-    let stiffness =
-        null.problem.model(0, &null.x[..null.problem.free.len()]).ok()?.0.value(Parameter::JointStiffness)?;
-    let starts = YIELD_SHARES.iter().flat_map(|yields| SPRING_SHARES.iter().map(move |share| (*yields, *share)));
-    let start = |(yields, share): (f64, f64)| {
-        let yield_rad = yields * ground.largest_bend_rad();
-        vec![
-            (spring, (1.0 - share) * null.value(spring).unwrap_or(0.0)),
-            // what it loses the base model took for the damper's
-            (Parameter::JointDamping, (1.0 - share) * null.value(Parameter::JointDamping).unwrap_or(0.0)),
-            (Parameter::HysteresisTorque, share * stiffness * yield_rad),
-            (Parameter::HysteresisYield, yield_rad),
-        ]
-    };
-    let costed = starts.map(start).map(|start| (ground.cost_at(&hypothesis, null, &start), start));
+    let starts = starts(ground, null, &YIELD_SHARES, &SPRING_SHARES, &[1.0])?;
+    let costed = starts.into_iter().map(|start| (ground.cost_at(&hypothesis, null, &start), start));
     let (_, best) = costed.min_by(|a, b| a.0.total_cmp(&b.0))?;
     if ground.is_strip() {
         return ground.begin(&hypothesis, null, &best);
     }
     ground.refit(&hypothesis, null, &best)
+}
+
+/// Where a hysteresis beside a fit may start: with these yield angles, as parts of the largest bend, as these parts of the spring, the spring being as many times
+/// as stiff before it yields as that fit has it.
+fn starts(
+    ground: &Ground<'_>,
+    fit: &Refit<'_>,
+    yield_shares: &[f64],
+    spring_shares: &[f64],
+    stiffer: &[f64],
+) -> Option<Vec<Vec<(Parameter, f64)>>> {
+    let spring =
+        [Parameter::JointStiffness, Parameter::BendingStiffness].into_iter().find(|p| fit.value(*p).is_some())?;
+    let stiffness = fit.problem.model(0, &fit.x[..fit.problem.free.len()]).ok()?.0.value(Parameter::JointStiffness)?;
+    let mut starts = Vec::new();
+    for yield_rad in yield_shares.iter().map(|share| share * ground.largest_bend_rad()) {
+        for (share, scale) in spring_shares.iter().flat_map(|share| stiffer.iter().map(move |scale| (share, scale))) {
+            starts.push(vec![
+                (spring, (1.0 - share) * scale * fit.value(spring).unwrap_or(0.0)),
+                // what it loses the base model took for the damper's
+                (Parameter::JointDamping, (1.0 - share) * fit.value(Parameter::JointDamping).unwrap_or(0.0)),
+                (Parameter::HysteresisTorque, share * scale * stiffness * yield_rad),
+                (Parameter::HysteresisYield, yield_rad),
+            ]);
+        }
+    }
+    Some(starts)
+}
+
+/// The hysteresis beside a fit from wherever it may be: its sum of squares has many false minima.
+pub(super) fn anywhere<'a>(ground: &Ground<'a>, fit: &Refit<'a>) -> Option<Refit<'a>> {
+    let hypothesis = fit.hypothesis.and(Cause::JointHysteretic, None);
+    let starts = starts(ground, fit, &EVERY_YIELD, &EVERY_SHARE, &STIFFER)?;
+    let cost = |start: Vec<(Parameter, f64)>| (ground.cost_at(&hypothesis, fit, &start), start);
+    let mut costed: Vec<_> = starts.into_par_iter().with_max_len(1).map(cost).collect();
+    costed.sort_by(|a, b| a.0.total_cmp(&b.0));
+    costed.truncate(BEGUN);
+    let mut begun: Vec<Refit<'a>> =
+        (costed.par_iter().with_max_len(1)).filter_map(|(_, start)| ground.begin(&hypothesis, fit, start)).collect();
+    begun.sort_by(|a, b| a.chi2.total_cmp(&b.chi2));
+    begun.truncate(ENDED);
+    let ended = begun.par_iter().with_max_len(1).filter_map(|begun| ground.again(begun, ground::MOST_STEPS));
+    ended.min_by(|a, b| a.chi2.total_cmp(&b.chi2))
 }
 
 #[cfg(test)]

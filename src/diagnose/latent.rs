@@ -32,7 +32,7 @@ const WIDE: f64 = 300.0;
 /// Least white noise beside noise that goes on, in units of its variance.
 const WHITE: f64 = 1e-4;
 /// Sizes tried, a factor each.
-const SIZES: usize = 9;
+pub(super) const SIZES: usize = 9;
 const SIZE_FACTOR: f64 = 3.0;
 
 /// What is assumed of an unknown.

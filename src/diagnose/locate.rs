@@ -32,7 +32,7 @@ pub fn unknowns(fit: &Refit<'_>, variance: f64, assumed: Assumed) -> Vec<Latent>
     };
     let mut unknowns: Vec<Latent> = inputs.filter_map(course).collect();
     if assumed.beyond == Beyond::TheFit {
-        unknowns.extend(any_laws(fit, &around, variance, &sizes(typical(fit, Place::Hinge))));
+        unknowns.extend(any_laws(fit, &around, variance, |place| sizes(typical(fit, place))));
     }
     unknowns.sort_by(|a, b| b.gain.total_cmp(&a.gain));
     unknowns

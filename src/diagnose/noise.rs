@@ -92,7 +92,9 @@ pub fn off_the_lines(residual: &[f64], motion: &[f64]) -> Option<Noise> {
     let throughout = |colour: Colour| {
         let gains: Vec<f64> = parts.iter().map(|part| part.gains(colour)).collect();
         let is_slow = seen.swing_rad > -SLOW_RAD * colour.rho.ln();
-        !is_slow || gains.len() < PARTS || gains.iter().sum::<f64>() > gains.iter().copied().fold(0.0, f64::max)
+        !is_slow
+            || gains.len() < PARTS
+            || gains.iter().sum::<f64>() > gains.iter().copied().fold(0.0, f64::max) + BESIDE
     };
     // there is no more noise than there is residual
     let most = MOST * residual.iter().map(|r| r * r).sum::<f64>() / residual.len() as f64;
@@ -296,6 +298,21 @@ mod tests {
         let noise = off_the_lines(&residual, &motion).unwrap();
         assert!((noise.colour.rho - rho).abs() < 0.02 && (noise.colour.share - share).abs() < 0.1, "{noise:?}");
         assert!((noise.sd / 4e-3 - 1.0).abs() < 0.12, "{noise:?}");
+    }
+
+    #[test]
+    fn a_gust_is_no_noise() {
+        let mut random = rand::rngs::StdRng::seed_from_u64(11);
+        let once = |i: usize| 5e-4 * (-((i as f64 - 430.0) / 20.0).powi(2)).exp();
+        let residual: Vec<f64> = (0..600)
+            .map(|i| {
+                let white: f64 = StandardNormal.sample(&mut random);
+                1e-4 * white + once(i)
+            })
+            .collect();
+        let motion: Vec<f64> = (0..600).map(|i| 0.5 * (0.4 * f64::from(i)).cos()).collect();
+        let noise = off_the_lines(&residual, &motion).unwrap();
+        assert!(noise.colour.rho < 0.5, "{noise:?}");
     }
 
     #[test]

@@ -25,7 +25,8 @@ const YIELDS: [f64; 3] = [0.03, 0.15, 0.6];
 const PER_RESOLUTION: f64 = 1.0;
 /// Peaks over the frequency that are kept beside the highest.
 const FURTHER_PEAKS: usize = 4;
-/// Highest frequency of a moving support, in units of the swing's.
+/// Lowest and highest frequency of a moving support, in units of the swing's. A slower one only leans, and has to move by metres to do so.
+pub(super) const LOWEST: f64 = 0.1;
 const HIGHEST: f64 = 8.0;
 
 /// What one effect promises.
@@ -255,8 +256,9 @@ impl<'g, 'a> Screen<'g, 'a> {
         let nyquist_hz = 0.5 * around.iter().map(|(a, _, _)| a.t_s.len() as f64).fold(0.0, f64::max) / span_s;
         let count = (PER_RESOLUTION * span_s * (HIGHEST * swing_hz).min(0.9 * nyquist_hz)) as usize;
         let hz = |k: usize| (k as f64 + 0.5) / (PER_RESOLUTION * span_s);
+        let first = ((PER_RESOLUTION * span_s * LOWEST * swing_hz) as usize).max(1);
         let promises: Vec<(f64, f64)> =
-            (1..count).filter_map(|k| Some((self.promise(&self.at_frequency(&around, hz(k)))?, hz(k)))).collect();
+            (first..count).filter_map(|k| Some((self.promise(&self.at_frequency(&around, hz(k)))?, hz(k)))).collect();
         let is_peak = |k: &usize| {
             let near = promises[k.saturating_sub(1)..promises.len().min(k + 2)].iter();
             near.map(|p| p.0).fold(f64::NEG_INFINITY, f64::max) <= promises[*k].0

@@ -2,12 +2,12 @@
 
 use rayon::prelude::*;
 
-use super::Cause;
 use super::ground::{self, Ground};
 use super::noise::BEYOND_NOISE;
 use super::refit::Refit;
 use super::screen::{Score, Screen};
 use super::selection::{self, Lacks};
+use super::{Cause, hysteresis};
 use crate::fit::Record;
 use crate::progress::Progress;
 
@@ -33,8 +33,13 @@ pub fn second_look<'a>(
     let fits = from_the_first_part(ground, fits, |fits| seeds(ground, fits));
     let seeds: Vec<&Refit<'a>> = seeds(ground, &fits).into_iter().map(|i| &fits[i]).collect();
     progress.begin("second look", Some((seeds.len() * causes.len()) as u64));
-    let pairs: Vec<Refit<'a>> = seeds.iter().flat_map(|seed| beside(ground, seed, causes, progress)).collect();
-    let all = merged(fits, pairs);
+    let mut others: Vec<Refit<'a>> = seeds.iter().flat_map(|seed| beside(ground, seed, causes, progress)).collect();
+    if causes.contains(&Cause::JointHysteretic) {
+        let lacking = seeds.iter().filter(|seed| !seed.hypothesis.causes.contains(&Cause::JointHysteretic));
+        let bases = lacking.copied().chain(fits.first());
+        others.extend(bases.filter_map(|base| hysteresis::anywhere(ground, base)));
+    }
+    let all = merged(fits, others);
     let all = from_the_first_part(ground, all, |fits| {
         let mut chosen = best(fits, ANEW, |_| true, |fit| fit.chi2);
         if ground.records.iter().any(comes_to_rest) {

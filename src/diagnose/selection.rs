@@ -36,6 +36,8 @@ const SCANNED: usize = 3;
 const MOST_PAIRS: usize = 20;
 /// A dear pair must lower the best χ² by this.
 const WORTH: f64 = 9.0;
+/// A χ² that was this many times as large was not yet a minimum's.
+const FAR_DOWN: f64 = 3.0;
 /// Pairs fitted even where they promise little.
 const FEWEST_PAIRS: usize = 6;
 
@@ -65,10 +67,16 @@ pub fn fits<'a>(ground: &mut Ground<'a>, null: Refit<'a>, causes: &[Cause], prog
     let pairs: Vec<Refit<'a>> = pairs.collect();
     all.extend(pairs);
     let all = with_refined_noise(ground, all);
+    let least = least_chi2(&all);
     let all = without_stragglers(ground, all);
+    let all = if least_chi2(&all) < least { with_refined_noise(ground, all) } else { all };
     let all = fine_strip::with_fine_strip(ground, all, causes, progress);
     let all = second_look::second_look(ground, all, causes, progress);
     with_errors_in_step(ground, all)
+}
+
+fn least_chi2(fits: &[Refit<'_>]) -> f64 {
+    fits.iter().map(|fit| fit.chi2).fold(f64::INFINITY, f64::min)
 }
 
 /// The base model anew from weaker dampers, where it leaves much: what it lacks can have driven its own damper so high that a mode is gone, and no
@@ -151,8 +159,15 @@ fn without_stragglers<'a>(ground: &Ground<'a>, mut fits: Vec<Refit<'a>>) -> Vec<
     fits
 }
 
-/// The same fits with the noise that the best of them leaves; those that have not yet converged, and are worth it, go on.
+/// The same fits with the noise that the best of them leaves; those that have not yet converged, and are worth it, go on. Where that led far down, the noise is
+/// what is left there.
 pub(super) fn with_refined_noise<'a>(ground: &mut Ground<'a>, fits: Vec<Refit<'a>>) -> Vec<Refit<'a>> {
+    let before = least_chi2(&fits);
+    let fits = refined_once(ground, fits);
+    if FAR_DOWN * least_chi2(&fits) < before { refined_once(ground, fits) } else { fits }
+}
+
+fn refined_once<'a>(ground: &mut Ground<'a>, fits: Vec<Refit<'a>>) -> Vec<Refit<'a>> {
     let best = fits.iter().min_by(|a, b| a.chi2.total_cmp(&b.chi2));
     let changed = best.is_some_and(|best| ground.refine_noise(best));
     let ground = &*ground;
@@ -180,7 +195,7 @@ fn with_errors_in_step<'a>(ground: &mut Ground<'a>, fits: Vec<Refit<'a>>) -> Vec
     if ground.noise.iter().all(|noise| noise.in_step == 0.0) {
         return fits;
     }
-    let least = fits.iter().map(|fit| fit.chi2).fold(f64::INFINITY, f64::min);
+    let least = least_chi2(&fits);
     let again = |fit: Refit<'a>| {
         let worth = fit.chi2 < HOPELESS * (least + HOPELESS);
         ground.again(&fit, if worth { ground::FEW_STEPS } else { 0 }).unwrap_or(fit)

@@ -8,6 +8,7 @@ use super::refit::Refit;
 use super::{Cause, Place, locate};
 use crate::fit::whitening::RecordNoise;
 use crate::model::Parameter;
+use crate::statistics::median_step_s;
 
 /// A verdict stands alone when it is at least this probable.
 const ALONE: f64 = 0.75;
@@ -26,6 +27,11 @@ const IN_STEP: f64 = 0.6;
 /// a law outside the table that has a near relative in it is more often what has been filmed.
 const BESIDE_A_LAW: f64 = 0.35;
 const SLIGHT: f64 = 25.0;
+/// Frames are missing whole. A jump of the clock by another part of them can be meant, or stand for a knock, or for a part that fell off.
+const NOT_WHOLE: f64 = 0.6;
+/// A jump is of whole frames if it is by so many standard deviations, or by this part of a frame.
+const WHOLE_SD: f64 = 3.0;
+const WHOLE: f64 = 0.05;
 /// Where the best of the table leaves far more than noise, its names stand if they leave at most this part of what the base model leaves of what was not fitted. Of what a rig does they may be the
 /// largest part, or the nearest relatives of what is not in the table: the odds are even.
 const PROVEN: f64 = 0.5;
@@ -138,7 +144,7 @@ fn genuine(fit: &Refit<'_>, fits: &[Refit<'_>]) -> f64 {
     if fit.hypothesis.causes.is_empty() {
         return 1.0;
     }
-    let named = 1.0 - IMITATED;
+    let named = if misses_part_of_a_frame(fit) { NOT_WHOLE * (1.0 - IMITATED) } else { 1.0 - IMITATED };
     let Some(hz) = fit.value(Parameter::SupportFrequency) else { return named };
     let fit_of = |causes: &[Cause]| fits.iter().find(|f| f.hypothesis.causes == causes);
     let others: Vec<Cause> = fit.hypothesis.causes.iter().copied().filter(|c| *c != Cause::SupportMotion).collect();
@@ -147,6 +153,18 @@ fn genuine(fit: &Refit<'_>, fits: &[Refit<'_>]) -> f64 {
         return BESIDE_A_LAW * named;
     }
     if fit_of(&[]).is_some_and(|null| locate::is_in_step(null, hz)) { IN_STEP * named } else { named }
+}
+
+/// Whether a fit misses frames, and not a whole number of them.
+fn misses_part_of_a_frame(fit: &Refit<'_>) -> bool {
+    let (Some(missing_s), Some((record, _))) = (fit.value(Parameter::DroppedFrames), fit.hypothesis.dropped) else {
+        return false;
+    };
+    let Some(frame_s) = median_step_s(&fit.problem.records[record].t_s) else { return false };
+    let sd = fit.covariance(&[Parameter::DroppedFrames])[(0, 0)].sqrt() / frame_s;
+    let frames = missing_s / frame_s;
+    let whole = frames.round().abs().max(1.0).copysign(frames);
+    (frames - whole).abs() > (WHOLE_SD * sd).max(WHOLE)
 }
 
 /// By how much the torque of a fit's laws may be wrong.
