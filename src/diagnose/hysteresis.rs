@@ -10,9 +10,10 @@ use super::ground::{self, Ground};
 use super::refit::Refit;
 use super::screen::Score;
 use super::selection::Lacks;
-use crate::fit::Problem;
 use crate::fit::descent::{Block, Outcome};
+use crate::fit::{Problem, Record};
 use crate::model::Parameter;
+use crate::series::FEWEST_ROWS;
 
 /// Starts: yield angles as parts of the largest bend, and the hysteresis' part of the spring.
 const YIELD_SHARES: [f64; 3] = [0.05, 0.2, 0.6];
@@ -20,9 +21,11 @@ const SPRING_SHARES: [f64; 2] = [0.4, 0.9];
 /// The same where everything else has failed, and how much stiffer the joint may then be; how many of them begin a descent, and how many end it.
 const EVERY_YIELD: [f64; 5] = [0.03, 0.1, 0.25, 0.5, 0.9];
 const EVERY_SHARE: [f64; 4] = [0.1, 0.4, 0.7, 0.95];
-const STIFFER: [f64; 2] = [1.0, 2.0];
-const BEGUN: usize = 8;
+const STIFFER: [f64; 3] = [1.0, 2.0, 8.0];
+const BEGUN: usize = 12;
 const ENDED: usize = 3;
+/// Parts of the recordings that are followed before the whole is.
+const PARTS: [f64; 2] = [0.15, 0.5];
 
 /// Where T_h and Δ_y stand among a problem's variables.
 #[derive(Debug, Clone, Copy)]
@@ -126,13 +129,15 @@ fn starts(
     let spring =
         [Parameter::JointStiffness, Parameter::BendingStiffness].into_iter().find(|p| fit.value(*p).is_some())?;
     let stiffness = fit.problem.model(0, &fit.x[..fit.problem.free.len()]).ok()?.0.value(Parameter::JointStiffness)?;
+    // a base model that has locked its joint is no guide to the damper
+    let damping = fit.value(Parameter::JointDamping).unwrap_or(0.0).min(ground.experiment.model.c_eq_n_m_s_per_rad);
     let mut starts = Vec::new();
     for yield_rad in yield_shares.iter().map(|share| share * ground.largest_bend_rad()) {
         for (share, scale) in spring_shares.iter().flat_map(|share| stiffer.iter().map(move |scale| (share, scale))) {
             starts.push(vec![
                 (spring, (1.0 - share) * scale * fit.value(spring).unwrap_or(0.0)),
                 // what it loses the base model took for the damper's
-                (Parameter::JointDamping, (1.0 - share) * fit.value(Parameter::JointDamping).unwrap_or(0.0)),
+                (Parameter::JointDamping, (1.0 - share) * damping),
                 (Parameter::HysteresisTorque, share * scale * stiffness * yield_rad),
                 (Parameter::HysteresisYield, yield_rad),
             ]);
@@ -141,20 +146,44 @@ fn starts(
     Some(starts)
 }
 
-/// The hysteresis beside a fit from wherever it may be: its sum of squares has many false minima.
+/// The hysteresis beside a fit from wherever it may be: its sum of squares has many false minima, of a whole recording far more than of its beginning.
 pub(super) fn anywhere<'a>(ground: &Ground<'a>, fit: &Refit<'a>) -> Option<Refit<'a>> {
     let hypothesis = fit.hypothesis.and(Cause::JointHysteretic, None);
     let starts = starts(ground, fit, &EVERY_YIELD, &EVERY_SHARE, &STIFFER)?;
-    let cost = |start: Vec<(Parameter, f64)>| (ground.cost_at(&hypothesis, fit, &start), start);
+    let fit = &seen_to_start(ground, fit);
+    let until = |part: f64| -> Vec<Record> {
+        let rows = |record: &Record| ((part * record.len() as f64) as usize).max(FEWEST_ROWS);
+        ground.records.iter().map(|record| record.until(rows(record).min(record.len()))).collect()
+    };
+    let [beginning, first_half] = PARTS.map(until);
+    let (beginning, first_half) = (ground.on(&beginning), ground.on(&first_half));
+    let cost = |start: Vec<(Parameter, f64)>| (beginning.cost_at(&hypothesis, fit, &start), start);
     let mut costed: Vec<_> = starts.into_par_iter().with_max_len(1).map(cost).collect();
     costed.sort_by(|a, b| a.0.total_cmp(&b.0));
     costed.truncate(BEGUN);
-    let mut begun: Vec<Refit<'a>> =
-        (costed.par_iter().with_max_len(1)).filter_map(|(_, start)| ground.begin(&hypothesis, fit, start)).collect();
-    begun.sort_by(|a, b| a.chi2.total_cmp(&b.chi2));
+    let begun = costed.par_iter().with_max_len(1).filter_map(|(_, start)| {
+        let begun = beginning.begin(&hypothesis, fit, start)?;
+        beginning.again(&begun, ground::FEW_STEPS)
+    });
+    let mut begun: Vec<(f64, Vec<f64>)> = begun.map(|begun| (begun.chi2, begun.x)).collect();
+    begun.sort_by(|a, b| a.0.total_cmp(&b.0));
     begun.truncate(ENDED);
-    let ended = begun.par_iter().with_max_len(1).filter_map(|begun| ground.again(begun, ground::MOST_STEPS));
+    let ended = begun.into_par_iter().with_max_len(1).filter_map(|(_, x)| {
+        let half = first_half.descend_from(&hypothesis, x, ground::FEW_STEPS)?;
+        ground.descend_from(&hypothesis, half.x, ground::MOST_STEPS)
+    });
     ended.min_by(|a, b| a.chi2.total_cmp(&b.chi2))
+}
+
+/// A fit whose motions start as short stretches show them to, whatever it makes of them.
+fn seen_to_start<'a>(ground: &Ground<'a>, fit: &Refit<'a>) -> Refit<'a> {
+    let mut fit = fit.clone();
+    let starts = fit.x.len() - fit.problem.free.len();
+    if let Some(seen) = ground.begun.len().checked_sub(starts) {
+        fit.x.truncate(fit.problem.free.len());
+        fit.x.extend_from_slice(&ground.begun[seen..]);
+    }
+    fit
 }
 
 #[cfg(test)]
