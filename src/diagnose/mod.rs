@@ -272,8 +272,9 @@ pub fn diagnose<'a>(
             found = again;
         }
     }
-    let is_loose = !experiment.specimen.links.is_empty() || lacks_a_damper(experiment, found.0.records[0].links());
-    if is_loose && least_left(&found.2).is_some_and(verdict::leaves_more_than_noise) {
+    let may_be_doubted =
+        !experiment.specimen.links.is_empty() || lacks_a_damper(experiment, found.0.records[0].links());
+    if may_be_doubted && least_left(&found.2).is_some_and(verdict::leaves_more_than_noise) {
         let again = fitted(prepared, experiment, Taken::Loosely, progress)?;
         let left = |found: &Fitted<'_>| least_left(&found.2).map_or(f64::INFINITY, Refit::left_share);
         if left(&again) < left(&found) {

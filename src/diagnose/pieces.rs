@@ -52,24 +52,33 @@ pub fn preferred(ground: &Ground<'_>, fits: &[Refit<'_>]) -> Option<usize> {
     let simple = |fit: &Refit<'_>| fit.hypothesis.causes.len() < 2 && !fit.hypothesis.is_dear();
     let unexplained = weights.scatter > UNEXPLAINED;
     let compared: Vec<&Refit<'_>> = fits.iter().filter(|fit| within(fit) || unexplained && simple(fit)).collect();
-    let others = TRIED.map(|pieces| with(ground.experiment, pieces));
+    let left_with = |fit: &Refit<'_>, pieces: usize| {
+        let experiment = with(ground.experiment, pieces);
+        let other = Ground { experiment: &experiment, ..ground.clone() };
+        Some(weights.weight(&other.refit(&fit.hypothesis, fit, &[])?))
+    };
     let promised = compared.par_iter().with_max_len(1).filter_map(|fit| {
         let mut points = vec![(usual, weights.weight(fit))];
-        for (experiment, pieces) in others.iter().zip(TRIED) {
-            let other = Ground { experiment, ..ground.clone() };
-            points.push((pieces, weights.weight(&other.refit(&fit.hypothesis, fit, &[])?)));
+        for pieces in TRIED {
+            points.push((pieces, left_with(fit, pieces)?));
         }
-        likeliest_count(&points, FEWEST)
+        let (pieces, left) = likeliest_count(&points, FEWEST)?;
+        // the parabola is only a guide
+        let is_new = !points.iter().any(|(tried, _)| *tried == pieces);
+        Some((pieces, if is_new { left_with(fit, pieces)? } else { left }))
     });
     let (pieces, value) = promised.min_by(|a, b| a.1.total_cmp(&b.1))?;
     (pieces != usual && value < weights.weight(best) - WORTH).then_some(pieces)
 }
 
-/// Whether fits with another count do better, as was promised.
+/// Whether fits with another count do better, as was promised. Each round has learnt a noise of its own; the first one's is the yardstick.
 pub fn is_kept(ground: &Ground<'_>, before: &[Refit<'_>], after: &[Refit<'_>]) -> bool {
     let weights = Weights::of(ground, before);
-    let of = |fits| weights.best(fits).map_or(f64::INFINITY, |fit| weights.weight(fit));
-    of(after) < of(before)
+    let (Some(old), Some(new)) = (weights.best(before), weights.best(after)) else { return false };
+    let mut problem = new.problem.clone();
+    problem.noise.clone_from(&ground.noise);
+    let new = Refit { chi2: problem.cost(&new.x), ..new.clone() };
+    weights.weight(&new) < weights.weight(old)
 }
 
 /// An experiment with another number of rods.
