@@ -7,7 +7,7 @@
 use rayon::prelude::*;
 
 use super::ground::{Ground, Hypothesis};
-use super::refit::Refit;
+use super::refit::{Refit, least};
 use super::second_look::beside;
 use super::selection::{self, Lacks};
 use super::{Cause, pieces};
@@ -21,41 +21,34 @@ const FEWEST: usize = 3;
 /// The fits, those with a strip that bends everywhere made anew with a finer one, where that is asked for and does better.
 pub fn with_fine_strip<'a>(
     ground: &mut Ground<'a>,
-    fits: Vec<Refit<'a>>,
+    mut fits: Vec<Refit<'a>>,
     causes: &[Cause],
     progress: &dyn Progress,
 ) -> Vec<Refit<'a>> {
     let bends = |fit: &Refit<'a>| fit.hypothesis.causes.contains(&Cause::DistributedFlexibility);
     let alone = Hypothesis { causes: vec![Cause::DistributedFlexibility], dropped: None };
-    let mut fits = fits;
-    let best = fits.iter().min_by(|a, b| a.chi2.total_cmp(&b.chi2));
-    let unexplained = best.is_some_and(|best| Lacks::of(ground, best, &[]).unexplained);
+    let unexplained = least(&fits).is_some_and(|best| Lacks::of(ground, best, &[]).unexplained);
     if unexplained && causes.contains(&Cause::DistributedFlexibility) && !fits.iter().any(bends) {
         // from the base model's motion its own may not be found
         fits.extend(ground.refit_anew(&alone, &[], fits[0].chi2));
     }
-    let best = fits.iter().min_by(|a, b| a.chi2.total_cmp(&b.chi2));
-    let asked_for = best.is_some_and(bends);
+    let asked_for = least(&fits).is_some_and(bends);
     let Some(coarse) = fits.iter().find(|fit| asked_for && fit.hypothesis == alone) else { return fits };
-    let of = |pieces: usize| {
-        let ground = Ground { fine_strip: Some(pieces), ..ground.clone() };
-        let fine = ground.refit(&alone, coarse, &[])?;
-        Some((pieces, ground, fine))
-    };
+    let with = |pieces: usize| Ground { fine_strip: Some(pieces), ..ground.clone() };
+    let of = |pieces: usize| Some((pieces, with(pieces).refit(&alone, coarse, &[])?));
     let usual = ground.experiment.model.pieces;
     let counts = [usual, FEW, MANY];
-    let mut finer: Vec<_> = counts.into_par_iter().with_max_len(1).filter_map(of).collect();
-    let left: Vec<(usize, f64)> = finer.iter().map(|(pieces, _, fine)| (*pieces, fine.chi2)).collect();
+    let mut finer: Vec<(usize, Refit<'a>)> = counts.into_par_iter().with_max_len(1).filter_map(of).collect();
+    let left: Vec<(usize, f64)> = finer.iter().map(|(pieces, fine)| (*pieces, fine.chi2)).collect();
     let promised = pieces::likeliest_count(&left, FEWEST).filter(|(pieces, _)| !counts.contains(pieces));
     finer.extend(promised.and_then(|(pieces, _)| of(pieces)));
-    let left_of = |pieces: usize| finer.iter().find(|f| f.0 == pieces).map_or(coarse.chi2, |f| f.2.chi2);
     // as many as usual, unless the recording asks for another count
-    let enough = left_of(usual) - pieces::WORTH;
-    let best = finer.iter().map(|f| (f.0, f.2.chi2)).filter(|f| f.1 < enough).min_by(|a, b| a.1.total_cmp(&b.1));
-    let count = best.map_or(usual, |best| best.0);
-    let chosen = finer.into_iter().find(|(pieces, _, fine)| *pieces == count && fine.chi2 < coarse.chi2);
-    let Some((_, fine_ground, fine)) = chosen else { return fits };
-    *ground = fine_ground;
+    let enough = finer.iter().find(|f| f.0 == usual).map_or(coarse.chi2, |f| f.1.chi2) - pieces::WORTH;
+    let better = finer.iter().filter(|f| f.1.chi2 < enough).min_by(|a, b| a.1.chi2.total_cmp(&b.1.chi2));
+    let count = better.map_or(usual, |better| better.0);
+    let chosen = finer.into_iter().find(|(pieces, fine)| *pieces == count && fine.chi2 < coarse.chi2);
+    let Some((_, fine)) = chosen else { return fits };
+    *ground = with(count);
     progress.begin("strip", Some(causes.len() as u64));
     let pairs = beside(ground, &fine, causes, progress);
     let mut all: Vec<Refit<'a>> = fits.into_iter().filter(|fit| !bends(fit)).collect();

@@ -274,9 +274,9 @@ pub fn diagnose<'a>(
     }
     let may_be_doubted =
         !experiment.specimen.links.is_empty() || lacks_a_damper(experiment, found.0.records[0].links());
-    if may_be_doubted && least_left(&found.2).is_some_and(verdict::leaves_more_than_noise) {
+    if may_be_doubted && refit::least(&found.2).is_some_and(verdict::leaves_more_than_noise) {
         let again = fitted(prepared, experiment, Taken::Loosely, progress)?;
-        let left = |found: &Fitted<'_>| least_left(&found.2).map_or(f64::INFINITY, Refit::left_share);
+        let left = |found: &Fitted<'_>| refit::least(&found.2).map_or(f64::INFINITY, Refit::left_share);
         if left(&again) < left(&found) {
             found = again;
         }
@@ -309,11 +309,6 @@ pub fn diagnose<'a>(
         weighed,
         ground,
     })
-}
-
-/// The fit that leaves least.
-fn least_left<'f, 'a>(fits: &'f [Refit<'a>]) -> Option<&'f Refit<'a>> {
-    fits.iter().min_by(|a, b| a.chi2.total_cmp(&b.chi2))
 }
 
 /// The base model's fit, which every selection holds.

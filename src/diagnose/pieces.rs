@@ -6,7 +6,7 @@
 use rayon::prelude::*;
 
 use super::ground::Ground;
-use super::refit::Refit;
+use super::refit::{Refit, least_chi2};
 use crate::experiment::{Experiment, Model};
 
 /// Counts between two marks that are tried beside the usual one, and the bounds of what they may lead to.
@@ -27,8 +27,7 @@ struct Weights {
 
 impl Weights {
     fn of(ground: &Ground<'_>, fits: &[Refit<'_>]) -> Self {
-        let least = fits.iter().map(|fit| fit.chi2).fold(f64::INFINITY, f64::min);
-        Self { scatter: (least / ground.values() as f64).max(1.0) }
+        Self { scatter: (least_chi2(fits) / ground.values() as f64).max(1.0) }
     }
 
     fn weight(&self, fit: &Refit<'_>) -> f64 {

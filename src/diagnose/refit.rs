@@ -127,3 +127,13 @@ impl<'a> Refit<'a> {
         Some(stacked(&blocks, self.x.len()))
     }
 }
+
+/// The fit that leaves least.
+pub fn least<'f, 'a>(fits: &'f [Refit<'a>]) -> Option<&'f Refit<'a>> {
+    fits.iter().min_by(|a, b| a.chi2.total_cmp(&b.chi2))
+}
+
+/// What that one leaves; infinite of none.
+pub fn least_chi2(fits: &[Refit<'_>]) -> f64 {
+    least(fits).map_or(f64::INFINITY, |fit| fit.chi2)
+}

@@ -4,7 +4,7 @@ use rayon::prelude::*;
 
 use super::ground::{self, Ground};
 use super::noise::BEYOND_NOISE;
-use super::refit::Refit;
+use super::refit::{Refit, least, least_chi2};
 use super::screen::{Score, Screen};
 use super::selection::{self, Lacks};
 use super::{Cause, hysteresis};
@@ -26,7 +26,7 @@ pub fn second_look<'a>(
     causes: &[Cause],
     progress: &dyn Progress,
 ) -> Vec<Refit<'a>> {
-    let lacks = fits.iter().min_by(|a, b| a.chi2.total_cmp(&b.chi2)).map(|best| Lacks::of(ground, best, &[]));
+    let lacks = least(&fits).map(|best| Lacks::of(ground, best, &[]));
     if ground.is_strip() || !lacks.is_some_and(|lacks| lacks.unexplained) {
         return fits;
     }
@@ -123,8 +123,7 @@ fn best<'a>(
 
 /// The single effects that leave least; where that is far more than noise, its colour does not count.
 fn seeds(ground: &Ground<'_>, fits: &[Refit<'_>]) -> Vec<usize> {
-    let least = fits.iter().map(|fit| fit.chi2).fold(f64::INFINITY, f64::min);
-    let beyond_noise = least > BEYOND_NOISE * BEYOND_NOISE * ground.values() as f64;
+    let beyond_noise = least_chi2(fits) > BEYOND_NOISE * BEYOND_NOISE * ground.values() as f64;
     let left = |fit: &Refit<'_>| if beyond_noise { fit.left_share() } else { fit.chi2 };
     best(fits, SEEDS, |fit| fit.hypothesis.causes.len() == 1, left)
 }

@@ -3,7 +3,7 @@
 use rayon::prelude::*;
 
 use super::ground::{self, Ground, Hypothesis};
-use super::refit::{OUT_OF_STEP, Refit};
+use super::refit::{OUT_OF_STEP, Refit, least, least_chi2};
 use super::screen::{Score, Screen};
 use super::{Cause, dropped, fine_strip, hysteresis, second_look};
 use crate::model::Parameter;
@@ -75,10 +75,6 @@ pub fn fits<'a>(ground: &mut Ground<'a>, null: Refit<'a>, causes: &[Cause], prog
     with_errors_in_step(ground, all)
 }
 
-fn least_chi2(fits: &[Refit<'_>]) -> f64 {
-    fits.iter().map(|fit| fit.chi2).fold(f64::INFINITY, f64::min)
-}
-
 /// The base model anew from weaker dampers, where it leaves much: what it lacks can have driven its own damper so high that a mode is gone, and no
 /// descent leads back.
 pub fn from_weaker_dampers<'a>(ground: &Ground<'a>, null: Refit<'a>) -> Refit<'a> {
@@ -99,8 +95,7 @@ pub fn from_weaker_dampers<'a>(ground: &Ground<'a>, null: Refit<'a>) -> Refit<'a
 /// are fitted from there.
 fn from_the_best_single<'a>(ground: &Ground<'a>, fits: Vec<Refit<'a>>) -> Vec<Refit<'a>> {
     let null = &fits[0];
-    let Some(best) = fits.iter().min_by(|a, b| a.chi2.total_cmp(&b.chi2)).filter(|b| b.chi2 < EXPLAINS * null.chi2)
-    else {
+    let Some(best) = least(&fits).filter(|b| b.chi2 < EXPLAINS * null.chi2) else {
         return fits;
     };
     let moved = |parameter: &Parameter| {
@@ -168,7 +163,7 @@ pub(super) fn with_refined_noise<'a>(ground: &mut Ground<'a>, fits: Vec<Refit<'a
 }
 
 fn refined_once<'a>(ground: &mut Ground<'a>, fits: Vec<Refit<'a>>) -> Vec<Refit<'a>> {
-    let best = fits.iter().min_by(|a, b| a.chi2.total_cmp(&b.chi2));
+    let best = least(&fits);
     let changed = best.is_some_and(|best| ground.refine_noise(best));
     let ground = &*ground;
     let (least, null) = (best.map_or(0.0, |best| best.chi2), fits[0].chi2);

@@ -4,7 +4,7 @@ use super::evidence::{self, Scatter, normalised};
 use super::heldout::HeldOut;
 use super::latent::Latent;
 use super::noise::{BEYOND_NOISE, COLOURED};
-use super::refit::Refit;
+use super::refit::{self, Refit};
 use super::{Cause, Place, locate};
 use crate::fit::whitening::RecordNoise;
 use crate::model::Parameter;
@@ -105,7 +105,7 @@ pub fn weigh<'a>(
     candidates: usize,
     remainder: impl Fn(&Refit<'a>, f64) -> (Vec<Latent>, f64),
 ) -> (Vec<Weighed<'a>>, f64, Vec<Latent>) {
-    let least = fits.iter().min_by(|a, b| a.chi2.total_cmp(&b.chi2));
+    let least = refit::least(&fits);
     let scatter = least.map_or(Scatter::NOISE, |best| Scatter::of(best, values));
     let least_without = |cause: Cause| {
         let others = fits.iter().filter(|f| !f.hypothesis.causes.contains(&cause));
