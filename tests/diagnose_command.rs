@@ -375,6 +375,28 @@ fn bad_input_is_one_line_and_exit_code_2_and_touches_no_output() {
 }
 
 #[test]
+fn three_effects_are_named_where_two_leave_more_than_noise() {
+    let folder = Folder::new();
+    let options = ["--duration", "15", "--noise-rad", "3e-4", "--seed", "1"];
+    let effects = "air_quadratic = 4e-3\nhinge_coulomb = 4e-7\ncamera_tilt = 0.02\n";
+    let angles = folder.simulated(BASE, effects, &options);
+    let report = folder.diagnosis(&angles, BASE, &[]);
+    let named = |list: &str| -> Vec<String> {
+        let names = report["verdict"][list].as_array().unwrap();
+        names.iter().map(|name| name.as_str().unwrap().replace("side_force", "camera_tilt")).collect()
+    };
+    let (two, further) = (named("effects"), named("further_effects"));
+    assert_eq!((two.len(), further.len()), (2, 1), "{:#}", report["verdict"]);
+    let mut all = [two, further].concat();
+    all.sort();
+    // angles do not tell a turned camera from a turned gravity
+    assert_eq!(all, ["air_quadratic", "camera_tilt", "hinge_coulomb"]);
+    for left in report["heldout"]["augmented_rmse_rad"].as_array().unwrap() {
+        assert!(left.as_f64().unwrap() < 1.3 * 3e-4, "{}", report["heldout"]);
+    }
+}
+
+#[test]
 fn a_viscous_hinge_is_not_all_of_a_real_arm() {
     let table = PathBuf::from("../shared/data/multiarm_single.csv");
     if !table.exists() {

@@ -22,6 +22,8 @@ const MOST_ROWS: f64 = 1e6;
 const DRY_RAD: f64 = 1e-3;
 /// Candidates listed on the page.
 const LISTED: usize = 6;
+/// Names that a verdict's own list gives.
+const MAIN_EFFECTS: usize = 2;
 /// Candidates written to the file.
 const WRITTEN: usize = 25;
 
@@ -250,7 +252,7 @@ impl Report<'_> {
                     )
                 };
                 format!(
-                    "Something is missing that is not in the table of effects ({percent:.0} %): no named law, nor two of them, leaves only noise{nearest}."
+                    "Something is missing that is not in the table of effects ({percent:.0} %): no named law, nor several of them, leaves only noise{nearest}."
                 )
             }
             Status::Identified => {
@@ -299,7 +301,7 @@ impl Report<'_> {
                 let of_torque = self.diagnosis.missing_torque.as_ref().and_then(|t| t.phase);
                 of_torque.or(self.diagnosis.departure.goes_with)
             }
-            _ => self.diagnosis.main_effect().and_then(Phase::of),
+            _ => self.diagnosis.named_effects().first().copied().and_then(Phase::of),
         }
     }
 
@@ -344,6 +346,10 @@ impl Report<'_> {
         let null = diagnosis.null();
         let verdict = &diagnosis.verdict;
         let departure = &diagnosis.departure;
+        // the format gives two names; what a rig has beside them stands by itself
+        let explaining = diagnosis.named_effects();
+        let is_main = |cause: &&Cause| explaining.iter().take(MAIN_EFFECTS).any(|main| main == *cause);
+        let (effects, further): (Vec<&Cause>, Vec<&Cause>) = verdict.effects.iter().partition(is_main);
         let shares: Map<String, Value> =
             Place::OF_LOSSES.iter().zip(diagnosis.energy_shares).map(|(p, s)| (p.id().to_owned(), json!(s))).collect();
         json!({
@@ -377,7 +383,8 @@ impl Report<'_> {
             "candidates": diagnosis.weighed.iter().take(WRITTEN).map(candidate_json).collect::<Vec<_>>(),
             "verdict": {
                 "status": verdict.status.id(),
-                "effects": verdict.effects.iter().map(|c| c.id()).collect::<Vec<_>>(),
+                "effects": effects.iter().map(|c| c.id()).collect::<Vec<_>>(),
+                "further_effects": further.iter().map(|c| c.id()).collect::<Vec<_>>(),
                 "class": verdict.class.iter().map(|c| c.id()).collect::<Vec<_>>(),
                 "probability": verdict.probability,
                 "class_probability": verdict.class_probability,
@@ -419,7 +426,11 @@ fn names(causes: &[Cause], none: &str) -> String {
 }
 
 fn words(causes: &[Cause]) -> String {
-    causes.iter().map(|c| format!("{} ({})", c.words(), c.id())).collect::<Vec<_>>().join(" and ")
+    let words: Vec<String> = causes.iter().map(|c| format!("{} ({})", c.words(), c.id())).collect();
+    match &words[..] {
+        [first @ .., before, last] => [first, &[format!("{before} and {last}")]].concat().join(", "),
+        few => few.concat(),
+    }
 }
 
 fn rmse_rad(fit: &Refit<'_>) -> Vec<f64> {

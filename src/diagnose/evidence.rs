@@ -31,6 +31,8 @@ const NEEDED: f64 = 9.0;
 const PRIOR_NULL: f64 = 0.25;
 const PRIOR_ONE: f64 = 0.40;
 const PRIOR_TWO: f64 = 0.25;
+/// Three are this much less probable than two, and so on.
+const FURTHER: f64 = 0.2;
 /// An effect of the camera is this much likelier than one of physics.
 const CAMERA_FIRST: f64 = 2.0;
 /// Of physics outside the table.
@@ -67,8 +69,13 @@ pub fn ln_prior(hypothesis: &Hypothesis, candidates: usize) -> f64 {
         + match hypothesis.causes.len() {
             0 => PRIOR_NULL.ln(),
             1 => (PRIOR_ONE / count).ln(),
-            _ => (PRIOR_TWO / (0.5 * count * (count - 1.0)).max(1.0)).ln(),
+            many => (PRIOR_TWO * FURTHER.powi(many as i32 - 2) / ways(count, many)).ln(),
         }
+}
+
+/// Of how many kinds `chosen` effects of `count` can be.
+fn ways(count: f64, chosen: usize) -> f64 {
+    (0..chosen).map(|k| (count - k as f64).max(1.0) / (k + 1) as f64).product::<f64>().max(1.0)
 }
 
 /// ln Z of a fitted hypothesis; −∞ where a coefficient is not told from zero. `least_without` is the least χ² of all hypotheses that lack an effect of

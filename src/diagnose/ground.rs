@@ -302,7 +302,7 @@ impl<'a> Ground<'a> {
             beliefs: self.beliefs.clone(),
             noise: records.iter().map(|r| self.noise[place(r)].clone()).collect(),
             step_error_rad: self.step_error_rad,
-            begun: Vec::new(),
+            begun: if records.len() == self.records.len() { self.begun.clone() } else { Vec::new() },
             fine_strip: self.fine_strip,
         }
     }
@@ -312,6 +312,17 @@ impl<'a> Ground<'a> {
     pub fn plain(&self) -> Self {
         let noise = self.noise.iter().map(|noise| RecordNoise { in_step: 0.0, ..noise.clone() }).collect();
         Self { noise, ..self.clone() }
+    }
+
+    /// A fit whose motions start as short stretches show them to, whatever it makes of them.
+    pub fn seen_to_start<'b>(&self, fit: &Refit<'b>) -> Refit<'b> {
+        let mut fit = fit.clone();
+        let starts = fit.x.len() - fit.problem.free.len();
+        if let Some(seen) = self.begun.len().checked_sub(starts) {
+            fit.x.truncate(fit.problem.free.len());
+            fit.x.extend_from_slice(&self.begun[seen..]);
+        }
+        fit
     }
 
     /// Largest measured difference of two neighbouring angles; of one link the largest angle.

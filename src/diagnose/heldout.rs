@@ -1,7 +1,9 @@
 //! The proof: fit on one part, predict the other with every coefficient frozen.
 
 use super::ground::{Ground, Hypothesis};
+use super::growing;
 use super::refit::Refit;
+use super::verdict::leaves_more_than_noise;
 use crate::fit::{Belief, Record};
 
 /// Part of a recording that is fitted; the rest is predicted.
@@ -48,6 +50,9 @@ fn along(ground: &Ground<'_>, null: &Refit<'_>, best: &Refit<'_>, from_s: Option
     let part = ground.on(&early);
     let predicted = |fit: &Refit<'_>| {
         let refitted = part.refit(&fit.hypothesis, fit, &[])?;
+        // what leaves far more than noise may have lost step between here and there
+        let grown = leaves_more_than_noise(&refitted).then(|| growing::grown_alone(&part, &refitted)).flatten();
+        let refitted = grown.into_iter().chain([refitted]).min_by(|a, b| a.chi2.total_cmp(&b.chi2))?;
         let whole = ground.problem(&fit.hypothesis).ok()?;
         errors(&whole.predict(0, &refitted.x, false).ok()?.values, record, rows)
     };

@@ -5,15 +5,14 @@
 
 use rayon::prelude::*;
 
-use super::Cause;
 use super::ground::{self, Ground};
 use super::refit::Refit;
 use super::screen::Score;
 use super::selection::Lacks;
+use super::{Cause, growing};
+use crate::fit::Problem;
 use crate::fit::descent::{Block, Outcome};
-use crate::fit::{Problem, Record};
 use crate::model::Parameter;
-use crate::series::FEWEST_ROWS;
 
 /// Starts: yield angles as parts of the largest bend, and the hysteresis' part of the spring.
 const YIELD_SHARES: [f64; 3] = [0.05, 0.2, 0.6];
@@ -150,12 +149,8 @@ fn starts(
 pub(super) fn anywhere<'a>(ground: &Ground<'a>, fit: &Refit<'a>) -> Option<Refit<'a>> {
     let hypothesis = fit.hypothesis.and(Cause::JointHysteretic, None);
     let starts = starts(ground, fit, &EVERY_YIELD, &EVERY_SHARE, &STIFFER)?;
-    let fit = &seen_to_start(ground, fit);
-    let until = |part: f64| -> Vec<Record> {
-        let rows = |record: &Record| ((part * record.len() as f64) as usize).max(FEWEST_ROWS);
-        ground.records.iter().map(|record| record.until(rows(record).min(record.len()))).collect()
-    };
-    let [beginning, first_half] = PARTS.map(until);
+    let fit = &ground.seen_to_start(fit);
+    let [beginning, first_half] = PARTS.map(|part| growing::first_part(ground.records, part));
     let (beginning, first_half) = (ground.on(&beginning), ground.on(&first_half));
     let cost = |start: Vec<(Parameter, f64)>| (beginning.cost_at(&hypothesis, fit, &start), start);
     let mut costed: Vec<_> = starts.into_par_iter().with_max_len(1).map(cost).collect();
@@ -173,17 +168,6 @@ pub(super) fn anywhere<'a>(ground: &Ground<'a>, fit: &Refit<'a>) -> Option<Refit
         ground.descend_from(&hypothesis, half.x, ground::MOST_STEPS)
     });
     ended.min_by(|a, b| a.chi2.total_cmp(&b.chi2))
-}
-
-/// A fit whose motions start as short stretches show them to, whatever it makes of them.
-fn seen_to_start<'a>(ground: &Ground<'a>, fit: &Refit<'a>) -> Refit<'a> {
-    let mut fit = fit.clone();
-    let starts = fit.x.len() - fit.problem.free.len();
-    if let Some(seen) = ground.begun.len().checked_sub(starts) {
-        fit.x.truncate(fit.problem.free.len());
-        fit.x.extend_from_slice(&ground.begun[seen..]);
-    }
-    fit
 }
 
 #[cfg(test)]

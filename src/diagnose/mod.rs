@@ -33,6 +33,7 @@ pub mod energy;
 pub mod evidence;
 pub mod fine_strip;
 pub mod ground;
+pub mod growing;
 pub mod heldout;
 pub mod hysteresis;
 pub mod latent;
@@ -49,6 +50,8 @@ pub mod torque;
 pub mod verdict;
 
 use std::sync::OnceLock;
+
+use rayon::prelude::*;
 
 use crate::error::{Error, Result};
 use crate::experiment::Experiment;
@@ -71,6 +74,10 @@ pub use verdict::{Status, Verdict, Weighed};
 
 /// A length or an inertia of a rig is known to this share.
 const GEOMETRY_SHARE: f64 = 0.1;
+/// What is at least this probable counts.
+const EVEN: f64 = 0.5;
+/// The best fits, which are made anew with the file taken loosely.
+const ANEW: usize = 4;
 /// Springs to start from, over the file's, where that leads nowhere.
 const SPRINGS: [f64; 3] = [0.03, 30.0, 1e-3];
 /// Correlation of the noise from row to row that counts as colour.
@@ -118,16 +125,16 @@ impl<'a> Diagnosis<'a> {
         1.0 - beyond(self.named()) / beyond(self.null()).max(1.0)
     }
 
-    /// Of the effects named, the one that explains most.
-    pub fn main_effect(&self) -> Option<Cause> {
-        main_effect(&self.weighed, self.named())
+    /// The effects named, the one that explains most first.
+    pub fn named_effects(&self) -> Vec<Cause> {
+        by_what_they_explain(&self.weighed, self.named())
     }
 
     /// Where what is missing acts.
     pub fn place(&self) -> Option<Place> {
         match self.verdict.status {
             Status::Adequate => None,
-            _ => self.unknown_at.or_else(|| self.main_effect().map(Cause::place)),
+            _ => self.unknown_at.or_else(|| self.named_effects().first().map(|cause| cause.place())),
         }
     }
 
@@ -272,20 +279,19 @@ pub fn diagnose<'a>(
             found = again;
         }
     }
-    let may_be_doubted =
-        !experiment.specimen.links.is_empty() || lacks_a_damper(experiment, found.0.records[0].links());
-    if may_be_doubted && refit::least(&found.2).is_some_and(verdict::leaves_more_than_noise) {
-        let again = fitted(prepared, experiment, Taken::Loosely, progress)?;
-        let left = |found: &Fitted<'_>| refit::least(&found.2).map_or(f64::INFINITY, Refit::left_share);
-        if left(&again) < left(&found) {
-            found = again;
-        }
+    let weigh = |(ground, causes, fits): &Fitted<'a>| {
+        verdict::weigh(fits.clone(), ground.values(), causes.len(), |fit, variance| {
+            (locate::unknowns(fit, variance, Assumed::BESIDE), energy::added_torque_n_m(fit))
+        })
+    };
+    let (mut weighed, mut unknown, mut unknowns) = weigh(&found);
+    // a strip's fits are too dear to be followed from the beginning
+    if !found.0.is_strip() && (unknown > EVEN || leaves_more_than_noise(&found.2)) {
+        found = doubted(prepared, experiment, found, progress)?;
+        (weighed, unknown, unknowns) = weigh(&found);
     }
-    let (ground, causes, fits) = found;
-    let marks = prepared.records.first().map_or(0, Record::links);
-    let (weighed, unknown, unknowns) = verdict::weigh(fits, ground.values(), causes.len(), |fit, variance| {
-        (locate::unknowns(fit, variance, Assumed::BESIDE), energy::added_torque_n_m(fit))
-    });
+    let (ground, causes, _) = found;
+    let marks = ground.records[0].links();
     let null = base_model(&weighed);
     let best = &weighed[0].fit;
     let (held_out, adequacy) = rayon::join(
@@ -293,7 +299,7 @@ pub fn diagnose<'a>(
         || adequacy::adequacy(&ground, null, &causes, options.bootstraps, progress),
     );
     let verdict = Verdict::of(&weighed, unknown, marks, held_out.as_ref());
-    let of_nearest = main_effect(&weighed, best).map(Cause::place);
+    let of_nearest = by_what_they_explain(&weighed, best).first().map(|cause| cause.place());
     let unknown_at = if verdict.leaves_it_open() { locate::place_of_all(null, of_nearest) } else { None };
     Ok(Diagnosis {
         verdict,
@@ -316,14 +322,66 @@ fn base_model<'w, 'a>(weighed: &'w [Weighed<'a>]) -> &'w Refit<'a> {
     weighed.iter().find(|w| w.fit.hypothesis.causes.is_empty()).map_or(&weighed[0].fit, |w| &w.fit)
 }
 
-/// Of a fit's effects, the one that explains most: without which it would be worst.
-fn main_effect(weighed: &[Weighed<'_>], fit: &Refit<'_>) -> Option<Cause> {
-    let causes = &fit.hypothesis.causes;
+/// A fit's effects, the one that explains most first: without which it would be worst.
+fn by_what_they_explain(weighed: &[Weighed<'_>], fit: &Refit<'_>) -> Vec<Cause> {
+    let mut causes = fit.hypothesis.causes.clone();
     let left_without = |cause: &Cause| {
-        let others: Vec<Cause> = causes.iter().copied().filter(|c| c != cause).collect();
+        let others: Vec<Cause> = fit.hypothesis.causes.iter().copied().filter(|c| c != cause).collect();
         weighed.iter().find(|w| w.fit.hypothesis.causes == others).map_or(f64::INFINITY, |w| w.fit.chi2)
     };
-    causes.iter().copied().max_by(|a, b| left_without(a).total_cmp(&left_without(b)))
+    causes.sort_by(|a, b| left_without(b).total_cmp(&left_without(a)));
+    causes
+}
+
+/// Whether the best of some fits leaves so much that the noise does not matter.
+fn leaves_more_than_noise(fits: &[Refit<'_>]) -> bool {
+    refit::least(fits).is_some_and(verdict::leaves_more_than_noise)
+}
+
+/// The hypotheses from the beginning of the recordings on, and more effects beside them, with the file taken loosely where it may be doubted.
+fn doubted<'a>(
+    prepared: &'a Prepared,
+    experiment: &'a Experiment,
+    found: Fitted<'a>,
+    progress: &dyn Progress,
+) -> Result<Fitted<'a>> {
+    let (ground, mut causes, mut fits) = found;
+    let mut ground = ground.plain();
+    let marks = ground.records[0].links();
+    let has_slack = !experiment.specimen.links.is_empty() || lacks_a_damper(experiment, marks);
+    let loosely = has_slack && leaves_more_than_noise(&fits);
+    if loosely {
+        (ground.base, ground.beliefs) = base_of(experiment, marks, Taken::Loosely)?;
+        ground.begun = begun(prepared, experiment, &ground.base)?;
+        causes.retain(|cause| cause.may_be_missing(experiment, &ground.base, marks));
+        for fit in &mut fits {
+            fit.hypothesis.causes.retain(|cause| causes.contains(cause));
+        }
+    }
+    let further = if leaves_more_than_noise(&fits) {
+        growing::grown(&ground, &fits, &causes, progress)
+    } else {
+        growing::with_more(&ground, growing::with_more(&ground, fits.clone(), &causes), &causes)
+    };
+    if loosely {
+        let bases = (0..fits.len()).filter(|place| fits[*place].hypothesis.causes.is_empty());
+        let anew: Vec<usize> = bases.chain(refit::best(&fits, ANEW, |_| true, |fit| fit.chi2)).collect();
+        let again = |place: &usize| ground.refit(&fits[*place].hypothesis, &fits[*place], &[]);
+        fits = refit::merged(Vec::new(), anew.par_iter().with_max_len(1).filter_map(again).collect());
+    }
+    let fits = growing::with_rivals(&ground, refit::merged(fits, further), &causes);
+    let fits = selection::with_refined_noise(&mut ground, fits);
+    let fits = selection::with_errors_in_step(&mut ground, fits);
+    Ok((ground, causes, fits))
+}
+
+/// Where a base model's descent begins: what was not free when the start was sought, where the file has it.
+fn begun(prepared: &Prepared, experiment: &Experiment, base: &[Parameter]) -> Result<Vec<f64>> {
+    let stated = Problem::new(&prepared.records, experiment, base)?.start_values()?;
+    let sought = |parameter: &Parameter| prepared.base.iter().position(|p| p == parameter);
+    let parameters =
+        base.iter().zip(stated).map(|(parameter, stated)| sought(parameter).map_or(stated, |at| prepared.x[at]));
+    Ok(parameters.chain(prepared.x[prepared.base.len()..].iter().copied()).collect())
 }
 
 /// Ground, effects and fits of all hypotheses.
@@ -338,13 +396,7 @@ fn fitted<'a>(
     let records = &prepared.records;
     let marks = records.first().map_or(0, Record::links);
     let (base, beliefs) = base_of(experiment, marks, taken)?;
-    // what was not free when the start was sought begins where the file has it
-    let stated = Problem::new(records, experiment, &base)?.start_values()?;
-    let sought = |parameter: &Parameter| prepared.base.iter().position(|p| p == parameter);
-    let begun: Vec<f64> = (base.iter().zip(stated))
-        .map(|(parameter, stated)| sought(parameter).map_or(stated, |place| prepared.x[place]))
-        .chain(prepared.x[prepared.base.len()..].iter().copied())
-        .collect();
+    let begun = begun(prepared, experiment, &base)?;
     let causes: Vec<Cause> = Cause::ALL.into_iter().filter(|c| c.may_be_missing(experiment, &base, marks)).collect();
     let mut ground = Ground {
         records,

@@ -137,3 +137,29 @@ pub fn least<'f, 'a>(fits: &'f [Refit<'a>]) -> Option<&'f Refit<'a>> {
 pub fn least_chi2(fits: &[Refit<'_>]) -> f64 {
     least(fits).map_or(f64::INFINITY, |fit| fit.chi2)
 }
+
+/// The fits of a kind that leave least.
+pub fn best<'a>(
+    fits: &[Refit<'a>],
+    count: usize,
+    is_meant: impl Fn(&Refit<'a>) -> bool,
+    left: impl Fn(&Refit<'a>) -> f64,
+) -> Vec<usize> {
+    let mut order: Vec<(f64, usize)> =
+        (0..fits.len()).filter(|i| is_meant(&fits[*i])).map(|i| (left(&fits[i]), i)).collect();
+    order.sort_by(|a, b| a.0.total_cmp(&b.0));
+    order.truncate(count);
+    order.into_iter().map(|(_, i)| i).collect()
+}
+
+/// The better one of each hypothesis.
+pub fn merged<'a>(mut fits: Vec<Refit<'a>>, others: Vec<Refit<'a>>) -> Vec<Refit<'a>> {
+    for other in others {
+        match fits.iter_mut().find(|fit| fit.hypothesis.causes == other.hypothesis.causes) {
+            Some(known) if other.chi2 < known.chi2 => *known = other,
+            Some(_) => {}
+            None => fits.push(other),
+        }
+    }
+    fits
+}

@@ -4,7 +4,7 @@ use rayon::prelude::*;
 
 use super::ground::{self, Ground};
 use super::noise::BEYOND_NOISE;
-use super::refit::{Refit, least, least_chi2};
+use super::refit::{Refit, best, least, least_chi2, merged};
 use super::screen::{Score, Screen};
 use super::selection::{self, Lacks};
 use super::{Cause, hysteresis};
@@ -71,18 +71,6 @@ pub(super) fn beside<'a>(
     causes.par_iter().with_max_len(1).filter_map(of).collect()
 }
 
-/// The better one of each hypothesis.
-fn merged<'a>(mut fits: Vec<Refit<'a>>, others: Vec<Refit<'a>>) -> Vec<Refit<'a>> {
-    for other in others {
-        match fits.iter_mut().find(|fit| fit.hypothesis.causes == other.hypothesis.causes) {
-            Some(known) if other.chi2 < known.chi2 => *known = other,
-            Some(_) => {}
-            None => fits.push(other),
-        }
-    }
-    fits
-}
-
 /// The best fits of a kind anew from where the first part of each recording leads: when a dry hinge stops, and where, no derivative tells, and early on it
 /// has not.
 fn from_the_first_part<'a>(
@@ -105,20 +93,6 @@ fn from_the_first_part<'a>(
     };
     let others: Vec<Refit<'a>> = chosen.par_iter().with_max_len(1).filter_map(again).collect();
     merged(fits, others)
-}
-
-/// The fits of a kind that leave least.
-fn best<'a>(
-    fits: &[Refit<'a>],
-    count: usize,
-    is_meant: impl Fn(&Refit<'a>) -> bool,
-    left: impl Fn(&Refit<'a>) -> f64,
-) -> Vec<usize> {
-    let mut order: Vec<(f64, usize)> =
-        (0..fits.len()).filter(|i| is_meant(&fits[*i])).map(|i| (left(&fits[i]), i)).collect();
-    order.sort_by(|a, b| a.0.total_cmp(&b.0));
-    order.truncate(count);
-    order.into_iter().map(|(_, i)| i).collect()
 }
 
 /// The single effects that leave least; where that is far more than noise, its colour does not count.

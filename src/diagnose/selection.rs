@@ -183,7 +183,7 @@ fn refined_once<'a>(ground: &mut Ground<'a>, fits: Vec<Refit<'a>>) -> Vec<Refit<
 }
 
 /// The same fits beside the errors in step with the swing that a tracked angle may have; those that are near the noise go on from where they are.
-fn with_errors_in_step<'a>(ground: &mut Ground<'a>, fits: Vec<Refit<'a>>) -> Vec<Refit<'a>> {
+pub(super) fn with_errors_in_step<'a>(ground: &mut Ground<'a>, fits: Vec<Refit<'a>>) -> Vec<Refit<'a>> {
     for (noise, record) in ground.noise.iter_mut().zip(ground.records) {
         noise.in_step = record.in_step;
     }

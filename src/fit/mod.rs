@@ -40,6 +40,8 @@ pub use verdict::Verdict;
 
 /// Residuals beyond this many standard deviations of their neighbours are outliers.
 const OUTLIER: f64 = 6.0;
+/// A descent that leaves more than this, over the variance of the noise, is tried from the file's values as well.
+const ASTRAY: f64 = 25.0;
 
 /// A fitted model.
 #[derive(Debug, Clone)]
@@ -120,7 +122,7 @@ impl Fit {
 /// [`Error::Option`], [`Error::Simulation`]: see [`Problem::new`]; and where no motion near the start values can be integrated.
 pub fn fit(records: &[Record], experiment: &Experiment, free: &[Parameter]) -> Result<Fit> {
     let mut problem = Problem::new(records, experiment, free)?;
-    let start = shooting::multiple_shooting(&mut problem)?.x;
+    let shot = shooting::multiple_shooting(&mut problem)?.x;
     let noise_rad: Vec<Vec<f64>> = problem.noise.iter().map(|noise| noise.sd_rad.clone()).collect();
     problem.integrate_below_the_noise();
     let refused = || Error::Simulation {
@@ -128,7 +130,14 @@ pub fn fit(records: &[Record], experiment: &Experiment, free: &[Parameter]) -> R
     };
     let lower = problem.lower();
     let robust = Descent { huber: 4.0, most_steps: 30, enough: 0.03, ..Descent::default() };
-    let first = robust.run(start, &lower, |x| problem.blocks(x)).ok_or_else(refused)?;
+    let descended = |start: Vec<f64>| robust.run(start, &lower, |x| problem.blocks(x));
+    // stretches that a model cannot follow may lead astray from values that were near
+    let stated = [problem.start_values()?, shot[free.len()..].to_vec()].concat();
+    let from_stretches = descended(shot);
+    let astray = from_stretches.as_ref().is_none_or(|end| end.cost > ASTRAY * end.residuals() as f64);
+    let from_stated = if astray { descended(stated) } else { None };
+    let ends = [from_stretches, from_stated].into_iter().flatten();
+    let first = ends.min_by(|a, b| a.cost.total_cmp(&b.cost)).ok_or_else(refused)?;
     let (kept, outliers) = without_outliers(&problem, &first.x)?;
     let problem = Problem { records: &kept, ..problem };
     let outcome = Descent { most_steps: 30, enough: 1e-3, ..Descent::default() }
