@@ -29,6 +29,25 @@ release_rad = [0.6]
 [model.effects]
 hinge_viscous = 1e-3
 ";
+/// Two arms of metal on bearings.
+const TWO_ARMS: &str = "
+[[specimen.links]]
+length_m = 0.17
+mass_kg = 0.094
+com_m = 0.11
+inertia_kg_m2 = 4.4e-4
+[[specimen.links]]
+length_m = 0.23
+mass_kg = 0.138
+com_m = 0.117
+inertia_kg_m2 = 1.27e-3
+[model]
+k_eq_n_m_per_rad = 0.0
+c_eq_n_m_s_per_rad = 1e-5
+release_rad = [-0.8, 1.0]
+[model.effects]
+hinge_viscous = 1e-4
+";
 /// The upper arm of a real double pendulum, as published, swinging alone.
 const REAL_ARM: &str = "
 [[specimen.links]]
@@ -394,6 +413,18 @@ fn three_effects_are_named_where_two_leave_more_than_noise() {
     for left in report["heldout"]["augmented_rmse_rad"].as_array().unwrap() {
         assert!(left.as_f64().unwrap() < 1.3 * 3e-4, "{}", report["heldout"]);
     }
+}
+
+#[test]
+fn dry_bearings_are_found_in_a_joint_without_a_spring() {
+    let folder = Folder::new();
+    let options = ["--duration", "15", "--noise-rad", "3e-4", "--seed", "1"];
+    let effects = "hinge_coulomb = 3e-4\njoint_hysteretic = { torque_n_m = 1.5e-4, yield_rad = 1e-3 }\n";
+    let angles = folder.simulated(TWO_ARMS, effects, &options);
+    let report = folder.diagnosis(&angles, TWO_ARMS, &[]);
+    let verdict = &report["verdict"];
+    assert_eq!(verdict["effects"], serde_json::json!(["hinge_coulomb", "joint_hysteretic"]), "{verdict:#}");
+    assert!(verdict["statement"].as_str().unwrap().contains("dry friction in it"), "{verdict:#}");
 }
 
 #[test]

@@ -18,8 +18,8 @@ use crate::output::OutputFile;
 
 /// Longest planned recording.
 const MOST_ROWS: f64 = 1e6;
-/// A joint that yields before this angle is dry.
-const DRY_RAD: f64 = 1e-3;
+/// A joint that yields before this part of its largest bend is dry.
+const DRY_SHARE: f64 = 0.01;
 /// Candidates listed on the page.
 const LISTED: usize = 6;
 /// Names that a verdict's own list gives.
@@ -286,8 +286,9 @@ impl Report<'_> {
 
     /// What a law's coefficients say beside their values.
     fn remark(&self) -> &'static str {
+        let dry_rad = DRY_SHARE * self.diagnosis.ground.largest_bend_rad();
         match self.diagnosis.named().value(Parameter::HysteresisYield) {
-            Some(yield_rad) if yield_rad < DRY_RAD => {
+            Some(yield_rad) if yield_rad < dry_rad => {
                 " The joint yields at next to no angle: that is dry friction in it."
             }
             _ => "",

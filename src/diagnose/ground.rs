@@ -15,6 +15,9 @@ use crate::model::observe::chord_angles_rad;
 
 /// A yield angle of the joint's hysteresis to start from, as a part of the largest bend.
 const YIELD_SHARE: f64 = 0.2;
+/// The same of a joint that has no spring: a bearing whose friction is dry. How near to it that stays, as a part of itself.
+const DRY_YIELD_SHARE: f64 = 1e-3;
+const STAYS_DRY: f64 = 0.5;
 /// A fit from short stretches, or of a strip, goes on where its first steps lead below this multiple of the base model's χ².
 pub(super) const BEYOND_HOPE: f64 = 10.0;
 /// A dear hypothesis goes on where its first steps lead below this multiple of the base model's χ².
@@ -96,8 +99,8 @@ impl<'a> Ground<'a> {
                 experiment.model.effects.distributed_flexibility = Some(experiment.model.k_eq_n_m_per_rad * mark_m);
             }
             if *cause == Cause::JointHysteretic {
-                let yield_rad = YIELD_SHARE * self.largest_bend_rad();
-                beliefs.push(Belief { parameter: Parameter::HysteresisYield, value: yield_rad, sd: 2.5 * yield_rad });
+                let (yield_rad, sd) = self.yield_rad();
+                beliefs.push(Belief { parameter: Parameter::HysteresisYield, value: yield_rad, sd });
                 experiment.model.effects.joint_hysteretic = Some(Hysteresis { torque_n_m: 0.0, yield_rad });
             }
             free.extend(cause.parameters());
@@ -337,6 +340,17 @@ impl<'a> Ground<'a> {
             rows.filter_map(bend).fold(0.0, f64::max)
         };
         self.records.iter().map(of).fold(1e-6, f64::max)
+    }
+
+    /// Whether the base model's joint has a spring.
+    pub fn has_spring(&self) -> bool {
+        self.base.iter().any(|p| matches!(p, Parameter::JointStiffness | Parameter::BendingStiffness))
+    }
+
+    /// What is believed of a hysteresis' yield angle, and its standard deviation.
+    pub fn yield_rad(&self) -> (f64, f64) {
+        let of = |share: f64, scatter: f64| (share * self.largest_bend_rad(), scatter * share * self.largest_bend_rad());
+        if self.has_spring() { of(YIELD_SHARE, 2.5) } else { of(DRY_YIELD_SHARE, STAYS_DRY) }
     }
 
     /// Whether the base model bends all along the strip.

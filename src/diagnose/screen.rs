@@ -106,7 +106,11 @@ impl<'g, 'a> Screen<'g, 'a> {
         // every corner of a hysteresis ends a step, which the others need not suffer
         let (kinked, smooth): (Vec<Cause>, Vec<Cause>) = smooth.into_iter().partition(|c| *c == Cause::JointHysteretic);
         let mut scores = self.of_coefficients(&smooth, None).unwrap_or_default();
-        let yields_rad = YIELDS.map(|share| share * self.ground.largest_bend_rad());
+        let yields_rad = if self.ground.has_spring() {
+            YIELDS.map(|share| share * self.ground.largest_bend_rad()).to_vec()
+        } else {
+            vec![self.ground.yield_rad().0]
+        };
         let kinked = yields_rad.into_iter().filter_map(|yield_rad| {
             let mut score = self.of_coefficients(&kinked, Some(yield_rad))?.pop()?;
             score.start.push((Parameter::HysteresisYield, yield_rad));
