@@ -15,6 +15,9 @@ pub const FEWEST_ROWS: usize = 8;
 /// An angle that varies by less than this (rad) does not swing; the best encoders resolve ten times more.
 const STILL_RAD: f64 = 1e-6;
 
+/// A column of which more than this part of the numbers is negative holds no standard deviations, whatever its name.
+const MOST_NEGATIVE: f64 = 0.25;
+
 /// Consecutive swings beyond a full turn that no hanging chain makes.
 const IMPOSSIBLE_SWINGS: usize = 4;
 
@@ -31,6 +34,8 @@ pub struct AngleSeries {
     pub sd_rad: Vec<Vec<Option<f64>>>,
     /// Whether the table also holds the marks in the picture, from which its angles were measured.
     pub tracked: bool,
+    /// What of the table was passed over, and why.
+    pub warnings: Vec<String>,
 }
 
 impl AngleSeries {
@@ -73,12 +78,14 @@ impl AngleSeries {
             theta_rad: vec![Vec::new(); links],
             sd_rad: vec![Vec::new(); links],
             tracked: header.iter().any(|name| name == "m1_x_px"),
+            warnings: Vec::new(),
         };
         for record in reader.records() {
             let record = record.map_err(|e| table.refuse(e.position().map(csv::Position::line), &e.to_string()))?;
             series.push(&Row { record: &record, header: &header, table: &table }, &columns)?;
         }
         series.check(&table)?;
+        series.keep_deviations();
         Ok(series)
     }
 
@@ -99,9 +106,28 @@ impl AngleSeries {
         for (link, column) in columns.theta.iter().enumerate() {
             self.theta_rad[link].push(row.number(*column)?);
             let sd = columns.sd[link].and_then(|c| row.record[c].parse().ok());
-            self.sd_rad[link].push(sd.filter(|sd: &f64| sd.is_finite() && *sd > 0.0));
+            self.sd_rad[link].push(sd.filter(|sd: &f64| sd.is_finite()));
         }
         Ok(())
+    }
+
+    /// Keeps the standard deviations that are positive, of the columns that hold some.
+    fn keep_deviations(&mut self) {
+        for (link, column) in self.sd_rad.iter_mut().enumerate() {
+            let (numbers, negative) =
+                column.iter().flatten().fold((0, 0), |(n, below), sd| (n + 1, below + usize::from(*sd < 0.0)));
+            let is_none = negative as f64 > MOST_NEGATIVE * numbers as f64;
+            if is_none {
+                self.warnings.push(format!(
+                    "{}: theta{}_sd_rad is negative in {negative} of {numbers} rows: no standard deviations; passed over",
+                    self.path.display(),
+                    link + 1
+                ));
+            }
+            for sd in column {
+                *sd = sd.filter(|sd| *sd > 0.0 && !is_none);
+            }
+        }
     }
 
     fn check(&self, table: &Table) -> Result<()> {
@@ -203,6 +229,7 @@ impl AngleSeries {
             theta_rad: part(&self.theta_rad),
             sd_rad: part(&self.sd_rad),
             tracked: self.tracked,
+            warnings: self.warnings.clone(),
         }
     }
 }
@@ -377,6 +404,19 @@ mod tests {
         assert_eq!((series.step_s(), series.nyquist_hz(), series.duration_s()), (1.0, 0.5, 8.0));
         assert_eq!(series.rows(2.0, 4.0), 2..4);
         assert_eq!(series.slice(2..4).theta_rad[1], [Some(0.2), None]);
+    }
+
+    #[test]
+    fn a_column_of_negative_deviations_is_passed_over_with_a_word() {
+        let mut text = "t_s,theta1_rad,theta1_sd_rad\n".to_owned();
+        for row in 0..40 {
+            let t = 0.1 * f64::from(row);
+            let _ = writeln!(text, "{t:.3},{:.6},{:.6}", swing(t), 0.2 * (6.0 * t).sin());
+        }
+        let series = AngleSeries::parse(text.as_bytes(), Path::new("a.csv")).unwrap();
+        assert!(series.sd_rad[0].iter().all(Option::is_none));
+        let expected = "a.csv: theta1_sd_rad is negative in 18 of 40 rows: no standard deviations; passed over";
+        assert_eq!(series.warnings, [expected]);
     }
 
     #[test]
