@@ -244,8 +244,10 @@ impl Report<'_> {
                 let nearest = if causes.is_empty() {
                     "; no law of the table comes nearer than the base model".to_owned()
                 } else {
+                    let [comes, explains] =
+                        if causes.len() == 1 { ["comes", "it explains"] } else { ["come", "they explain"] };
                     format!(
-                        ". Of the table {} comes nearest ({:.0} % among the named): it explains {:.1} % of what the base model leaves beyond the noise",
+                        ". Of the table {} {comes} nearest ({:.0} % among the named): {explains} {:.1} % of what the base model leaves beyond the noise",
                         words(causes),
                         1e2 * named.if_named,
                         1e2 * self.diagnosis.explained()

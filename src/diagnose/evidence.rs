@@ -104,7 +104,8 @@ pub fn ln_evidence(fit: &Refit<'_>, scatter: Scatter, least_without: impl Fn(Cau
         };
         let fall = (least_without(*cause) - fit.chi2) / scatter.of_all;
         let needed = scatter.of_values > MUCH_LEFT && fall > NEEDED;
-        if !(needed || value.abs() > TOLD_FROM_ZERO * sd) {
+        // a law of no size is none, however much more is left without it
+        if value == 0.0 || !(needed || value.abs() > TOLD_FROM_ZERO * sd) {
             return f64::NEG_INFINITY;
         }
         ln_volume -= (value.abs() * SIZES).ln();
@@ -129,7 +130,8 @@ pub fn ln_evidence(fit: &Refit<'_>, scatter: Scatter, least_without: impl Fn(Cau
             _ => {}
         }
     }
-    likelihood + ln_volume
+    let ln = likelihood + ln_volume;
+    if ln.is_nan() { f64::NEG_INFINITY } else { ln }
 }
 
 /// Whether the support of a fit moves so slowly beside the swing that nothing moves but the angles' zero.

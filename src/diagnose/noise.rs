@@ -25,8 +25,7 @@ const LINE: f64 = 25.0;
 const AROUND: usize = 12;
 /// Part of the frequencies that has to be left.
 const ENOUGH: f64 = 0.15;
-/// Noise that goes on for longer than the swing takes for so much must be the same in so many parts of a recording.
-const SLOW_RAD: f64 = std::f64::consts::PI;
+/// Noise that goes on must be the same in so many parts of a recording.
 const PARTS: usize = 3;
 /// Times tried for which noise goes on, in rows: from the shortest by a factor each.
 const ROWS: (f64, f64, usize) = (0.3, 1.12, 48);
@@ -87,13 +86,11 @@ pub fn off_the_lines(residual: &[f64], motion: &[f64]) -> Option<Noise> {
     let length = residual.len().div_ceil(PARTS);
     let parts: Vec<Between> =
         residual.chunks(length).zip(motion.chunks(length)).filter_map(|(r, m)| Between::of(r, m)).collect();
-    // what is slower than the swing and comes once, as a gust does, or fades, as a joint that settles, is no noise: without the part that says most for it
-    // the others must say so, too
+    // what comes once, as a gust does or a jump of the clock, or fades, as a joint that settles, is no noise: without the part that says most for it the others
+    // must say so, too
     let throughout = |colour: Colour| {
         let gains: Vec<f64> = parts.iter().map(|part| part.gains(colour)).collect();
-        let is_slow = seen.swing_rad > -SLOW_RAD * colour.rho.ln();
-        !is_slow
-            || gains.len() < PARTS
+        gains.len() < PARTS
             || gains.iter().sum::<f64>() > gains.iter().copied().fold(0.0, f64::max) + BESIDE
     };
     // there is no more noise than there is residual
@@ -122,18 +119,14 @@ pub fn off_the_lines(residual: &[f64], motion: &[f64]) -> Option<Noise> {
 struct Between {
     /// cos 2πfΔt and power of each.
     powers: Vec<(f64, f64)>,
-    /// By how much the swing goes on from row to row.
-    swing_rad: f64,
 }
 
 impl Between {
     fn of(residual: &[f64], motion: &[f64]) -> Option<Self> {
         let power = spectrum(residual);
         let angle_rad = |k: usize| std::f64::consts::PI * k as f64 / (power.len() - 1) as f64;
-        let lines = Lines::of(motion)?;
-        let free = lines.between(&power)?;
-        let powers = free.into_iter().map(|k| (angle_rad(k).cos(), power[k])).collect();
-        Some(Self { powers, swing_rad: angle_rad(lines.peak) })
+        let free = Lines::of(motion)?.between(&power)?;
+        Some(Self { powers: free.into_iter().map(|k| (angle_rad(k).cos(), power[k])).collect() })
     }
 
     /// ln-likelihood of a colour, up to a constant, with the variance that makes it likeliest.
@@ -311,6 +304,22 @@ mod tests {
             })
             .collect();
         let motion: Vec<f64> = (0..600).map(|i| 0.5 * (0.4 * f64::from(i)).cos()).collect();
+        let noise = off_the_lines(&residual, &motion).unwrap();
+        assert!(noise.colour.rho < 0.5, "{noise:?}");
+    }
+
+    #[test]
+    fn a_jump_of_the_clock_is_no_noise() {
+        let mut random = rand::rngs::StdRng::seed_from_u64(13);
+        // a motion in the middle between the phases before and after
+        let ahead = |i: usize| if i < 330 { -1.0 } else { 1.0 };
+        let residual: Vec<f64> = (0..1320)
+            .map(|i| {
+                let white: f64 = StandardNormal.sample(&mut random);
+                3e-4 * white + 0.02 * ahead(i) * (0.107 * i as f64).sin()
+            })
+            .collect();
+        let motion: Vec<f64> = (0..1320).map(|i| 0.9 * (0.107 * f64::from(i)).cos()).collect();
         let noise = off_the_lines(&residual, &motion).unwrap();
         assert!(noise.colour.rho < 0.5, "{noise:?}");
     }
