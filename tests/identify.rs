@@ -69,7 +69,14 @@ impl Case {
         };
         let theta_rad: Vec<Vec<Option<f64>>> = (0..2).map(|l| t_s.iter().map(|t| angle(l, *t)).collect()).collect();
         let sd_rad = theta_rad.iter().map(|l| vec![None; l.len()]).collect();
-        let series = AngleSeries { path: PathBuf::from("synthetic"), t_s, theta_rad, sd_rad, tracked: false, warnings: Vec::new() };
+        let series = AngleSeries {
+            path: PathBuf::from("synthetic"),
+            t_s,
+            theta_rad,
+            sd_rad,
+            tracked: false,
+            warnings: Vec::new(),
+        };
         Self { modes, series }
     }
 }
@@ -246,7 +253,8 @@ fn a_simulated_strip_gives_back_its_frequencies_and_its_friction() {
         }
     }
     let sd_rad = theta_rad.iter().map(|l| vec![None; l.len()]).collect();
-    let series = AngleSeries { path: PathBuf::from("simulated"), t_s, theta_rad, sd_rad, tracked: false, warnings: Vec::new() };
+    let series =
+        AngleSeries { path: PathBuf::from("simulated"), t_s, theta_rad, sd_rad, tracked: false, warnings: Vec::new() };
     let found = identify(&series, Some(&experiment)).unwrap();
     println!("{found}");
     let natural = natural_hz(&experiment);
@@ -280,7 +288,10 @@ fn simulated(rng: &mut Xoshiro256PlusPlus, release_rad: f64) -> (AngleSeries, [(
         }
     }
     let sd_rad = theta_rad.iter().map(|l| vec![None; l.len()]).collect();
-    (AngleSeries { path: PathBuf::from("simulated"), t_s, theta_rad, sd_rad, tracked: false, warnings: Vec::new() }, poles(&experiment))
+    (
+        AngleSeries { path: PathBuf::from("simulated"), t_s, theta_rad, sd_rad, tracked: false, warnings: Vec::new() },
+        poles(&experiment),
+    )
 }
 
 /// Eigenvalues of the linearised chain with its dampers.

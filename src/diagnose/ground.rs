@@ -13,11 +13,10 @@ use crate::fit::{Belief, Problem, Record};
 use crate::model::Parameter;
 use crate::model::observe::chord_angles_rad;
 
-/// A yield angle of the joint's hysteresis to start from, as a part of the largest bend.
-const YIELD_SHARE: f64 = 0.2;
-/// The same of a joint that has no spring: a bearing whose friction is dry. How near to it that stays, as a part of itself.
-const DRY_YIELD_SHARE: f64 = 1e-3;
-const STAYS_DRY: f64 = 0.5;
+/// A yield angle of the joint's hysteresis to start from, as a part of the largest bend, and how far from it that may be, as a part of itself.
+const YIELD: (f64, f64) = (0.2, 2.5);
+/// The same of a joint that has no spring: a bearing, whose friction is dry.
+const DRY_YIELD: (f64, f64) = (1e-3, 0.5);
 /// A fit from short stretches, or of a strip, goes on where its first steps lead below this multiple of the base model's χ².
 pub(super) const BEYOND_HOPE: f64 = 10.0;
 /// A dear hypothesis goes on where its first steps lead below this multiple of the base model's χ².
@@ -349,8 +348,9 @@ impl<'a> Ground<'a> {
 
     /// What is believed of a hysteresis' yield angle, and its standard deviation.
     pub fn yield_rad(&self) -> (f64, f64) {
-        let of = |share: f64, scatter: f64| (share * self.largest_bend_rad(), scatter * share * self.largest_bend_rad());
-        if self.has_spring() { of(YIELD_SHARE, 2.5) } else { of(DRY_YIELD_SHARE, STAYS_DRY) }
+        let (share, scatter) = if self.has_spring() { YIELD } else { DRY_YIELD };
+        let yield_rad = share * self.largest_bend_rad();
+        (yield_rad, scatter * yield_rad)
     }
 
     /// Whether the base model bends all along the strip.

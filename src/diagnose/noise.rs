@@ -90,8 +90,7 @@ pub fn off_the_lines(residual: &[f64], motion: &[f64]) -> Option<Noise> {
     // must say so, too
     let throughout = |colour: Colour| {
         let gains: Vec<f64> = parts.iter().map(|part| part.gains(colour)).collect();
-        gains.len() < PARTS
-            || gains.iter().sum::<f64>() > gains.iter().copied().fold(0.0, f64::max) + BESIDE
+        gains.len() < PARTS || gains.iter().sum::<f64>() > gains.iter().copied().fold(0.0, f64::max) + BESIDE
     };
     // there is no more noise than there is residual
     let most = MOST * residual.iter().map(|r| r * r).sum::<f64>() / residual.len() as f64;

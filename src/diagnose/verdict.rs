@@ -12,9 +12,9 @@ use crate::statistics::median_step_s;
 
 /// A verdict stands alone when it is at least this probable.
 const ALONE: f64 = 0.75;
-/// Of the names that fit within the noise this part stands for something outside the table that they imitate: on the training bank of the concealed
-/// benchmark, names stated at 0.99 were right in 93 of 100 cases.
-const IMITATED: f64 = 0.06;
+/// Of the names that fit within the noise this part stands for something outside the table that they imitate: on training banks of the concealed benchmark,
+/// names stated at 0.99 were right in 97 of 100 cases.
+const IMITATED: f64 = 0.03;
 /// Each name beyond two is with these odds what it seems to be: many free numbers together imitate much, and no bank has calibrated them.
 const BEYOND_TWO: f64 = 0.7;
 /// A hypothesis this much less probable than the best named one is told from it.
@@ -23,8 +23,9 @@ const TOLD_APART: f64 = 0.05;
 const LAW_SHARE: f64 = 0.002;
 /// A hysteresis by more: how it goes over from spring to slip has as many forms as there are authors.
 const HYSTERESIS_SHARE: f64 = 0.05;
-/// A support in step with the swing can be what it seems to be, or stand for a torque that is not known: the odds are about even.
-const IN_STEP: f64 = 0.6;
+/// A support in step with the swing can be what it seems to be, or stand for a torque that is not known: on the same banks it was what it seemed four times
+/// out of five.
+const IN_STEP: f64 = 0.8;
 /// The same beside a law of physics, where it gains less than this many standard deviations: three free numbers complete a law that is only nearly right, and
 /// a law outside the table that has a near relative in it is more often what has been filmed.
 const BESIDE_A_LAW: f64 = 0.35;
