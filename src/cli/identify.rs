@@ -49,7 +49,7 @@ impl IdentifyArgs {
         let experiment = self.config.as_deref().map(Experiment::read).transpose()?;
         self.keep_inputs()?;
         let json = self.json.as_deref().map(OutputFile::create).transpose()?;
-        let series = self.stretch(super::table(&self.angles)?)?;
+        let series = self.stretch(super::read_angles(&self.angles)?)?;
         let found = identify(&series, experiment.as_ref())?;
         let text = if self.quiet { String::new() } else { found.to_string() };
         super::deliver(&text, &found, json)

@@ -88,7 +88,7 @@ fn exit(outcome: crate::Result<()>) -> ExitCode {
 }
 
 /// A table of angles; what of it is passed over is said on standard error.
-fn table(path: &Path) -> crate::Result<AngleSeries> {
+fn read_angles(path: &Path) -> crate::Result<AngleSeries> {
     let series = AngleSeries::read(path)?;
     for warning in &series.warnings {
         eprintln!("warning: {warning}");
@@ -99,7 +99,7 @@ fn table(path: &Path) -> crate::Result<AngleSeries> {
 /// The tables of some recordings, from one stamp until another.
 fn recordings(paths: &[PathBuf], marks: usize, (from_s, until_s): (f64, f64)) -> crate::Result<Vec<Record>> {
     let read = |path: &PathBuf| {
-        let series = table(path)?;
+        let series = read_angles(path)?;
         let kept = series.slice(series.rows(from_s, until_s));
         if kept.len() < crate::series::FEWEST_ROWS {
             let message = format!("{} rows between --from and --until; widen them", kept.len());

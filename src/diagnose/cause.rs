@@ -173,7 +173,7 @@ impl Cause {
         let strip = experiment.specimen.links.is_empty();
         let meaningful = match self {
             Self::DifferentialLag | Self::JointCubicStiffness | Self::JointHysteretic => marks > 1,
-            Self::RestCurl => base.iter().any(|p| matches!(p, Parameter::JointStiffness | Parameter::BendingStiffness)),
+            Self::RestCurl => base.iter().any(|parameter| parameter.is_spring()),
             Self::DistributedFlexibility => marks > 1 && strip && base.contains(&Parameter::JointStiffness),
             _ => true,
         };

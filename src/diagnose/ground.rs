@@ -343,7 +343,7 @@ impl<'a> Ground<'a> {
 
     /// Whether the base model's joint has a spring.
     pub fn has_spring(&self) -> bool {
-        self.base.iter().any(|p| matches!(p, Parameter::JointStiffness | Parameter::BendingStiffness))
+        self.base.iter().any(|parameter| parameter.is_spring())
     }
 
     /// What is believed of a hysteresis' yield angle, and its standard deviation.

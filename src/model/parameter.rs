@@ -113,6 +113,11 @@ impl Parameter {
         }
     }
 
+    /// Whether it is the spring between two links, or along a strip.
+    pub fn is_spring(self) -> bool {
+        matches!(self, Self::JointStiffness | Self::BendingStiffness)
+    }
+
     /// Whether its law is proportional to it, and gone at zero; a yield angle or a frequency only shapes a law.
     pub fn is_proportional(self) -> bool {
         !matches!(self, Self::HysteresisYield | Self::SupportFrequency)
