@@ -428,18 +428,24 @@ fn dry_bearings_are_found_in_a_joint_without_a_spring() {
 }
 
 #[test]
-fn a_viscous_hinge_is_not_all_of_a_real_arm() {
+fn a_real_arm_has_dry_friction_and_quadratic_drag_beside_its_viscous_hinge() {
     let table = PathBuf::from("../shared/data/multiarm_single.csv");
     if !table.exists() {
         println!("skipped: {} is not there", table.display());
         return;
     }
     let folder = Folder::new();
-    let report = folder.diagnosis(&table, REAL_ARM, &["--until", "12"]);
+    let report = folder.diagnosis(&table, REAL_ARM, &[]);
     let verdict = &report["verdict"];
     println!("{}", verdict["statement"]);
-    assert_ne!(verdict["status"], "adequate", "{verdict:#}");
     assert!(report["baseline"]["p_value"].as_f64().unwrap() < 0.01, "{}", report["baseline"]);
+    let named = verdict["effects"].as_array().unwrap();
+    for loss in ["hinge_coulomb", "air_quadratic"] {
+        assert!(named.iter().any(|name| name == loss), "{verdict:#}");
+    }
+    let [before, after] =
+        ["baseline_rmse_rad", "augmented_rmse_rad"].map(|model| report["heldout"][model][0].as_f64().unwrap());
+    assert!(after < 0.5 * before, "{}", report["heldout"]);
 }
 
 #[test]

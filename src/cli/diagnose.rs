@@ -9,7 +9,8 @@ use super::Bar;
 use super::figure::Figure;
 use super::table::{Table, number, paragraph};
 use crate::diagnose::{
-    self, Cause, Detectable, Diagnosis, MissingTorque, Phase, Place, Refit, Status, Weighed, locate, verdict,
+    self, Cause, Detectable, Diagnosis, MAIN_EFFECTS, MissingTorque, Phase, Place, Refit, Status, Weighed, locate,
+    verdict,
 };
 use crate::error::{Error, Result};
 use crate::experiment::Experiment;
@@ -22,8 +23,6 @@ const MOST_ROWS: f64 = 1e6;
 const DRY_SHARE: f64 = 0.01;
 /// Candidates listed on the page.
 const LISTED: usize = 6;
-/// Names that a verdict's own list gives.
-const MAIN_EFFECTS: usize = 2;
 /// Candidates written to the file.
 const WRITTEN: usize = 25;
 

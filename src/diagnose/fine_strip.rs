@@ -8,7 +8,6 @@ use rayon::prelude::*;
 
 use super::ground::{Ground, Hypothesis};
 use super::refit::{Refit, least};
-use super::second_look::beside;
 use super::selection::{self, Lacks};
 use super::{Cause, pieces};
 use crate::progress::Progress;
@@ -50,7 +49,7 @@ pub fn with_fine_strip<'a>(
     let Some((_, fine)) = chosen else { return fits };
     *ground = with(count);
     progress.begin("strip", Some(causes.len() as u64));
-    let pairs = beside(ground, &fine, causes, progress);
+    let pairs = selection::beside(ground, &fine, causes, None, progress);
     let mut all: Vec<Refit<'a>> = fits.into_iter().filter(|fit| !bends(fit)).collect();
     all.push(fine);
     all.extend(pairs);

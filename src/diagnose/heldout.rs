@@ -1,5 +1,7 @@
 //! The proof: fit on one part, predict the other with every coefficient frozen.
 
+use rayon::prelude::*;
+
 use super::ground::{Ground, Hypothesis};
 use super::growing;
 use super::refit::Refit;
@@ -32,19 +34,24 @@ impl HeldOut {
     }
 }
 
-/// Predicts the last third of a single recording from the first two; of several, the last recording from the others, of which only the
-/// start is then fitted. `from_s` moves the border of a single one.
-pub fn held_out(ground: &Ground<'_>, null: &Refit<'_>, best: &Refit<'_>, from_s: Option<f64>) -> Option<HeldOut> {
-    if ground.records.len() > 1 { across(ground, null, best) } else { along(ground, null, best, from_s) }
+/// Predicts, by the base model and by each of some fits, the last third of a single recording from the first two; of several, the last recording from the others,
+/// of which only the start is then fitted. `from_s` moves the border of a single one.
+pub fn held_out(
+    ground: &Ground<'_>,
+    null: &Refit<'_>,
+    fits: &[&Refit<'_>],
+    from_s: Option<f64>,
+) -> Vec<Option<HeldOut>> {
+    if ground.records.len() > 1 { across(ground, null, fits) } else { along(ground, null, fits, from_s) }
 }
 
-fn along(ground: &Ground<'_>, null: &Refit<'_>, best: &Refit<'_>, from_s: Option<f64>) -> Option<HeldOut> {
+fn along(ground: &Ground<'_>, null: &Refit<'_>, fits: &[&Refit<'_>], from_s: Option<f64>) -> Vec<Option<HeldOut>> {
     let record = &ground.records[0];
     let (first_s, last_s) = (record.t_s[0], record.t_s[record.len() - 1]);
     let border_s = from_s.unwrap_or(first_s + FITTED * (last_s - first_s));
     let rows = record.t_s.partition_point(|t| *t < border_s);
     if rows < crate::series::FEWEST_ROWS || rows + crate::series::FEWEST_ROWS > record.len() {
-        return None;
+        return vec![None; fits.len()];
     }
     let early = [record.until(rows)];
     let part = ground.on(&early);
@@ -56,11 +63,10 @@ fn along(ground: &Ground<'_>, null: &Refit<'_>, best: &Refit<'_>, from_s: Option
         let whole = ground.problem(&fit.hypothesis).ok()?;
         errors(&whole.predict(0, &refitted.x, false).ok()?.values, record, rows)
     };
-    let (baseline, augmented) = rayon::join(|| predicted(null), || predicted(best));
-    Some(HeldOut { record: 0, from_s: border_s, baseline_rad: baseline?, augmented_rad: augmented? })
+    beside_the_base(null, fits, predicted, (0, border_s))
 }
 
-fn across(ground: &Ground<'_>, null: &Refit<'_>, best: &Refit<'_>) -> Option<HeldOut> {
+fn across(ground: &Ground<'_>, null: &Refit<'_>, fits: &[&Refit<'_>]) -> Vec<Option<HeldOut>> {
     let last = ground.records.len() - 1;
     let others = ground.on(&ground.records[..last]);
     let alone = ground.on(&ground.records[last..]);
@@ -83,9 +89,22 @@ fn across(ground: &Ground<'_>, null: &Refit<'_>, best: &Refit<'_>) -> Option<Hel
         let seen = alone.refit(&hypothesis, &start, &[])?;
         errors(&seen.problem.predict(0, &seen.x, false).ok()?.values, &ground.records[last], 0)
     };
-    let from_s = ground.records[last].t_s[0];
-    let (baseline, augmented) = rayon::join(|| predicted(null), || predicted(best));
-    Some(HeldOut { record: last, from_s, baseline_rad: baseline?, augmented_rad: augmented? })
+    beside_the_base(null, fits, predicted, (last, ground.records[last].t_s[0]))
+}
+
+/// What each fit leaves of a recording from a stamp on, beside what the base model does.
+fn beside_the_base(
+    null: &Refit<'_>,
+    fits: &[&Refit<'_>],
+    predicted: impl Fn(&Refit<'_>) -> Option<Vec<f64>> + Sync,
+    (record, from_s): (usize, f64),
+) -> Vec<Option<HeldOut>> {
+    let of_fits = || fits.par_iter().with_max_len(1).map(|fit| predicted(fit)).collect::<Vec<_>>();
+    let (baseline, augmented) = rayon::join(|| predicted(null), of_fits);
+    let proof = |augmented_rad: Option<Vec<f64>>| {
+        Some(HeldOut { record, from_s, baseline_rad: baseline.clone()?, augmented_rad: augmented_rad? })
+    };
+    augmented.into_iter().map(proof).collect()
 }
 
 /// Root mean square error of each angle from a row on.

@@ -13,6 +13,8 @@
 //! | [`selection`] | which are fitted in full |
 //! | [`fine_strip`] | a strip that bends everywhere, as finely as it needs |
 //! | [`second_look`] | from further starts, where much is left |
+//! | [`growing`] | from the beginning of the recordings on, where still more is |
+//! | [`stepwise`] | more effects than two |
 //! | [`evidence`] | how probable each is |
 //! | [`surroundings`] | what a small torque would have done |
 //! | [`latent`] | the unknown torque, of any course |
@@ -45,13 +47,12 @@ pub mod refit;
 pub mod screen;
 pub mod second_look;
 pub mod selection;
+pub mod stepwise;
 pub mod surroundings;
 pub mod torque;
 pub mod verdict;
 
 use std::sync::OnceLock;
-
-use rayon::prelude::*;
 
 use crate::error::{Error, Result};
 use crate::experiment::Experiment;
@@ -70,14 +71,16 @@ pub use locate::Departure;
 pub use plan::{Plan, planned};
 pub use refit::Refit;
 pub use torque::{MissingTorque, Phase};
-pub use verdict::{Status, Verdict, Weighed};
+pub use verdict::{Status, Verdict, Weighed, Weighing};
 
 /// A length or an inertia of a rig is known to this share.
 const GEOMETRY_SHARE: f64 = 0.1;
+/// Effects that an answer has at first, those that explain most; further ones stand beside them.
+pub const MAIN_EFFECTS: usize = 2;
+/// Where far more than noise is left, a further one must leave at most this part of what they do of what was not fitted.
+const BORNE_OUT: f64 = 0.9;
 /// What is at least this probable counts.
 const EVEN: f64 = 0.5;
-/// The best fits, which are made anew with the file taken loosely.
-const ANEW: usize = 4;
 /// Springs to start from, over the file's, where that leads nowhere.
 const SPRINGS: [f64; 3] = [0.03, 30.0, 1e-3];
 /// Correlation of the noise from row to row that counts as colour.
@@ -279,25 +282,36 @@ pub fn diagnose<'a>(
             found = again;
         }
     }
-    let weigh = |(ground, causes, fits): &Fitted<'a>| {
-        verdict::weigh(fits.clone(), ground.values(), causes.len(), |fit, variance| {
+    let weigh = |ground: &Ground<'a>, causes: &[Cause], fits: Vec<Refit<'a>>| {
+        verdict::weigh(fits, ground.values(), causes.len(), |fit, variance| {
             (locate::unknowns(fit, variance, Assumed::BESIDE), energy::added_torque_n_m(fit))
         })
     };
-    let (mut weighed, mut unknown, mut unknowns) = weigh(&found);
+    let mut answer = weigh(&found.0, &found.1, found.2.clone());
     // a strip's fits are too dear to be followed from the beginning
-    if !found.0.is_strip() && (unknown > EVEN || leaves_more_than_noise(&found.2)) {
+    if !found.0.is_strip() && (answer.unknown > EVEN || leaves_more_than_noise(&found.2)) {
         found = doubted(prepared, experiment, found, progress)?;
-        (weighed, unknown, unknowns) = weigh(&found);
+        answer = weigh(&found.0, &found.1, found.2.clone());
     }
-    let (ground, causes, _) = found;
+    let (ground, causes, mut fits) = found;
+    let best = &answer.weighed[0].fit;
+    let fewer = (best.hypothesis.causes.len() > MAIN_EFFECTS && verdict::is_beyond_noise(best)).then(|| {
+        fits.retain(|fit| fit.hypothesis.causes.len() <= MAIN_EFFECTS);
+        weigh(&ground, &causes, fits)
+    });
+    let (proofs, adequacy) = {
+        let null = base_model(&answer.weighed);
+        let named: Vec<&Refit<'a>> =
+            [Some(&answer), fewer.as_ref()].into_iter().flatten().map(|a| &a.weighed[0].fit).collect();
+        rayon::join(
+            || heldout::held_out(&ground.plain(), null, &named, options.predict_from_s),
+            || adequacy::adequacy(&ground, null, &causes, options.bootstraps, progress),
+        )
+    };
+    let (Weighing { weighed, unknown, unknowns }, held_out) = borne_out(answer, fewer, proofs);
     let marks = ground.records[0].links();
     let null = base_model(&weighed);
     let best = &weighed[0].fit;
-    let (held_out, adequacy) = rayon::join(
-        || heldout::held_out(&ground.plain(), null, best, options.predict_from_s),
-        || adequacy::adequacy(&ground, null, &causes, options.bootstraps, progress),
-    );
     let verdict = Verdict::of(&weighed, unknown, marks, held_out.as_ref());
     let of_nearest = by_what_they_explain(&weighed, best).first().map(|cause| cause.place());
     let unknown_at = if verdict.leaves_it_open() { locate::place_of_all(null, of_nearest) } else { None };
@@ -315,6 +329,22 @@ pub fn diagnose<'a>(
         weighed,
         ground,
     })
+}
+
+/// The answer, or that with fewer effects unless the further one predicts what was not fitted much better; and its proof. Where the model's own error is far
+/// above the noise, that of what was fitted always falls.
+fn borne_out<'a>(
+    answer: Weighing<'a>,
+    fewer: Option<Weighing<'a>>,
+    proofs: Vec<Option<HeldOut>>,
+) -> (Weighing<'a>, Option<HeldOut>) {
+    let mut proofs = proofs.into_iter();
+    let proof = proofs.next().flatten();
+    let leaves = |proof: &Option<HeldOut>| proof.as_ref().map_or(f64::INFINITY, HeldOut::leaves);
+    match (fewer, proofs.next().flatten()) {
+        (Some(fewer), other) if leaves(&proof) > BORNE_OUT * leaves(&other) => (fewer, other),
+        _ => (answer, proof),
+    }
 }
 
 /// The base model's fit, which every selection holds.
@@ -338,39 +368,26 @@ fn leaves_more_than_noise(fits: &[Refit<'_>]) -> bool {
     refit::least(fits).is_some_and(verdict::leaves_more_than_noise)
 }
 
-/// The hypotheses from the beginning of the recordings on, and more effects beside them, with the file taken loosely where it may be doubted.
+/// The hypotheses with the file taken loosely where it may be doubted, from the beginning of the recordings on where they leave far more than noise, and with
+/// more effects beside them.
 fn doubted<'a>(
     prepared: &'a Prepared,
     experiment: &'a Experiment,
-    found: Fitted<'a>,
+    mut found: Fitted<'a>,
     progress: &dyn Progress,
 ) -> Result<Fitted<'a>> {
-    let (ground, mut causes, mut fits) = found;
-    let mut ground = ground.plain();
-    let marks = ground.records[0].links();
+    let marks = found.0.records[0].links();
     let has_slack = !experiment.specimen.links.is_empty() || lacks_a_damper(experiment, marks);
-    let loosely = has_slack && leaves_more_than_noise(&fits);
-    if loosely {
-        (ground.base, ground.beliefs) = base_of(experiment, marks, Taken::Loosely)?;
-        ground.begun = begun(prepared, experiment, &ground.base)?;
-        causes.retain(|cause| cause.may_be_missing(experiment, &ground.base, marks));
-        for fit in &mut fits {
-            fit.hypothesis.causes.retain(|cause| causes.contains(cause));
-        }
+    if has_slack && leaves_more_than_noise(&found.2) {
+        found = fitted(prepared, experiment, Taken::Loosely, progress)?;
     }
-    let further = if leaves_more_than_noise(&fits) {
-        growing::grown(&ground, &fits, &causes, progress)
-    } else {
-        growing::with_more(&ground, growing::with_more(&ground, fits.clone(), &causes), &causes)
-    };
-    if loosely {
-        let bases = (0..fits.len()).filter(|place| fits[*place].hypothesis.causes.is_empty());
-        let anew: Vec<usize> = bases.chain(refit::best(&fits, ANEW, |_| true, |fit| fit.chi2)).collect();
-        let again = |place: &usize| ground.refit(&fits[*place].hypothesis, &fits[*place], &[]);
-        fits = refit::merged(Vec::new(), anew.par_iter().with_max_len(1).filter_map(again).collect());
+    let (ground, causes, mut fits) = found;
+    let mut ground = ground.plain();
+    if leaves_more_than_noise(&fits) {
+        let grown = growing::grown(&ground, &fits, &causes, progress);
+        fits = refit::merged(fits, grown);
     }
-    let fits = growing::with_rivals(&ground, refit::merged(fits, further), &causes);
-    let fits = selection::with_refined_noise(&mut ground, fits);
+    let fits = stepwise::with_more_and_fewer(&mut ground, fits, &causes, progress);
     let fits = selection::with_errors_in_step(&mut ground, fits);
     Ok((ground, causes, fits))
 }
@@ -417,5 +434,11 @@ fn fitted<'a>(
     let null =
         if ground.refine_noise(&null) { ground.again(&null, ground::MOST_STEPS).ok_or_else(refused)? } else { null };
     let fits = selection::fits(&mut ground, null, &causes, progress);
+    if taken == Taken::Loosely {
+        // they are followed from the beginning next
+        return Ok((ground, causes, fits));
+    }
+    let fits = second_look::second_look(&mut ground, fits, &causes, progress);
+    let fits = selection::with_errors_in_step(&mut ground, fits);
     Ok((ground, causes, fits))
 }

@@ -64,6 +64,11 @@ impl<'a> Refit<'a> {
         self.hypothesis.causes.iter().flat_map(|cause| cause.parameters()).copied().collect()
     }
 
+    /// How many there are.
+    pub fn coefficients(&self) -> usize {
+        self.hypothesis.causes.iter().map(|cause| cause.parameters().len()).sum()
+    }
+
     /// The covariance of some of the parameters, all other variables being free: the inverse of JᵀJ, of which variables held by their bound
     /// are left out.
     pub fn covariance(&self, of: &[Parameter]) -> DMatrix<f64> {

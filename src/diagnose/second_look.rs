@@ -5,7 +5,6 @@ use rayon::prelude::*;
 use super::ground::{self, Ground};
 use super::noise::BEYOND_NOISE;
 use super::refit::{Refit, best, least, least_chi2, merged};
-use super::screen::{Score, Screen};
 use super::selection::{self, Lacks};
 use super::{Cause, hysteresis};
 use crate::fit::Record;
@@ -33,7 +32,8 @@ pub fn second_look<'a>(
     let fits = from_the_first_part(ground, fits, |fits| seeds(ground, fits));
     let seeds: Vec<&Refit<'a>> = seeds(ground, &fits).into_iter().map(|i| &fits[i]).collect();
     progress.begin("second look", Some((seeds.len() * causes.len()) as u64));
-    let mut others: Vec<Refit<'a>> = seeds.iter().flat_map(|seed| beside(ground, seed, causes, progress)).collect();
+    let mut others: Vec<Refit<'a>> =
+        seeds.iter().flat_map(|seed| selection::beside(ground, seed, causes, None, progress)).collect();
     if causes.contains(&Cause::JointHysteretic) {
         let lacking = seeds.iter().filter(|seed| !seed.hypothesis.causes.contains(&Cause::JointHysteretic));
         let bases = lacking.copied().chain(fits.first());
@@ -49,26 +49,6 @@ pub fn second_look<'a>(
         chosen
     });
     selection::with_refined_noise(ground, all)
-}
-
-/// Every other effect beside a fit.
-pub(super) fn beside<'a>(
-    ground: &Ground<'a>,
-    seed: &Refit<'a>,
-    causes: &[Cause],
-    progress: &dyn Progress,
-) -> Vec<Refit<'a>> {
-    let Some(screen) = Screen::at(ground, seed) else { return Vec::new() };
-    let scores: Vec<Score> = screen.scores(causes);
-    let lacks = Lacks::of(ground, seed, &scores);
-    let of = |cause: &Cause| {
-        progress.advance(1);
-        if seed.hypothesis.causes.contains(cause) {
-            return None;
-        }
-        selection::single(ground, seed, *cause, scores.iter().find(|s| s.cause == *cause), lacks)
-    };
-    causes.par_iter().with_max_len(1).filter_map(of).collect()
 }
 
 /// The best fits of a kind anew from where the first part of each recording leads: when a dry hinge stops, and where, no derivative tells, and early on it

@@ -5,7 +5,7 @@ use rayon::prelude::*;
 use super::ground::{self, Ground, Hypothesis};
 use super::refit::{OUT_OF_STEP, Refit, least, least_chi2};
 use super::screen::{Score, Screen};
-use super::{Cause, dropped, fine_strip, hysteresis, second_look};
+use super::{Cause, dropped, fine_strip, hysteresis};
 use crate::model::Parameter;
 use crate::progress::Progress;
 
@@ -70,9 +70,7 @@ pub fn fits<'a>(ground: &mut Ground<'a>, null: Refit<'a>, causes: &[Cause], prog
     let least = least_chi2(&all);
     let all = without_stragglers(ground, all);
     let all = if least_chi2(&all) < least { with_refined_noise(ground, all) } else { all };
-    let all = fine_strip::with_fine_strip(ground, all, causes, progress);
-    let all = second_look::second_look(ground, all, causes, progress);
-    with_errors_in_step(ground, all)
+    fine_strip::with_fine_strip(ground, all, causes, progress)
 }
 
 /// The base model anew from weaker dampers, where it leaves much: what it lacks can have driven its own damper so high that a mode is gone, and no
@@ -279,6 +277,33 @@ pub(super) fn single<'a>(
         tries.push(ground.refit_anew(&null.hypothesis.and(cause, None), &[], null.chi2));
     }
     tries.into_iter().flatten().min_by(|a, b| a.chi2.total_cmp(&b.chi2))
+}
+
+/// Other effects beside a fit: every one, or as many as are asked of those that promise most.
+pub(super) fn beside<'a>(
+    ground: &Ground<'a>,
+    fit: &Refit<'a>,
+    causes: &[Cause],
+    most: Option<usize>,
+    progress: &dyn Progress,
+) -> Vec<Refit<'a>> {
+    let Some(screen) = Screen::at(ground, fit) else { return Vec::new() };
+    let scores: Vec<Score> = screen.scores(causes);
+    let lacks = Lacks::of(ground, fit, &scores);
+    let score = |cause: Cause| scores.iter().find(|score| score.cause == cause);
+    let promised = |cause: Cause| score(cause).map_or(0.0, |score| score.gain);
+    let mut others: Vec<Cause> = causes.iter().copied().filter(|c| !fit.hypothesis.causes.contains(c)).collect();
+    if let Some(most) = most {
+        others.retain(|cause| promised(*cause) > WORTH);
+        others.sort_by(|a, b| promised(*b).total_cmp(&promised(*a)));
+        others.truncate(most);
+    }
+    let of = |cause: &Cause| {
+        let found = single(ground, fit, *cause, score(*cause), lacks);
+        progress.advance(1);
+        found
+    };
+    others.par_iter().with_max_len(1).filter_map(of).collect()
 }
 
 /// Whether an effect can put the base model out of step by its frequency.

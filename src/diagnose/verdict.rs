@@ -5,7 +5,7 @@ use super::heldout::HeldOut;
 use super::latent::Latent;
 use super::noise::{BEYOND_NOISE, COLOURED};
 use super::refit::{self, Refit};
-use super::{Cause, Place, locate};
+use super::{Cause, MAIN_EFFECTS, Place, locate};
 use crate::fit::whitening::RecordNoise;
 use crate::model::Parameter;
 use crate::statistics::median_step_s;
@@ -100,14 +100,24 @@ pub struct Verdict {
     pub to_decide: Option<String>,
 }
 
-/// Hypotheses with probabilities, likeliest first; the last number is that of the unknown. `remainder` is the unknown around the likeliest fit,
-/// `added_n_m` the torque of that fit's own effects.
+/// Hypotheses beside the unknown.
+#[derive(Debug)]
+pub struct Weighing<'a> {
+    /// With their probabilities, likeliest first.
+    pub weighed: Vec<Weighed<'a>>,
+    /// The probability of something else.
+    pub unknown: f64,
+    /// That something around the likeliest fit, at each place.
+    pub unknowns: Vec<Latent>,
+}
+
+/// Weighs hypotheses; `remainder` gives the unknown around the likeliest fit, and the torque of that fit's own effects (N·m).
 pub fn weigh<'a>(
     fits: Vec<Refit<'a>>,
     values: usize,
     candidates: usize,
     remainder: impl Fn(&Refit<'a>, f64) -> (Vec<Latent>, f64),
-) -> (Vec<Weighed<'a>>, f64, Vec<Latent>) {
+) -> Weighing<'a> {
     let least = refit::least(&fits);
     let scatter = least.map_or(Scatter::NOISE, |best| Scatter::of(best, values));
     let least_without = |cause: Cause| {
@@ -139,7 +149,7 @@ pub fn weigh<'a>(
         .collect();
     // where the unknown takes all, or next to all, their order among themselves still counts
     weighed.sort_by(|a, b| (b.probability.total_cmp(&a.probability)).then(b.ln_posterior.total_cmp(&a.ln_posterior)));
-    (weighed, unknown, latents)
+    Weighing { weighed, unknown, unknowns: latents }
 }
 
 /// The odds that a fit's effects are what has been filmed, and stand for nothing else.
@@ -147,7 +157,7 @@ fn genuine(fit: &Refit<'_>, fits: &[Refit<'_>]) -> f64 {
     if fit.hypothesis.causes.is_empty() {
         return 1.0;
     }
-    let beyond_two = fit.hypothesis.causes.len().saturating_sub(2) as i32;
+    let beyond_two = fit.hypothesis.causes.len().saturating_sub(MAIN_EFFECTS) as i32;
     let whole = if misses_part_of_a_frame(fit) { NOT_WHOLE } else { 1.0 };
     let named = whole * (1.0 - IMITATED) * BEYOND_TWO.powi(beyond_two);
     let Some(hz) = fit.value(Parameter::SupportFrequency) else { return named };
