@@ -125,8 +125,7 @@ fn starts(
     spring_shares: &[f64],
     stiffer: &[f64],
 ) -> Option<Vec<Vec<(Parameter, f64)>>> {
-    let spring =
-        [Parameter::JointStiffness, Parameter::BendingStiffness].into_iter().find(|p| fit.value(*p).is_some())?;
+    let spring = fit.problem.free.iter().copied().find(|parameter| parameter.is_spring())?;
     let stiffness = fit.problem.model(0, &fit.x[..fit.problem.free.len()]).ok()?.0.value(Parameter::JointStiffness)?;
     // a base model that has locked its joint is no guide to the damper
     let damping = fit.value(Parameter::JointDamping).unwrap_or(0.0).min(ground.experiment.model.c_eq_n_m_s_per_rad);

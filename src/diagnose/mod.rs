@@ -10,6 +10,8 @@
 //! | [`hysteresis`] | where its fit starts, and in which variables |
 //! | [`pieces`] | how many rods stand for a strip |
 //! | [`screen`] | which would lower the residuals |
+//! | [`preparation`] | outliers, noise, where the base model's descent starts |
+//! | [`search`] | the way through what follows, with the file at its word or loosely |
 //! | [`selection`] | which are fitted in full |
 //! | [`fine_strip`] | a strip that bends everywhere, as finely as it needs |
 //! | [`second_look`] | from further starts, where much is left |
@@ -43,8 +45,10 @@ pub mod locate;
 pub mod noise;
 pub mod pieces;
 pub mod plan;
+mod preparation;
 pub mod refit;
 pub mod screen;
+mod search;
 pub mod second_look;
 pub mod selection;
 pub mod stepwise;
@@ -52,15 +56,10 @@ pub mod surroundings;
 pub mod torque;
 pub mod verdict;
 
-use std::sync::OnceLock;
-
-use crate::error::{Error, Result};
+use crate::error::Result;
 use crate::experiment::Experiment;
-use crate::fit::shooting::multiple_shooting;
-use crate::fit::whitening::{Colour, RecordNoise};
-use crate::fit::{Belief, Problem, Record, base_parameters};
-use crate::model::{ForwardModel, Parameter};
 use crate::progress::Progress;
+use search::Found;
 
 pub use adequacy::Detectable;
 pub use cause::{Cause, Place};
@@ -69,23 +68,17 @@ pub use heldout::HeldOut;
 pub use latent::{Assumed, Beyond, Form, Latent};
 pub use locate::Departure;
 pub use plan::{Plan, planned};
+pub use preparation::{Prepared, prepare};
 pub use refit::Refit;
 pub use torque::{MissingTorque, Phase};
 pub use verdict::{Status, Verdict, Weighed, Weighing};
 
-/// A length or an inertia of a rig is known to this share.
-const GEOMETRY_SHARE: f64 = 0.1;
 /// Effects that an answer has at first, those that explain most; further ones stand beside them.
 pub const MAIN_EFFECTS: usize = 2;
 /// Where far more than noise is left, a further one must leave at most this part of what they do of what was not fitted.
 const BORNE_OUT: f64 = 0.9;
 /// What is at least this probable counts.
 const EVEN: f64 = 0.5;
-/// Springs to start from, over the file's, where that leads nowhere.
-const SPRINGS: [f64; 3] = [0.03, 30.0, 1e-3];
-/// Correlation of the noise from row to row that counts as colour.
-const COLOURED: f64 = 0.12;
-
 /// Everything a diagnosis says.
 #[derive(Debug)]
 pub struct Diagnosis<'a> {
@@ -159,111 +152,6 @@ pub struct Options {
     pub predict_from_s: Option<f64>,
 }
 
-/// What the recordings, cleaned of outliers, are held against.
-pub struct Prepared {
-    /// Cleaned.
-    pub records: Vec<Record>,
-    pub noise: Vec<RecordNoise>,
-    step_error_rad: f64,
-    /// Parameters of the base model, taken at the file's word.
-    base: Vec<Parameter>,
-    /// Their values and the starts to descend from.
-    x: Vec<f64>,
-    /// The experiment with as many rods as the recordings ask for, where they do.
-    counted: OnceLock<Experiment>,
-}
-
-/// How the file is taken.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Taken {
-    /// At its word: the geometry is what it states, and one link has a damper where it states one.
-    AtItsWord,
-    /// Loosely: inertias and centres of mass of general links were measured to about a tenth, and whatever swings has a damper.
-    Loosely,
-}
-
-/// The base model's parameters and what is known of them.
-fn base_of(experiment: &Experiment, marks: usize, taken: Taken) -> Result<(Vec<Parameter>, Vec<Belief>)> {
-    let mut base = base_parameters(experiment, marks);
-    if taken == Taken::AtItsWord {
-        if lacks_a_damper(experiment, marks) {
-            base.retain(|parameter| *parameter != Parameter::HingeViscous);
-        }
-        return Ok((base, Vec::new()));
-    }
-    let mut beliefs = Vec::new();
-    if !experiment.specimen.links.is_empty() {
-        let model = ForwardModel::of(experiment)?;
-        let uncertain: &[Parameter] = match marks {
-            1 => &[Parameter::FirstInertia],
-            _ => &[Parameter::FirstInertia, Parameter::FirstCom, Parameter::SecondInertia, Parameter::SecondCom],
-        };
-        for parameter in uncertain {
-            let value = model.value(*parameter).unwrap_or(0.0);
-            base.push(*parameter);
-            beliefs.push(Belief { parameter: *parameter, value, sd: GEOMETRY_SHARE * value.abs().max(1e-12) });
-        }
-    }
-    Ok((base, beliefs))
-}
-
-/// Whether the file of a single link, which has no joint, states no damper: neither the hinge's nor a C.
-fn lacks_a_damper(experiment: &Experiment, marks: usize) -> bool {
-    marks == 1 && !experiment.model.states_damping && experiment.model.effects.hinge_viscous.is_none()
-}
-
-/// Learns the noise, leaves outliers out, and finds where the base model's descent is to start: near the file's values, and where no motion near them can
-/// follow the recordings, from softer and stiffer springs.
-///
-/// # Errors
-/// [`Error::Simulation`] where the specimen cannot swing.
-pub fn prepare(records: &[Record], experiment: &Experiment) -> Result<Prepared> {
-    let marks = records.first().map_or(0, Record::links);
-    let (base, _) = base_of(experiment, marks, Taken::AtItsWord)?;
-    let from = |spring: &f64| {
-        let mut experiment = experiment.clone();
-        experiment.model.k_eq_n_m_per_rad *= spring;
-        if let Some(bending) = &mut experiment.model.effects.distributed_flexibility {
-            *bending *= spring;
-        }
-        let mut problem = Problem::new(records, &experiment, &base)?;
-        let shot = multiple_shooting(&mut problem)?;
-        problem.integrate_below_the_noise();
-        let step_error_rad = problem.accuracy.step_error_rad;
-        problem.accuracy = problem.accuracy_of(problem.longest_s(), step_error_rad);
-        let (kept, _) = crate::fit::without_outliers(&problem, &shot.x)?;
-        Ok(Prepared {
-            noise: coloured(&shot.residuals, &problem.noise),
-            step_error_rad,
-            base: base.clone(),
-            x: shot.x,
-            records: kept,
-            counted: OnceLock::new(),
-        })
-    };
-    let as_stated = from(&1.0);
-    if as_stated.is_ok() {
-        as_stated
-    } else {
-        SPRINGS.iter().find_map(|spring| from(spring).ok()).map_or(as_stated, Ok)
-    }
-}
-
-/// Noise with the correlation of neighbouring residuals of each angle, where it is more than chance and the stretches' own starts make of it.
-fn coloured(residuals: &[(usize, usize, f64)], white: &[RecordNoise]) -> Vec<RecordNoise> {
-    let of = |record: usize, link: usize| {
-        let r: Vec<f64> = residuals.iter().filter(|r| r.0 == record && r.1 == link).map(|r| r.2).collect();
-        let power: f64 = r.iter().map(|v| v * v).sum();
-        let rho = r.windows(2).map(|w| w[0] * w[1]).sum::<f64>() / power.max(1e-300);
-        if rho > COLOURED { Colour { rho: (rho + 0.05).min(0.9), share: 1.0 } } else { Colour::default() }
-    };
-    let with_colour = |(record, white): (usize, &RecordNoise)| {
-        let colour = (0..white.sd_rad.len()).map(|link| of(record, link)).collect();
-        RecordNoise { colour, ..white.clone() }
-    };
-    white.iter().enumerate().map(with_colour).collect()
-}
-
 /// Diagnoses recordings of one specimen.
 ///
 /// # Errors
@@ -274,31 +162,24 @@ pub fn diagnose<'a>(
     options: &Options,
     progress: &dyn Progress,
 ) -> Result<Diagnosis<'a>> {
-    let mut found = fitted(prepared, experiment, Taken::AtItsWord, progress)?;
-    if let Some(count) = pieces::preferred(&found.0, &found.2) {
-        let counted = prepared.counted.get_or_init(|| pieces::with(experiment, count));
-        let again = fitted(prepared, counted, Taken::AtItsWord, progress)?;
-        if pieces::is_kept(&found.0, &found.2, &again.2) {
-            found = again;
-        }
-    }
-    let weigh = |ground: &Ground<'a>, causes: &[Cause], fits: Vec<Refit<'a>>| {
-        verdict::weigh(fits, ground.values(), causes.len(), |fit, variance| {
+    let mut found = search::at_its_word(prepared, experiment, progress)?;
+    let weigh = |found: &Found<'a>| {
+        verdict::weigh(found.fits.clone(), found.ground.values(), found.causes.len(), |fit, variance| {
             (locate::unknowns(fit, variance, Assumed::BESIDE), energy::added_torque_n_m(fit))
         })
     };
-    let mut answer = weigh(&found.0, &found.1, found.2.clone());
+    let mut answer = weigh(&found);
     // a strip's fits are too dear to be followed from the beginning
-    if !found.0.is_strip() && (answer.unknown > EVEN || leaves_more_than_noise(&found.2)) {
-        found = doubted(prepared, experiment, found, progress)?;
-        answer = weigh(&found.0, &found.1, found.2.clone());
+    if !found.ground.is_strip() && (answer.unknown > EVEN || found.leaves_more_than_noise()) {
+        found = search::doubted(prepared, experiment, found, progress);
+        answer = weigh(&found);
     }
-    let (ground, causes, mut fits) = found;
     let best = &answer.weighed[0].fit;
     let fewer = (best.hypothesis.causes.len() > MAIN_EFFECTS && verdict::is_beyond_noise(best)).then(|| {
-        fits.retain(|fit| fit.hypothesis.causes.len() <= MAIN_EFFECTS);
-        weigh(&ground, &causes, fits)
+        found.fits.retain(|fit| fit.hypothesis.causes.len() <= MAIN_EFFECTS);
+        weigh(&found)
     });
+    let Found { ground, causes, .. } = found;
     let (proofs, adequacy) = {
         let null = base_model(&answer.weighed);
         let named: Vec<&Refit<'a>> =
@@ -361,84 +242,4 @@ fn by_what_they_explain(weighed: &[Weighed<'_>], fit: &Refit<'_>) -> Vec<Cause> 
     };
     causes.sort_by(|a, b| left_without(b).total_cmp(&left_without(a)));
     causes
-}
-
-/// Whether the best of some fits leaves so much that the noise does not matter.
-fn leaves_more_than_noise(fits: &[Refit<'_>]) -> bool {
-    refit::least(fits).is_some_and(verdict::leaves_more_than_noise)
-}
-
-/// The hypotheses with the file taken loosely where it may be doubted, from the beginning of the recordings on where they leave far more than noise, and with
-/// more effects beside them.
-fn doubted<'a>(
-    prepared: &'a Prepared,
-    experiment: &'a Experiment,
-    mut found: Fitted<'a>,
-    progress: &dyn Progress,
-) -> Result<Fitted<'a>> {
-    let marks = found.0.records[0].links();
-    let has_slack = !experiment.specimen.links.is_empty() || lacks_a_damper(experiment, marks);
-    if has_slack && leaves_more_than_noise(&found.2) {
-        found = fitted(prepared, experiment, Taken::Loosely, progress)?;
-    }
-    let (ground, causes, mut fits) = found;
-    let mut ground = ground.plain();
-    if leaves_more_than_noise(&fits) {
-        let grown = growing::grown(&ground, &fits, &causes, progress);
-        fits = refit::merged(fits, grown);
-    }
-    let fits = stepwise::with_more_and_fewer(&mut ground, fits, &causes, progress);
-    let fits = selection::with_errors_in_step(&mut ground, fits);
-    Ok((ground, causes, fits))
-}
-
-/// Where a base model's descent begins: what was not free when the start was sought, where the file has it.
-fn begun(prepared: &Prepared, experiment: &Experiment, base: &[Parameter]) -> Result<Vec<f64>> {
-    let stated = Problem::new(&prepared.records, experiment, base)?.start_values()?;
-    let sought = |parameter: &Parameter| prepared.base.iter().position(|p| p == parameter);
-    let parameters =
-        base.iter().zip(stated).map(|(parameter, stated)| sought(parameter).map_or(stated, |at| prepared.x[at]));
-    Ok(parameters.chain(prepared.x[prepared.base.len()..].iter().copied()).collect())
-}
-
-/// Ground, effects and fits of all hypotheses.
-type Fitted<'a> = (Ground<'a>, Vec<Cause>, Vec<Refit<'a>>);
-
-fn fitted<'a>(
-    prepared: &'a Prepared,
-    experiment: &'a Experiment,
-    taken: Taken,
-    progress: &dyn Progress,
-) -> Result<Fitted<'a>> {
-    let records = &prepared.records;
-    let marks = records.first().map_or(0, Record::links);
-    let (base, beliefs) = base_of(experiment, marks, taken)?;
-    let begun = begun(prepared, experiment, &base)?;
-    let causes: Vec<Cause> = Cause::ALL.into_iter().filter(|c| c.may_be_missing(experiment, &base, marks)).collect();
-    let mut ground = Ground {
-        records,
-        experiment,
-        base,
-        beliefs,
-        noise: prepared.noise.clone(),
-        step_error_rad: prepared.step_error_rad,
-        begun: begun.clone(),
-        fine_strip: None,
-    };
-    let refused = || Error::Simulation {
-        detail: "no motion near the start values follows the recording; check [specimen] and [model]".into(),
-    };
-    let nothing = Hypothesis::default();
-    let null = ground.descend_from(&nothing, begun, ground::MOST_STEPS).ok_or_else(refused)?;
-    let null = selection::from_weaker_dampers(&ground, null);
-    let null =
-        if ground.refine_noise(&null) { ground.again(&null, ground::MOST_STEPS).ok_or_else(refused)? } else { null };
-    let fits = selection::fits(&mut ground, null, &causes, progress);
-    if taken == Taken::Loosely {
-        // they are followed from the beginning next
-        return Ok((ground, causes, fits));
-    }
-    let fits = second_look::second_look(&mut ground, fits, &causes, progress);
-    let fits = selection::with_errors_in_step(&mut ground, fits);
-    Ok((ground, causes, fits))
 }

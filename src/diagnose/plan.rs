@@ -1,9 +1,10 @@
 //! Before an experiment: what a planned recording could show, and what it could tell apart.
 
+use super::Cause;
 use super::adequacy::{Detectable, detectable};
 use super::ground::{Ground, Hypothesis};
 use super::screen::Screen;
-use super::{Cause, Taken, base_of};
+use super::search::{Taken, base_of};
 use crate::error::{Error, Result};
 use crate::experiment::Experiment;
 use crate::fit::Record;
