@@ -45,10 +45,10 @@ pub mod locate;
 pub mod noise;
 pub mod pieces;
 pub mod plan;
-mod preparation;
+pub mod preparation;
 pub mod refit;
 pub mod screen;
-mod search;
+pub mod search;
 pub mod second_look;
 pub mod selection;
 pub mod stepwise;
@@ -155,7 +155,7 @@ pub struct Options {
 /// Diagnoses recordings of one specimen.
 ///
 /// # Errors
-/// [`Error::Simulation`] where the specimen cannot swing, or no motion near the start values follows the recording.
+/// [`crate::error::Error::Simulation`] where the specimen cannot swing, or no motion near the start values follows the recording.
 pub fn diagnose<'a>(
     prepared: &'a Prepared,
     experiment: &'a Experiment,

@@ -33,7 +33,7 @@ pub struct Prepared {
 /// follow the recordings, from softer and stiffer springs.
 ///
 /// # Errors
-/// [`Error::Simulation`] where the specimen cannot swing.
+/// [`crate::error::Error::Simulation`] where the specimen cannot swing.
 pub fn prepare(records: &[Record], experiment: &Experiment) -> Result<Prepared> {
     let marks = records.first().map_or(0, Record::links);
     let (base, _) = base_of(experiment, marks, Taken::AtItsWord)?;
