@@ -182,8 +182,7 @@ pub fn diagnose<'a>(
     let Found { ground, causes, .. } = found;
     let (proofs, adequacy) = {
         let null = base_model(&answer.weighed);
-        let named: Vec<&Refit<'a>> =
-            [Some(&answer), fewer.as_ref()].into_iter().flatten().map(|a| &a.weighed[0].fit).collect();
+        let named: Vec<&Refit<'a>> = std::iter::once(&answer).chain(&fewer).map(|a| &a.weighed[0].fit).collect();
         rayon::join(
             || heldout::held_out(&ground.plain(), null, &named, options.predict_from_s),
             || adequacy::adequacy(&ground, null, &causes, options.bootstraps, progress),

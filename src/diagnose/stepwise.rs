@@ -5,13 +5,13 @@
 
 use rayon::prelude::*;
 
-use super::Cause;
 use super::ground::{self, Ground};
 use super::growing;
 use super::refit::{self, Refit, least, merged};
 use super::screen::{Score, Screen};
 use super::selection;
 use super::verdict::leaves_more_than_noise;
+use super::{Cause, MAIN_EFFECTS};
 use crate::progress::{Progress, Silent};
 
 /// Most effects of one hypothesis, and most coefficients.
@@ -38,14 +38,16 @@ pub fn with_more_and_fewer<'a>(
     let (mut led, mut rivalled) = (Vec::new(), Vec::new());
     for turn in 0..TURNS {
         let seeds = not_yet(leading(&fits), &mut led);
+        if turn > 0 && seeds.is_empty() {
+            break;
+        }
         let more: Vec<Refit<'a>> = seeds.into_iter().flat_map(|seed| with_one_more(ground, seed, causes)).collect();
         fits = merged(fits, more);
         let seeds = not_yet(best_of_each_count(&fits), &mut rivalled);
         let rivals: Vec<Refit<'a>> = seeds.into_iter().flat_map(|seed| rivals(ground, seed, causes)).collect();
         fits = selection::with_refined_noise(ground, merged(fits, rivals));
         progress.advance(1);
-        let goes_on = turn == 0 || least(&fits).is_some_and(leaves_more_than_noise);
-        if !goes_on || leading(&fits).iter().all(|fit| led.contains(&fit.hypothesis.causes)) {
+        if turn > 0 && !least(&fits).is_some_and(leaves_more_than_noise) {
             break;
         }
     }
@@ -86,7 +88,7 @@ pub(super) fn with_one_more<'b>(ground: &Ground<'b>, fit: &Refit<'b>, causes: &[
 /// A fit without each of its effects, and of three with another in its place. (Pairs have been sought from every side, and where far more than noise is left
 /// nothing does as well.)
 fn rivals<'a>(ground: &Ground<'a>, fit: &Refit<'a>, causes: &[Cause]) -> Vec<Refit<'a>> {
-    let may_have_equals = fit.hypothesis.causes.len() > 2 && !leaves_more_than_noise(fit);
+    let may_have_equals = fit.hypothesis.causes.len() > MAIN_EFFECTS && !leaves_more_than_noise(fit);
     let of = |cause: &Cause| {
         let fewer = without(ground, fit, *cause)?;
         let mut others = if may_have_equals { in_its_place(ground, fit, &fewer, causes) } else { Vec::new() };
