@@ -2,7 +2,6 @@
 
 mod bar;
 mod diagnose;
-mod figure;
 mod fit;
 mod identify;
 mod modes;

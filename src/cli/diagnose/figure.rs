@@ -8,8 +8,8 @@ use std::f64::consts::TAU;
 use std::fmt::Write;
 use std::ops::Range;
 
-use super::svg::{Panel, line, text};
-use super::table::number;
+use crate::cli::svg::{Panel, line, text};
+use crate::cli::table::number;
 use crate::diagnose::{Cause, Diagnosis, Ground, MissingTorque, Place, Prepared, Refit, locate};
 use crate::error::{Error, Result};
 use crate::experiment::Experiment;

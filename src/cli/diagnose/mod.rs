@@ -1,0 +1,136 @@
+//! `freeswing diagnose`: where simulation and recording differ, and what physics was left out.
+
+mod figure;
+mod file;
+mod page;
+mod words;
+
+use std::path::PathBuf;
+
+use serde_json::json;
+
+use super::Bar;
+use super::table::number;
+use crate::diagnose::{self, Refit, locate};
+use crate::error::{Error, Result};
+use crate::experiment::Experiment;
+use crate::model::ForwardModel;
+use crate::output::OutputFile;
+use figure::Figure;
+
+/// Longest planned recording.
+const MOST_ROWS: f64 = 1e6;
+
+/// Say where the model differs from recordings, name the physics left out, and prove it.
+#[derive(Debug, clap::Args)]
+#[command(after_help = "\
+Examples:
+  freeswing diagnose kapton.csv --config videos/kapton.base.toml --figure diagnosis.svg
+  freeswing diagnose small.csv large.csv --config experiment.toml --json diagnosis.json
+  freeswing diagnose --detectable --config experiment.toml --duration 60 --rate 30 --noise-rad 3e-4
+
+The base model is that of `fit`: the joint's spring and damper, every effect named in [model.effects], and each recording's start; of one link
+the hinge's viscous damper, if the file states it or c_eq_n_m_s_per_rad. All other effects are candidates, those of the camera first.")]
+pub struct DiagnoseArgs {
+    /// Tables of angles of one specimen; `-` is standard input.
+    #[arg(required_unless_present = "detectable", conflicts_with = "detectable", value_name = "ANGLES")]
+    angles: Vec<PathBuf>,
+    /// The experiment file: specimen, rig and base model.
+    #[arg(long, value_name = "FILE")]
+    config: PathBuf,
+    /// Write all of it as JSON; `-` for standard output.
+    #[arg(long, value_name = "FILE")]
+    json: Option<PathBuf>,
+    /// Draw before and after as SVG; `-` for standard output.
+    #[arg(long, value_name = "FILE")]
+    figure: Option<PathBuf>,
+    /// Use rows from this stamp on.
+    #[arg(long, value_name = "S", default_value_t = f64::NEG_INFINITY, hide_default_value = true, allow_negative_numbers = true)]
+    from: f64,
+    /// Use rows before this stamp.
+    #[arg(long, value_name = "S", default_value_t = f64::INFINITY, hide_default_value = true, allow_negative_numbers = true)]
+    until: f64,
+    /// Predict a single recording from this stamp on, fitted before it [default: two thirds through it].
+    #[arg(long, value_name = "S", allow_negative_numbers = true)]
+    predict_from: Option<f64>,
+    /// Judge the base model by this many recordings made from it and fitted anew, not by their residuals to first order.
+    #[arg(long, value_name = "N", default_value_t = 0)]
+    bootstraps: usize,
+    /// Before an experiment: what a recording of the file's release would show of each effect, and what it would confuse.
+    #[arg(long)]
+    detectable: bool,
+    /// Length of the planned recording.
+    #[arg(long, value_name = "S", default_value_t = 60.0, requires = "detectable")]
+    duration: f64,
+    /// Rows a second of the planned recording.
+    #[arg(long, value_name = "HZ", default_value_t = 30.0, requires = "detectable")]
+    rate: f64,
+    /// Noise of the planned recording's angles.
+    #[arg(long, value_name = "RAD", default_value_t = 1e-3, requires = "detectable")]
+    noise_rad: f64,
+    /// Nothing on standard output, no progress.
+    #[arg(long)]
+    quiet: bool,
+}
+
+impl DiagnoseArgs {
+    /// Diagnoses and prints.
+    ///
+    /// # Errors
+    /// One line: what, where, what to do.
+    pub fn run(&self) -> Result<()> {
+        let experiment = Experiment::read(&self.config)?;
+        if self.detectable {
+            return self.plan(&experiment);
+        }
+        let marks = ForwardModel::of(&experiment)?.chain().groups().len();
+        let records = super::recordings(&self.angles, marks, (self.from, self.until))?;
+        let json = self.json.as_deref().map(OutputFile::create).transpose()?;
+        let figure = self.figure.as_deref().map(OutputFile::create).transpose()?;
+        let bar = Bar::of_fits(self.quiet);
+        let prepared = diagnose::prepare(&records, &experiment)?;
+        let diagnosis = diagnose::diagnose(&prepared, &experiment, &self.options(), &bar)?;
+        drop(bar);
+        let specimen = &experiment.specimen.name;
+        let alone = figure.as_ref().is_some_and(OutputFile::is_standard_output);
+        let text = if self.quiet || alone { String::new() } else { page::page(&diagnosis, specimen) };
+        if let Some(file) = figure {
+            file.commit(Figure::of(&diagnosis, &prepared, &experiment)?.svg().as_bytes())?;
+        }
+        super::deliver(&text, &file::diagnosis(&diagnosis, specimen), json)
+    }
+
+    fn options(&self) -> diagnose::Options {
+        diagnose::Options { bootstraps: self.bootstraps, predict_from_s: self.predict_from }
+    }
+
+    /// What a planned recording could show.
+    fn plan(&self, experiment: &Experiment) -> Result<()> {
+        for (option, value) in [("--duration", self.duration), ("--rate", self.rate), ("--noise-rad", self.noise_rad)] {
+            if !(value.is_finite() && value > 0.0) {
+                let message = format!("{value}: must be a positive number");
+                return Err(Error::Option { option: option.to_owned(), message });
+            }
+        }
+        let plan = diagnose::Plan { duration_s: self.duration, rate_hz: self.rate, noise_rad: self.noise_rad };
+        if !(plan.duration_s * plan.rate_hz <= MOST_ROWS) {
+            let message = "too many rows; give a shorter --duration or a lower --rate".to_owned();
+            return Err(Error::Option { option: "--duration".to_owned(), message });
+        }
+        let json = self.json.as_deref().map(OutputFile::create).transpose()?;
+        let limits = diagnose::planned(experiment, &plan)?;
+        let heading = format!(
+            "{}: {} s at {} Hz with {} mrad of noise would show\n",
+            experiment.specimen.name,
+            plan.duration_s,
+            plan.rate_hz,
+            number(1e3 * plan.noise_rad, 3)
+        );
+        let text = if self.quiet { String::new() } else { heading + &page::limits_table(&limits) };
+        super::deliver(&text, &json!({"schema": "freeswing.diagnosis/1", "detectable": file::limits(&limits)}), json)
+    }
+}
+
+fn rmse_rad(fit: &Refit<'_>) -> Vec<f64> {
+    locate::residuals(fit, 0).map(|r| r.rmse_rad).unwrap_or_default()
+}
