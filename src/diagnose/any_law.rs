@@ -77,7 +77,7 @@ impl<'s> Swing<'s> {
         Self {
             around,
             instants: around.rows.windows(2).enumerate().map(instant).collect(),
-            transitions: around.transitions(f64::INFINITY, |_| each_link.clone()),
+            transitions: around.transitions_of_inputs(|_| each_link.clone()),
         }
     }
 

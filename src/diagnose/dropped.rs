@@ -7,7 +7,7 @@
 //! Σ_{row < k} (measured − a)²/σ² + Σ_{row ≥ k} (measured − b)²/σ²
 //! ```
 //!
-//! least. That costs two motions for any number of instants.
+//! least. That costs two motions for any number of instants, and one more for any other number of frames.
 
 use super::Cause;
 use super::ground::{self, Ground, Hypothesis};
@@ -56,11 +56,12 @@ fn likeliest(ground: &Ground<'_>, fit: &Refit<'_>) -> Option<Jump> {
         let hypothesis = fit.hypothesis.and(Cause::DroppedFrames, Some((record, 0.0)));
         let problem = ground.problem(&hypothesis).ok()?;
         let step_s = median_step_s(&ground.records[record].t_s)?;
+        let before = squares(&fit.problem, record, &fit.x)?;
         for frames in 1..=MOST_FRAMES {
             for missing_s in [frames as f64 * step_s, -(frames as f64) * step_s] {
                 let mut x = fit.x.clone();
                 x.insert(problem.free.iter().position(|p| *p == Parameter::DroppedFrames)?, missing_s);
-                jumps.extend(best_instant(&problem, record, &x));
+                jumps.extend(best_instant(&problem, record, &x, &before));
             }
         }
     }
@@ -72,7 +73,7 @@ pub fn settled<'a>(ground: &Ground<'a>, fit: Refit<'a>) -> Refit<'a> {
     let mut fit = fit;
     for _ in 0..ROUNDS {
         let Some((record, at_s)) = fit.hypothesis.dropped else { break };
-        let Some(jump) = best_instant(&fit.problem, record, &fit.x).filter(|jump| jump.at_s != at_s) else { break };
+        let Some(jump) = better_instant(&fit, record).filter(|jump| jump.at_s != at_s) else { break };
         let hypothesis = Hypothesis { dropped: Some((record, jump.at_s)), ..fit.hypothesis.clone() };
         let again = ground.descend_from(&hypothesis, fit.x.clone(), ground::FEW_STEPS);
         let Some(again) = again.filter(|again| again.chi2 < fit.chi2) else { break };
@@ -81,18 +82,21 @@ pub fn settled<'a>(ground: &Ground<'a>, fit: Refit<'a>) -> Refit<'a> {
     fit
 }
 
-/// The instant, between two rows, at which a given jump fits best.
-fn best_instant(problem: &Problem<'_>, record: usize, x: &[f64]) -> Option<Jump> {
+/// The instant at which a fit's own jump fits best.
+fn better_instant(fit: &Refit<'_>, record: usize) -> Option<Jump> {
+    let mut never = fit.problem.clone();
+    never.dropped_at_s[record] = f64::INFINITY;
+    best_instant(&fit.problem, record, &fit.x, &squares(&never, record, &fit.x)?)
+}
+
+/// The instant, between two rows, at which a given jump fits best; `before` are the squares of a motion without it.
+fn best_instant(problem: &Problem<'_>, record: usize, x: &[f64], before: &[f64]) -> Option<Jump> {
     let t_s = &problem.records[record].t_s;
     let between = |row: usize| 0.5 * (t_s[row - 1] + t_s[row]);
-    let with_jump_at = |at_s: f64| {
-        let mut problem = problem.clone();
-        problem.dropped_at_s[record] = at_s;
-        squares(&problem, record, x)
-    };
     // the first row's state is where the motion begins, so it lies before any jump
-    let before = with_jump_at(t_s[t_s.len() - 1] + 1.0)?;
-    let after = with_jump_at(between(1))?;
+    let mut jumped = problem.clone();
+    jumped.dropped_at_s[record] = between(1);
+    let after = squares(&jumped, record, x)?;
     let mut left: f64 = before[0] + after[1..].iter().sum::<f64>();
     let mut best = (left, 1);
     for row in 2..t_s.len() {

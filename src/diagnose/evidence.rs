@@ -147,3 +147,39 @@ pub fn normalised(ln: &[f64]) -> Vec<f64> {
     let sum: f64 = ln.iter().map(|l| (l - most).exp()).sum();
     ln.iter().map(|l| (l - most).exp() / sum).collect()
 }
+
+#[cfg(test)]
+mod tests {
+    use nalgebra::DMatrix;
+
+    use super::*;
+    use crate::experiment::Experiment;
+    use crate::fit::{Problem, Record};
+
+    /// A fit with dry friction of this size, known to a tenth of 10⁻⁷ N·m, that leaves 4 of 60 values' squares.
+    fn with_friction(records: &[Record], torque_n_m: f64) -> Refit<'_> {
+        let free = [Parameter::HingeCoulomb];
+        let problem = Problem::new(records, &Experiment::default(), &free).unwrap();
+        let mut x = vec![torque_n_m];
+        x.resize(problem.variables(), 0.3);
+        let mut normal = DMatrix::identity(x.len(), x.len());
+        normal[(0, 0)] = 1e16;
+        let hypothesis = Hypothesis { causes: vec![Cause::HingeCoulomb], dropped: None };
+        Refit { hypothesis, problem, x, chi2: 240.0, normal, steps: 1, converged: true }
+    }
+
+    #[test]
+    fn a_law_of_no_size_is_none_however_much_is_left_without_it() {
+        let t_s: Vec<f64> = (0..30).map(|k| k as f64 / 30.0).collect();
+        let theta_rad = vec![vec![Some(0.1); 30]; 2];
+        let records =
+            [Record { path: "made".into(), theta_rad, relative_sd: vec![vec![1.0; 30]; 2], t_s, in_step: 0.0 }];
+        let scatter = Scatter { of_values: 5.0, of_all: 5.0 };
+        let needed = |torque_n_m: f64| ln_evidence(&with_friction(&records, torque_n_m), scatter, |_| 1e6);
+        assert_eq!(needed(0.0), f64::NEG_INFINITY);
+        // far more than noise is left: what is needed is not held against its own standard deviation
+        assert!(needed(1e-8).is_finite());
+        let not_needed = ln_evidence(&with_friction(&records, 1e-8), scatter, |_| 241.0);
+        assert_eq!(not_needed, f64::NEG_INFINITY);
+    }
+}

@@ -120,6 +120,27 @@ impl<'a> Ground<'a> {
 
     /// Fits a hypothesis from the parameters of another fit; `start` gives values of further ones.
     pub fn refit(&self, hypothesis: &Hypothesis, near: &Refit<'_>, start: &[(Parameter, f64)]) -> Option<Refit<'a>> {
+        self.refit_by(descent(FEW_STEPS), hypothesis, near, start)
+    }
+
+    /// The same, which ends after its first steps unless they lead below `bound`.
+    pub fn refit_below(
+        &self,
+        bound: f64,
+        hypothesis: &Hypothesis,
+        near: &Refit<'_>,
+        start: &[(Parameter, f64)],
+    ) -> Option<Refit<'a>> {
+        self.refit_by(descent_below(bound), hypothesis, near, start)
+    }
+
+    fn refit_by(
+        &self,
+        descent: Descent,
+        hypothesis: &Hypothesis,
+        near: &Refit<'_>,
+        start: &[(Parameter, f64)],
+    ) -> Option<Refit<'a>> {
         let (problem, x) = self.start(hypothesis, near, start)?;
         // a score is linear: where it overshoots, start from nothing
         let mut careful = x.clone();
@@ -129,13 +150,13 @@ impl<'a> Ground<'a> {
             careful[place] = 0.0;
         }
         if careful == x {
-            return self.descend(hypothesis, problem, x, FEW_STEPS);
+            return self.descend_by(descent, hypothesis, problem, x);
         }
         // without what is given it is the fit nearby
         let is_near = near.is_part_of(hypothesis, &problem) && start.iter().all(|(p, _)| near.value(*p).is_none());
         let worst_start = if is_near { near.chi2 } else { problem.cost(&careful) };
-        self.descend_below(worst_start, hypothesis, problem.clone(), x, FEW_STEPS)
-            .or_else(|| self.descend(hypothesis, problem, careful, FEW_STEPS))
+        self.descend_by(Descent { worst_start, ..descent }, hypothesis, problem.clone(), x)
+            .or_else(|| self.descend_by(descent, hypothesis, problem, careful))
     }
 
     /// The first steps of a refit.
@@ -177,8 +198,8 @@ impl<'a> Ground<'a> {
     }
 
     /// Fits a hypothesis from the start values of the experiment, by multiple shooting first: for a base model whose motion is out of step.
-    /// It goes on where its first steps lead below a multiple of `known`, what is known to be left without.
-    pub fn refit_anew(&self, hypothesis: &Hypothesis, start: &[(Parameter, f64)], known: f64) -> Option<Refit<'a>> {
+    /// It ends after its first steps unless they lead below `bound`.
+    pub fn refit_anew(&self, hypothesis: &Hypothesis, start: &[(Parameter, f64)], bound: f64) -> Option<Refit<'a>> {
         let mut problem = self.problem(hypothesis).ok()?;
         for (parameter, value) in start {
             set(&mut problem.experiment, *parameter, *value);
@@ -187,11 +208,7 @@ impl<'a> Ground<'a> {
         let x = multiple_shooting(&mut problem).ok()?.x;
         problem.noise.clone_from(&self.noise);
         problem.accuracy = accuracy;
-        let begun = self.descend(hypothesis, problem, x, FIRST_STEPS)?;
-        if !begun.converged && begun.chi2 < BEYOND_HOPE * known {
-            return self.again(&begun, FEW_STEPS - FIRST_STEPS);
-        }
-        Some(begun)
+        self.descend_by(descent_below(bound), hypothesis, problem, x)
     }
 
     /// The same hypothesis with the noise as it is known now.
@@ -265,20 +282,17 @@ impl<'a> Ground<'a> {
         x: Vec<f64>,
         most_steps: usize,
     ) -> Option<Refit<'a>> {
-        self.descend_below(f64::INFINITY, hypothesis, problem, x, most_steps)
+        self.descend_by(descent(most_steps), hypothesis, problem, x)
     }
 
-    /// The same unless the start costs more than `worst_start`.
-    fn descend_below(
+    fn descend_by(
         &self,
-        worst_start: f64,
+        descent: Descent,
         hypothesis: &Hypothesis,
         problem: Problem<'a>,
         x: Vec<f64>,
-        most_steps: usize,
     ) -> Option<Refit<'a>> {
         let lower = problem.lower();
-        let descent = Descent { most_steps, enough: 0.02, damping: FIRST_DAMPING, worst_start, ..Descent::default() };
         let outcome = match Straightened::of(&problem) {
             None => descent.run(x, &lower, |x| problem.blocks(x))?,
             Some(valley) => valley.bend(descent.run(valley.straight(x), &lower, |x| {
@@ -362,6 +376,15 @@ impl<'a> Ground<'a> {
     pub fn values(&self) -> usize {
         self.records.iter().map(|r| r.values(0..r.len())).sum()
     }
+}
+
+fn descent(most_steps: usize) -> Descent {
+    Descent { most_steps, enough: 0.02, damping: FIRST_DAMPING, ..Descent::default() }
+}
+
+/// One that ends after its first steps unless they lead below a bound.
+fn descent_below(bound: f64) -> Descent {
+    Descent { judged: Some((FIRST_STEPS, bound)), ..descent(FEW_STEPS) }
 }
 
 /// Sets a start value where the experiment holds it.

@@ -38,7 +38,11 @@ pub fn grown<'a>(ground: &Ground<'a>, fits: &[Refit<'a>], causes: &[Cause], prog
             chosen.extend((0..fits.len()).filter(|place| fits[*place].hypothesis.causes.is_empty()));
             chosen.sort_unstable();
             chosen.dedup();
-            chosen.par_iter().with_max_len(1).filter_map(|place| begun(ground, &early, &fits[*place])).collect()
+            chosen
+                .par_iter()
+                .with_max_len(1)
+                .filter_map(|place| on_the_beginning(ground, &early, &fits[*place]))
+                .collect()
         } else {
             descended(&early, followed, ground::FEW_STEPS)
         };
@@ -90,7 +94,7 @@ fn descended<'b>(ground: &Ground<'b>, from: Vec<(Hypothesis, Vec<f64>)>, most_st
 }
 
 /// A fit's hypothesis on the beginning, from its own parameters or from those that short stretches led to, whichever leads further.
-fn begun<'b>(ground: &Ground<'_>, early: &Ground<'b>, fit: &Refit<'_>) -> Option<Refit<'b>> {
+fn on_the_beginning<'b>(ground: &Ground<'_>, early: &Ground<'b>, fit: &Refit<'_>) -> Option<Refit<'b>> {
     let fit = ground.seen_to_start(fit);
     let stretches: Vec<(Parameter, f64)> = ground.base.iter().copied().zip(ground.begun.iter().copied()).collect();
     let from = |start: &[(Parameter, f64)]| early.refit(&fit.hypothesis, &fit, start);

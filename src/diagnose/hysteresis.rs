@@ -8,7 +8,7 @@ use rayon::prelude::*;
 use super::ground::{self, Ground};
 use super::refit::Refit;
 use super::screen::Score;
-use super::selection::Lacks;
+use super::single::Lacks;
 use super::{Cause, growing};
 use crate::fit::Problem;
 use crate::fit::descent::{Block, Outcome};
@@ -86,8 +86,8 @@ impl Straightened {
     }
 }
 
-/// The hysteresis alone, from every start that may lead to its minimum: where the score points, and, as far as there is something to explain, as a part of
-/// the spring, and from short stretches that do not know what the base model has given up.
+/// The hysteresis alone, from every start that may lead to its minimum: where the score points, as a part of the spring where there is something to explain,
+/// and from short stretches, which do not know what the base model has given up, where nothing else explains it.
 pub(super) fn alone<'a>(
     ground: &Ground<'a>,
     null: &Refit<'a>,
@@ -95,17 +95,19 @@ pub(super) fn alone<'a>(
     lacks: Lacks,
 ) -> Option<Refit<'a>> {
     let hypothesis = null.hypothesis.and(Cause::JointHysteretic, None);
-    let near = || score.and_then(|score| ground.refit(&hypothesis, null, &score.start));
-    let softened = || (lacks.unexplained || lacks.seen).then(|| softened(ground, null)).flatten();
+    let near = || score.and_then(|score| ground.refit_below(lacks.leads, &hypothesis, null, &score.start));
+    let softened = || (lacks.unexplained || lacks.seen).then(|| softened(ground, null, lacks.leads)).flatten();
     // in every joint of a strip, and from no memory in each stretch, it is too dear
-    let anew =
-        || (lacks.unexplained && !ground.is_strip()).then(|| ground.refit_anew(&hypothesis, &[], null.chi2)).flatten();
+    let anew = || {
+        let known = ground::BEYOND_HOPE * null.chi2;
+        (lacks.unsolved && !ground.is_strip()).then(|| ground.refit_anew(&hypothesis, &[], known)).flatten()
+    };
     let (near, (softened, anew)) = rayon::join(near, || rayon::join(softened, anew));
     [near, softened, anew].into_iter().flatten().min_by(|a, b| a.chi2.total_cmp(&b.chi2))
 }
 
-/// The hysteresis where it makes up a part of what the base model takes for the spring: from the best of several such starts.
-fn softened<'a>(ground: &Ground<'a>, null: &Refit<'a>) -> Option<Refit<'a>> {
+/// The hysteresis where it makes up a part of what the base model takes for the spring: from the best of several such starts, if that leads below `bound`.
+fn softened<'a>(ground: &Ground<'a>, null: &Refit<'a>, bound: f64) -> Option<Refit<'a>> {
     let hypothesis = null.hypothesis.and(Cause::JointHysteretic, None);
     let starts = starts(ground, null, &YIELD_SHARES, &SPRING_SHARES, &[1.0])?;
     let costed = starts.into_iter().map(|start| (ground.cost_at(&hypothesis, null, &start), start));
@@ -113,7 +115,7 @@ fn softened<'a>(ground: &Ground<'a>, null: &Refit<'a>) -> Option<Refit<'a>> {
     if ground.is_strip() {
         return ground.begin(&hypothesis, null, &best);
     }
-    ground.refit(&hypothesis, null, &best)
+    ground.refit_below(bound, &hypothesis, null, &best)
 }
 
 /// Where a hysteresis beside a fit may start: with these yield angles, as parts of the largest bend, as these parts of the spring, the spring being as many times

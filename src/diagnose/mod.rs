@@ -13,6 +13,7 @@
 //! | [`preparation`] | outliers, noise, where the base model's descent starts |
 //! | [`search`] | the way through what follows, with the file at its word or loosely |
 //! | [`selection`] | which are fitted in full |
+//! | [`single`] | one effect beside a fit, from every start that may lead to it |
 //! | [`fine_strip`] | a strip that bends everywhere, as finely as it needs |
 //! | [`second_look`] | from further starts, where much is left |
 //! | [`growing`] | from the beginning of the recordings on, where still more is |
@@ -51,6 +52,7 @@ pub mod screen;
 pub mod search;
 pub mod second_look;
 pub mod selection;
+pub mod single;
 pub mod stepwise;
 pub mod surroundings;
 pub mod torque;

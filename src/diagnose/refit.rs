@@ -9,6 +9,8 @@ use crate::fit::descent::{Ending, Outcome};
 use crate::fit::problem::stacked;
 use crate::model::{Camera, ForwardModel, Parameter, State, Trajectory};
 
+/// A fit that leaves this part of the swing lacks something, whatever the noise.
+pub(super) const MUCH_LEFT: f64 = 0.05;
 /// A motion that leaves more than this part of the swing has lost step.
 pub(super) const OUT_OF_STEP: f64 = 0.35;
 

@@ -8,7 +8,8 @@
 //!
 //! Two laws have no such c at the outset: frames may be missing at any instant, and the support may move at any frequency. Both are scanned.
 
-use nalgebra::{DMatrix, DVector};
+use nalgebra::{DMatrix, DMatrixView, DVector};
+use rayon::prelude::*;
 
 use super::Cause;
 use super::ground::{Ground, Hypothesis};
@@ -23,6 +24,8 @@ const NOTHING_LEFT: f64 = 1e-5;
 const YIELDS: [f64; 3] = [0.03, 0.15, 0.6];
 /// Frequencies of a moving support: this fine for the length of the recording.
 const PER_RESOLUTION: f64 = 1.0;
+/// Frequencies that are followed side by side.
+const AT_ONCE: usize = 8;
 /// Peaks over the frequency that are kept beside the highest.
 const FURTHER_PEAKS: usize = 4;
 /// Lowest and highest frequency of a moving support, in units of the swing's. A slower one only leans, and has to move by metres to do so.
@@ -105,25 +108,28 @@ impl<'g, 'a> Screen<'g, 'a> {
             further.iter().copied().filter(|c| !c.is_scanned() && *c != Cause::DistributedFlexibility).collect();
         // every corner of a hysteresis ends a step, which the others need not suffer
         let (kinked, smooth): (Vec<Cause>, Vec<Cause>) = smooth.into_iter().partition(|c| *c == Cause::JointHysteretic);
-        let mut scores = self.of_coefficients(&smooth, None).unwrap_or_default();
         let yields_rad = if self.ground.has_spring() {
             YIELDS.map(|share| share * self.ground.largest_bend_rad()).to_vec()
         } else {
             vec![self.ground.yield_rad().0]
         };
-        let kinked = yields_rad.into_iter().filter_map(|yield_rad| {
-            let mut score = self.of_coefficients(&kinked, Some(yield_rad))?.pop()?;
-            score.start.push((Parameter::HysteresisYield, yield_rad));
+        let of_yield = |yield_rad: &f64| {
+            let mut score = self.of_coefficients(&kinked, Some(*yield_rad))?.pop()?;
+            score.start.push((Parameter::HysteresisYield, *yield_rad));
             Some(score)
-        });
-        scores.extend(kinked.max_by(|a, b| a.gain.total_cmp(&b.gain)));
-        if further.contains(&Cause::DroppedFrames) {
-            scores.extend(self.of_dropped_frames());
-        }
-        if further.contains(&Cause::SupportMotion) {
-            scores.extend(self.of_support());
-        }
-        scores
+        };
+        let of_yields = || yields_rad.par_iter().with_max_len(1).filter_map(of_yield).collect::<Vec<Score>>();
+        let ((smooth, yields), (dropped, support)) = rayon::join(
+            || rayon::join(|| self.of_coefficients(&smooth, None).unwrap_or_default(), of_yields),
+            || {
+                rayon::join(
+                    || further.contains(&Cause::DroppedFrames).then(|| self.of_dropped_frames()).flatten(),
+                    || further.contains(&Cause::SupportMotion).then(|| self.of_support()).flatten(),
+                )
+            },
+        );
+        let hysteresis = yields.into_iter().max_by(|a, b| a.gain.total_cmp(&b.gain));
+        smooth.into_iter().chain(hysteresis).chain(dropped).chain(support).collect()
     }
 
     /// All effects that are proportional to a coefficient, from one motion with all their derivatives.
@@ -247,7 +253,7 @@ impl<'g, 'a> Screen<'g, 'a> {
         for record in 0..records {
             let (model, _) = problem.model(record, &self.fit.x[..problem.free.len()]).ok()?;
             let surroundings = Surroundings::of(self.fit, record)?;
-            let transitions = surroundings.transitions(f64::INFINITY, |k| {
+            let transitions = surroundings.transitions_of_inputs(|k| {
                 let theta_rad = &surroundings.rows[k].theta_rad;
                 DMatrix::from_fn(theta_rad.len(), 1, |i, _| {
                     -surroundings.chain.static_moment_kg_m(i) * theta_rad[i].cos()
@@ -261,8 +267,13 @@ impl<'g, 'a> Screen<'g, 'a> {
         let count = (PER_RESOLUTION * span_s * (HIGHEST * swing_hz).min(0.9 * nyquist_hz)) as usize;
         let hz = |k: usize| (k as f64 + 0.5) / (PER_RESOLUTION * span_s);
         let first = ((PER_RESOLUTION * span_s * LOWEST * swing_hz) as usize).max(1);
-        let promises: Vec<(f64, f64)> =
-            (first..count).filter_map(|k| Some((self.promise(&self.at_frequency(&around, hz(k)))?, hz(k)))).collect();
+        let frequencies_hz: Vec<f64> = (first..count).map(hz).collect();
+        let of_several = |several: &[f64]| {
+            let columns = self.at_frequencies(&around, several);
+            let promised = |(k, hz): (usize, &f64)| Some((self.promise(&columns.columns(2 * k, 2))?, *hz));
+            several.iter().enumerate().filter_map(promised).collect::<Vec<_>>()
+        };
+        let promises: Vec<(f64, f64)> = frequencies_hz.chunks(AT_ONCE).flat_map(of_several).collect();
         let is_peak = |k: &usize| {
             let near = promises[k.saturating_sub(1)..promises.len().min(k + 2)].iter();
             near.map(|p| p.0).fold(f64::NEG_INFINITY, f64::max) <= promises[*k].0
@@ -270,7 +281,7 @@ impl<'g, 'a> Screen<'g, 'a> {
         let mut peaks: Vec<(f64, f64)> = (0..promises.len()).filter(is_peak).map(|k| promises[k]).collect();
         peaks.sort_by(|a, b| b.0.total_cmp(&a.0));
         let at = |hz: f64| {
-            let columns = self.at_frequency(&around, hz);
+            let columns = self.at_frequencies(&around, &[hz]).columns(0, 2).into_owned();
             let parameters = [Parameter::SupportSine, Parameter::SupportCosine];
             let mut score = self.score(Cause::SupportMotion, columns, &parameters, None)?;
             score.start.push((Parameter::SupportFrequency, hz));
@@ -283,24 +294,33 @@ impl<'g, 'a> Screen<'g, 'a> {
     }
 
     /// Δχ² of some columns, without forming c̃.
-    fn promise(&self, columns: &DMatrix<f64>) -> Option<f64> {
+    fn promise(&self, columns: &DMatrixView<'_, f64>) -> Option<f64> {
         let along = self.projection.basis.tr_mul(columns);
         let gram = columns.tr_mul(columns) - along.tr_mul(&along);
         let pull = columns.tr_mul(&self.projection.residual);
         Some(pull.dot(&(gram.try_inverse()? * &pull)))
     }
 
-    fn at_frequency(&self, around: &[(Surroundings, Vec<DMatrix<f64>>, f64)], frequency_hz: f64) -> DMatrix<f64> {
-        let rate = std::f64::consts::TAU * frequency_hz;
-        let mut columns = DMatrix::zeros(self.projection.residual.len(), 2);
+    /// Two columns each of a few frequencies.
+    fn at_frequencies(
+        &self,
+        around: &[(Surroundings, Vec<DMatrix<f64>>, f64)],
+        frequencies_hz: &[f64],
+    ) -> DMatrix<f64> {
+        let mut columns = DMatrix::zeros(self.projection.residual.len(), 2 * AT_ONCE);
         let mut first = 0;
         for (surroundings, transitions, _) in around {
             // the pivot's acceleration for one metre of sine, and of cosine
             let course = |pair: &[f64]| {
-                let (sin, cos) = (rate * 0.5 * (pair[0] + pair[1])).sin_cos();
-                [[-rate * rate * sin, -rate * rate * cos]]
+                let mut course = [0.0; 2 * AT_ONCE];
+                for (both, frequency_hz) in course.chunks_exact_mut(2).zip(frequencies_hz) {
+                    let rate = std::f64::consts::TAU * frequency_hz;
+                    let (sin, cos) = (rate * 0.5 * (pair[0] + pair[1])).sin_cos();
+                    both.copy_from_slice(&[-rate * rate * sin, -rate * rate * cos]);
+                }
+                [course]
             };
-            let held: Vec<[[f64; 2]; 1]> = surroundings.t_s.windows(2).map(course).collect();
+            let held: Vec<[[f64; 2 * AT_ONCE]; 1]> = surroundings.t_s.windows(2).map(course).collect();
             let seen = surroundings.seen(&surroundings.responses(transitions, &held));
             columns.rows_mut(first, seen.nrows()).copy_from(&seen);
             first += seen.nrows();

@@ -5,7 +5,8 @@ use rayon::prelude::*;
 use super::ground::{self, Ground};
 use super::noise::BEYOND_NOISE;
 use super::refit::{Refit, best, least, least_chi2, merged};
-use super::selection::{self, Lacks};
+use super::selection;
+use super::single::{self, Lacks};
 use super::{Cause, hysteresis};
 use crate::fit::Record;
 use crate::progress::Progress;
@@ -33,7 +34,7 @@ pub fn second_look<'a>(
     let seeds: Vec<&Refit<'a>> = seeds(ground, &fits).into_iter().map(|i| &fits[i]).collect();
     progress.begin("second look", Some((seeds.len() * causes.len()) as u64));
     let mut others: Vec<Refit<'a>> =
-        seeds.iter().flat_map(|seed| selection::beside(ground, seed, causes, None, progress)).collect();
+        seeds.iter().flat_map(|seed| single::beside(ground, seed, causes, None, progress)).collect();
     if causes.contains(&Cause::JointHysteretic) {
         let lacking = seeds.iter().filter(|seed| !seed.hypothesis.causes.contains(&Cause::JointHysteretic));
         let bases = lacking.copied().chain(fits.first());

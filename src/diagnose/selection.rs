@@ -3,20 +3,17 @@
 use rayon::prelude::*;
 
 use super::ground::{self, Ground, Hypothesis};
-use super::refit::{OUT_OF_STEP, Refit, least, least_chi2};
+use super::refit::{MUCH_LEFT, Refit, least, least_chi2};
 use super::screen::{Score, Screen};
-use super::{Cause, dropped, fine_strip, hysteresis};
+use super::single::{self, Lacks, WORTH};
+use super::{Cause, dropped, fine_strip};
 use crate::model::Parameter;
 use crate::progress::Progress;
 
 /// Fits from which pairs are built.
 const SEEDS: usize = 6;
-/// χ² beyond its expectation by this many standard deviations is worth a dear hypothesis.
-const SOMETHING_LEFT: f64 = 4.0;
 /// A pair that promises more than this many times the least χ² is not fitted.
 const PROMISING: f64 = 3.0;
-/// A base model that leaves this part of the swing lacks something, whatever the noise.
-const MUCH_LEFT: f64 = 0.05;
 /// Dampers to start the base model from, over the one it found.
 const WEAKER: [f64; 2] = [0.1, 0.01];
 /// An effect explains much where it leaves less than this part of the base model's χ², and leads elsewhere where a base parameter differs by
@@ -30,12 +27,10 @@ const STRAGGLES: f64 = 9.0;
 /// Fits that leave this many times the best one's χ² are no seeds, and no pair is promised less than this part of its seed's χ².
 const FAR: f64 = 100.0;
 const AFAR: f64 = 0.01;
-/// Of these, the ones beside which a moving support is looked for.
+/// Of these, the ones beside which what is dear to score is looked for.
 const SCANNED: usize = 3;
 /// Pairs fitted in full.
 const MOST_PAIRS: usize = 20;
-/// A dear pair must lower the best χ² by this.
-const WORTH: f64 = 9.0;
 /// A χ² that was this many times as large was not yet a minimum's.
 const FAR_DOWN: f64 = 3.0;
 /// Pairs fitted even where they promise little.
@@ -46,12 +41,19 @@ pub fn fits<'a>(ground: &mut Ground<'a>, null: Refit<'a>, causes: &[Cause], prog
     let scores = Screen::at(ground, &null).map(|s| s.scores(&cheap(ground, causes))).unwrap_or_default();
     let lacks = Lacks::of(ground, &null, &scores);
     progress.begin("effects", Some(causes.len() as u64));
-    let singles = causes.par_iter().with_max_len(1).filter_map(|cause| {
-        let fit = single(ground, &null, *cause, scores.iter().find(|s| s.cause == *cause), lacks);
-        progress.advance(1);
-        fit
-    });
-    let singles: Vec<Refit<'a>> = singles.collect();
+    let fitted = |causes: &[Cause], lacks: Lacks| -> Vec<Refit<'a>> {
+        let of = |cause: &Cause| {
+            let fit = single::single(ground, &null, *cause, scores.iter().find(|s| s.cause == *cause), lacks);
+            progress.advance(1);
+            fit
+        };
+        causes.par_iter().with_max_len(1).filter_map(of).collect()
+    };
+    // what is dear to fit is sought the longer the less the others explain
+    let (dear, others): (Vec<Cause>, Vec<Cause>) = causes.iter().partition(|cause| comes_last(**cause));
+    let mut singles = fitted(&others, lacks);
+    singles.extend(fitted(&dear, lacks.beside(&singles)));
+    singles.sort_by(|a, b| a.hypothesis.causes.cmp(&b.hypothesis.causes));
     let mut all = vec![null];
     all.extend(singles);
     let all = from_the_best_single(ground, all);
@@ -81,7 +83,7 @@ pub fn from_weaker_dampers<'a>(ground: &Ground<'a>, null: Refit<'a>) -> Refit<'a
     let weaker = WEAKER
         .par_iter()
         .with_max_len(1)
-        .filter_map(|part| ground.refit(&null.hypothesis, &null, &[(damper, part * strong)]));
+        .filter_map(|part| ground.refit_below(null.chi2, &null.hypothesis, &null, &[(damper, part * strong)]));
     let best = weaker.min_by(|a, b| a.chi2.total_cmp(&b.chi2));
     match best {
         Some(best) if best.chi2 < null.chi2 => best,
@@ -196,124 +198,12 @@ pub(super) fn with_errors_in_step<'a>(ground: &mut Ground<'a>, fits: Vec<Refit<'
     fits.into_par_iter().with_max_len(1).map(again).collect()
 }
 
-/// How much a fit lacks, which decides from how many starts an effect is fitted.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct Lacks {
-    /// χ² from which on a fit leaves more than noise.
-    too_much: f64,
-    /// It leaves more than noise.
-    pub unexplained: bool,
-    /// Its motion has lost step with a recording.
-    out_of_step: bool,
-    /// An effect that is not scanned for would explain some of it.
-    pub seen: bool,
-}
-
-impl Lacks {
-    pub fn of(ground: &Ground<'_>, null: &Refit<'_>, scores: &[Score]) -> Self {
-        let values = ground.values() as f64;
-        let too_much = values + SOMETHING_LEFT * (2.0 * values).sqrt();
-        let left_share = null.left_share();
-        Self {
-            too_much,
-            unexplained: left_share > MUCH_LEFT || null.chi2 > too_much,
-            out_of_step: left_share > OUT_OF_STEP,
-            seen: scores.iter().any(|s| s.gain > WORTH && !s.cause.is_scanned()),
-        }
-    }
-}
-
-/// One effect beside a fit, from every start that may lead to its minimum.
-pub(super) fn single<'a>(
-    ground: &Ground<'a>,
-    null: &Refit<'a>,
-    cause: Cause,
-    score: Option<&Score>,
-    lacks: Lacks,
-) -> Option<Refit<'a>> {
-    if cause == Cause::JointHysteretic {
-        return hysteresis::alone(ground, null, score, lacks);
-    }
-    let Lacks { too_much, unexplained, out_of_step, .. } = lacks;
-    let mut tries = Vec::new();
-    match (cause, score) {
-        (Cause::DistributedFlexibility, _) => {
-            // many links are dear: only where there is something to explain
-            if unexplained {
-                let hypothesis = null.hypothesis.and(cause, None);
-                let begun = ground.begin(&hypothesis, null, &[]).filter(|b| b.chi2 < ground::BEYOND_HOPE * null.chi2);
-                let begun = begun.and_then(|b| ground.again(&b, ground::FEW_STEPS));
-                let begun = begun.filter(|b| b.chi2 < ground::HOPEFUL * null.chi2);
-                tries.push(begun.and_then(|b| if b.converged { Some(b) } else { ground.again(&b, ground::FEW_STEPS) }));
-                if out_of_step && tries.iter().flatten().all(Refit::is_out_of_step) {
-                    tries.push(ground.refit_anew(&hypothesis, &[], null.chi2));
-                }
-            }
-        }
-        (Cause::DroppedFrames, _) => {
-            tries.push(dropped::alone(ground, null));
-            let scored = score.and_then(|s| ground.refit(&s.hypothesis(&null.hypothesis), null, &s.start));
-            tries.push(scored.map(|fit| dropped::settled(ground, fit)));
-        }
-        (_, Some(score)) => {
-            let hypothesis = score.hypothesis(&null.hypothesis);
-            let near = ground.refit(&hypothesis, null, &score.start);
-            let lost = out_of_step && changes_pace(cause) && near.as_ref().is_none_or(Refit::is_out_of_step);
-            // a base model may have damped away what a better one keeps: short stretches remember it
-            let slow = unexplained && is_loss(cause) && near.as_ref().is_none_or(|n| !n.converged);
-            if lost || slow {
-                tries.push(ground.refit_anew(&hypothesis, &score.start, null.chi2));
-            }
-            if unexplained && near.as_ref().is_none_or(|n| n.chi2 > too_much) {
-                tries.extend(score.further.iter().map(|start| ground.refit(&hypothesis, null, start)));
-            }
-            tries.push(near);
-        }
-        (_, None) => {}
-    }
-    let unsolved = unexplained && tries.iter().flatten().all(|t| t.chi2 > too_much);
-    if cause == Cause::RestCurl && unsolved {
-        // a base model that has given its second mode up is no place to start from
-        tries.push(ground.refit_anew(&null.hypothesis.and(cause, None), &[], null.chi2));
-    }
-    tries.into_iter().flatten().min_by(|a, b| a.chi2.total_cmp(&b.chi2))
-}
-
-/// Other effects beside a fit: every one, or as many as are asked of those that promise most.
-pub(super) fn beside<'a>(
-    ground: &Ground<'a>,
-    fit: &Refit<'a>,
-    causes: &[Cause],
-    most: Option<usize>,
-    progress: &dyn Progress,
-) -> Vec<Refit<'a>> {
-    let Some(screen) = Screen::at(ground, fit) else { return Vec::new() };
-    let scores: Vec<Score> = screen.scores(causes);
-    let lacks = Lacks::of(ground, fit, &scores);
-    let score = |cause: Cause| scores.iter().find(|score| score.cause == cause);
-    let promised = |cause: Cause| score(cause).map_or(0.0, |score| score.gain);
-    let mut others: Vec<Cause> = causes.iter().copied().filter(|c| !fit.hypothesis.causes.contains(c)).collect();
-    if let Some(most) = most {
-        others.retain(|cause| promised(*cause) > WORTH);
-        others.sort_by(|a, b| promised(*b).total_cmp(&promised(*a)));
-        others.truncate(most);
-    }
-    let of = |cause: &Cause| {
-        let found = single(ground, fit, *cause, score(*cause), lacks);
-        progress.advance(1);
-        found
-    };
-    others.par_iter().with_max_len(1).filter_map(of).collect()
-}
-
-/// Whether an effect can put the base model out of step by its frequency.
-fn changes_pace(cause: Cause) -> bool {
-    matches!(cause, Cause::TimeBase | Cause::HingeStiffness | Cause::AddedMass | Cause::JointCubicStiffness)
-}
-
-/// Whether an effect takes energy away, as the base model's own damper does.
-fn is_loss(cause: Cause) -> bool {
-    matches!(cause, Cause::HingeViscous | Cause::HingeCoulomb | Cause::AirLinear | Cause::AirQuadratic)
+/// Whether an effect costs many times what others do.
+fn comes_last(cause: Cause) -> bool {
+    matches!(
+        cause,
+        Cause::JointHysteretic | Cause::DistributedFlexibility | Cause::SupportMotion | Cause::DroppedFrames
+    )
 }
 
 /// The effects that are screened: a hysteresis in each joint of a strip of many links costs more than all others, and is only fitted alone.
@@ -340,9 +230,9 @@ fn promising<'s, 'a>(
         .with_max_len(1)
         .enumerate()
         .filter_map(|(rank, seed)| {
-            // every frequency of a moving support is dear
-            let few: Vec<Cause> =
-                further.iter().copied().filter(|c| rank < SCANNED || *c != Cause::SupportMotion).collect();
+            // every frequency of a moving support is dear, and every corner of a hysteresis
+            let dear = |cause: &Cause| matches!(cause, Cause::SupportMotion | Cause::JointHysteretic);
+            let few: Vec<Cause> = further.iter().copied().filter(|c| rank < SCANNED || !dear(c)).collect();
             Some((*seed, Screen::at(ground, seed)?.scores(&few)))
         })
         .collect();

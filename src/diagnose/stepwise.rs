@@ -10,6 +10,7 @@ use super::growing;
 use super::refit::{self, Refit, least, merged};
 use super::screen::{Score, Screen};
 use super::selection;
+use super::single;
 use super::verdict::leaves_more_than_noise;
 use super::{Cause, MAIN_EFFECTS};
 use crate::progress::{Progress, Silent};
@@ -82,7 +83,7 @@ pub(super) fn with_one_more<'b>(ground: &Ground<'b>, fit: &Refit<'b>, causes: &[
     }
     let room = MOST_COEFFICIENTS.saturating_sub(fit.coefficients());
     let causes: Vec<Cause> = causes.iter().copied().filter(|cause| cause.parameters().len() <= room).collect();
-    selection::beside(ground, fit, &causes, Some(TRIED), &Silent)
+    single::beside(ground, fit, &causes, Some(TRIED), &Silent)
 }
 
 /// A fit without each of its effects, and of three with another in its place. (Pairs have been sought from every side, and where far more than noise is left

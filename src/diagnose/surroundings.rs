@@ -132,25 +132,38 @@ impl Surroundings {
     /// From each row to the next, in the order state, inputs, parameters. Each column of `inputs` is a torque on the links that fades within `memory_s`
     /// (an Ornstein–Uhlenbeck process; infinite where it is held).
     pub fn transitions(&self, memory_s: f64, inputs: impl Fn(usize) -> DMatrix<f64>) -> Vec<DMatrix<f64>> {
-        (0..self.flows.len()).map(|k| self.transition(k, &inputs(k), memory_s)).collect()
+        (0..self.flows.len()).map(|k| self.transition(k, &inputs(k), memory_s, self.parameters)).collect()
     }
 
-    fn transition(&self, k: usize, inputs: &DMatrix<f64>, memory_s: f64) -> DMatrix<f64> {
+    /// The same of held inputs, without the parameters.
+    pub fn transitions_of_inputs(&self, inputs: impl Fn(usize) -> DMatrix<f64>) -> Vec<DMatrix<f64>> {
+        (0..self.flows.len()).map(|k| self.transition(k, &inputs(k), f64::INFINITY, 0)).collect()
+    }
+
+    fn transition(&self, k: usize, inputs: &DMatrix<f64>, memory_s: f64, parameters: usize) -> DMatrix<f64> {
         let part_s = (self.t_s[k + 1] - self.t_s[k]) / self.flows[k].len() as f64;
-        let parts = self.flows[k].iter().map(|flow| self.part(flow, inputs, memory_s, part_s));
+        let parts =
+            self.flows[k].iter().map(|flow| (self.rate_of_change(flow, inputs, memory_s, parameters) * part_s).exp());
         parts.reduce(|before, after| after * before).unwrap_or_default()
     }
 
-    fn part(&self, flow: &DMatrix<f64>, inputs: &DMatrix<f64>, memory_s: f64, length_s: f64) -> DMatrix<f64> {
+    /// d(state, inputs, the first parameters)/dt, while a flow is held.
+    fn rate_of_change(
+        &self,
+        flow: &DMatrix<f64>,
+        inputs: &DMatrix<f64>,
+        memory_s: f64,
+        parameters: usize,
+    ) -> DMatrix<f64> {
         let (state, count) = (self.state(), inputs.ncols());
-        let total = state + count + self.parameters;
+        let total = state + count + parameters;
         let mut matrix = DMatrix::zeros(total, total);
         matrix.view_mut((0, 0), (state, state)).copy_from(&flow.columns(0, state));
-        matrix.view_mut((0, state + count), (state, self.parameters)).copy_from(&flow.columns(state, self.parameters));
+        matrix.view_mut((0, state + count), (state, parameters)).copy_from(&flow.columns(state, parameters));
         let torques = flow.columns(state + self.parameters, self.links) * inputs;
         matrix.view_mut((0, state), (state, count)).copy_from(&torques);
         (state..state + count).for_each(|i| matrix[(i, i)] = -1.0 / memory_s);
-        (matrix * length_s).exp()
+        matrix
     }
 
     /// What inputs add to the angles, row after row, mark after mark, each following several courses; `held` is what they are between a row

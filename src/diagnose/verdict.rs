@@ -245,16 +245,9 @@ impl Verdict {
 
     /// The likeliest names and their class.
     fn naming(weighed: &[Weighed<'_>], probability: impl Fn(&Weighed<'_>) -> f64, unknown: f64, marks: usize) -> Self {
-        let named: Vec<&Weighed<'_>> = weighed.iter().filter(|w| !w.fit.hypothesis.causes.is_empty()).collect();
+        let named: Vec<&Weighed<'_>> = with_names(weighed).collect();
         let best = named[0];
-        let mut class: Vec<Cause> = best.fit.hypothesis.causes.clone();
-        for other in named.iter().filter(|w| probability(w) > TOLD_APART * probability(best)) {
-            for cause in &other.fit.hypothesis.causes {
-                if !class.contains(cause) {
-                    class.push(*cause);
-                }
-            }
-        }
+        let mut class = not_told_apart(weighed, &probability);
         let effects = best.fit.hypothesis.causes.clone();
         let status = if probability(best) >= ALONE { Status::Identified } else { Status::Ambiguous };
         if status == Status::Identified {
@@ -265,6 +258,23 @@ impl Verdict {
         let class_probability = named.iter().filter(within).map(|w| probability(w)).sum();
         Self { status, effects, class, probability: probability(best), class_probability, unknown, to_decide }
     }
+}
+
+/// The hypotheses that have effects, likeliest first.
+fn with_names<'w, 'a>(weighed: &'w [Weighed<'a>]) -> impl Iterator<Item = &'w Weighed<'a>> {
+    weighed.iter().filter(|w| !w.fit.hypothesis.causes.is_empty())
+}
+
+/// The effects of the likeliest names, then all that the recordings do not tell from them.
+pub fn not_told_apart(weighed: &[Weighed<'_>], probability: impl Fn(&Weighed<'_>) -> f64) -> Vec<Cause> {
+    let mut class = Vec::new();
+    let least = with_names(weighed).next().map_or(0.0, |best| TOLD_APART * probability(best));
+    for cause in with_names(weighed).filter(|w| probability(w) > least).flat_map(|w| &w.fit.hypothesis.causes) {
+        if !class.contains(cause) {
+            class.push(*cause);
+        }
+    }
+    class
 }
 
 /// Whether a fit leaves so much that the noise does not matter.

@@ -30,6 +30,8 @@ pub struct Descent {
     pub fixed: Option<usize>,
     /// A start that costs more is no start.
     pub worst_start: f64,
+    /// After so many steps it ends unless it has come below this cost.
+    pub judged: Option<(usize, f64)>,
     /// Damping of the first step, in units of the normal matrix' diagonal: small where the start is known to be near.
     pub damping: f64,
 }
@@ -42,6 +44,7 @@ impl Default for Descent {
             enough: 1e-5,
             fixed: None,
             worst_start: f64::INFINITY,
+            judged: None,
             damping: 1e-4,
         }
     }
@@ -108,6 +111,9 @@ impl Descent {
         let mut ending = Ending::LostPatience;
         let mut steps = 0;
         while steps < self.most_steps {
+            if self.judged.is_some_and(|(after, bound)| steps == after && normals.cost >= bound) {
+                break;
+            }
             steps += 1;
             let Some(taken) = self.step_within(&normals, &x, lower, damping) else {
                 damping *= 10.0;
@@ -231,6 +237,18 @@ mod tests {
     fn a_bound_holds_and_lets_go() {
         let outcome = Descent::default().run(vec![3.0, 4.0], &[f64::NEG_INFINITY, 2.25], valley).unwrap();
         assert!((outcome.x[1] - 2.25).abs() < 1e-9 && (outcome.x[0] - 1.5).abs() < 2e-3, "{outcome:?}");
+    }
+
+    #[test]
+    fn a_descent_that_is_judged_goes_on_only_below_its_bound() {
+        let ended = |bound: f64| {
+            let judged = Descent { judged: Some((2, bound)), ..Descent::default() };
+            let outcome = judged.run(vec![-1.2, 1.0], &[f64::NEG_INFINITY; 2], valley).unwrap();
+            (outcome.steps, outcome.ending)
+        };
+        assert_eq!(ended(0.0), (2, Ending::LostPatience));
+        let (steps, ending) = ended(f64::INFINITY);
+        assert!(steps > 2 && ending == Ending::Converged);
     }
 
     #[test]

@@ -32,8 +32,15 @@ impl Statements<'_> {
                 } else {
                     let [comes, explains] =
                         if causes.len() == 1 { ["comes", "it explains"] } else { ["come", "they explain"] };
+                    let class = verdict::not_told_apart(&self.diagnosis.weighed, |w| w.if_named);
+                    let others: Vec<Cause> = class.into_iter().filter(|cause| !causes.contains(cause)).collect();
+                    let apart = if others.is_empty() {
+                        String::new()
+                    } else {
+                        format!(", which the recording does not tell from {}", names(&others, ""))
+                    };
                     format!(
-                        ". Of the table {} {comes} nearest ({:.0} % among the named): {explains} {:.1} % of what the base model leaves beyond the noise",
+                        ". Of the table {} {comes} nearest ({:.0} % among the named): {explains} {:.1} % of what the base model leaves beyond the noise{apart}",
                         words(causes),
                         1e2 * named.if_named,
                         1e2 * self.diagnosis.explained()
@@ -145,7 +152,8 @@ fn words_of_torque(torque: &MissingTorque) -> String {
         let _ = write!(words, ", strongest at {hz:.2} Hz");
     }
     if let Some(share) = torque.energy_share {
-        let _ = write!(words, ", that takes {:.0} % of the energy lost", 1e2 * share);
+        let does = if share < 0.0 { "puts in as much as" } else { "takes" };
+        let _ = write!(words, ", that {does} {:.0} % of the energy lost", 1e2 * share.abs());
     }
     words
 }
