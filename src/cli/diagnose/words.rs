@@ -24,32 +24,10 @@ impl Statements<'_> {
             Status::Adequate => format!(
                 "Nothing is missing that this recording could show: the base model leaves only noise ({percent:.0} %)."
             ),
-            Status::Unknown => {
-                let named = &self.diagnosis.weighed[0];
-                let causes = &named.fit.hypothesis.causes;
-                let nearest = if causes.is_empty() {
-                    "; no law of the table comes nearer than the base model".to_owned()
-                } else {
-                    let [comes, explains] =
-                        if causes.len() == 1 { ["comes", "it explains"] } else { ["come", "they explain"] };
-                    let class = verdict::not_told_apart(&self.diagnosis.weighed, |w| w.if_named);
-                    let others: Vec<Cause> = class.into_iter().filter(|cause| !causes.contains(cause)).collect();
-                    let apart = if others.is_empty() {
-                        String::new()
-                    } else {
-                        format!(", which the recording does not tell from {}", names(&others, ""))
-                    };
-                    format!(
-                        ". Of the table {} {comes} nearest ({:.0} % among the named): {explains} {:.1} % of what the base model leaves beyond the noise{apart}",
-                        words(causes),
-                        1e2 * named.if_named,
-                        1e2 * self.diagnosis.explained()
-                    )
-                };
-                format!(
-                    "Something is missing that is not in the table of effects ({percent:.0} %): no named law, nor several of them, leaves only noise{nearest}."
-                )
-            }
+            Status::Unknown => format!(
+                "Something is missing that is not in the table of effects ({percent:.0} %): no named law, nor several of them, leaves only noise{}.",
+                self.nearest()
+            ),
             Status::Identified => {
                 format!("Missing: {} ({percent:.0} %).{}{}", words(&verdict.effects), self.remark(), self.more())
             }
@@ -63,6 +41,31 @@ impl Statements<'_> {
                 format!("Missing: most likely {effects} ({percent:.0} %){others}.{remark}{more}")
             }
         }
+    }
+
+    /// What of the table comes nearest to something that is not in it, and what is not told from that.
+    fn nearest(&self) -> String {
+        let named = &self.diagnosis.weighed[0];
+        let causes = &named.fit.hypothesis.causes;
+        if causes.is_empty() {
+            return "; no law of the table comes nearer than the base model".to_owned();
+        }
+        let [comes, explains, them] = match causes.len() {
+            1 => ["comes", "it explains", "it"],
+            _ => ["come", "they explain", "them"],
+        };
+        let mut others = verdict::not_told_apart(&self.diagnosis.weighed, |w| w.if_named);
+        others.retain(|cause| !causes.contains(cause));
+        let apart = match others.len() {
+            0 => String::new(),
+            _ => format!("; the recording does not tell {them} from {}", names(&others, "")),
+        };
+        format!(
+            ". Of the table {} {comes} nearest ({:.0} % among the named): {explains} {:.1} % of what the base model leaves beyond the noise{apart}",
+            words(causes),
+            1e2 * named.if_named,
+            1e2 * self.diagnosis.explained()
+        )
     }
 
     /// What names that leave far more than noise do not explain.
