@@ -156,7 +156,7 @@ mod tests {
     use crate::experiment::Experiment;
     use crate::fit::{Problem, Record};
 
-    /// A fit with dry friction of this size, known to a tenth of 10⁻⁷ N·m, that leaves 4 of 60 values' squares.
+    /// A fit with dry friction of this size, its standard deviation 10⁻⁸ N·m, that leaves four times the noise's variance in 60 values.
     fn with_friction(records: &[Record], torque_n_m: f64) -> Refit<'_> {
         let free = [Parameter::HingeCoulomb];
         let problem = Problem::new(records, &Experiment::default(), &free).unwrap();

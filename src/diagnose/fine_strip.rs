@@ -6,7 +6,7 @@
 
 use rayon::prelude::*;
 
-use super::ground::{self, Ground, Hypothesis};
+use super::ground::{Ground, Hypothesis};
 use super::refit::{Refit, least};
 use super::selection;
 use super::single::{self, Lacks};
@@ -30,7 +30,7 @@ pub fn with_fine_strip<'a>(
     let unexplained = least(&fits).is_some_and(|best| Lacks::of(ground, best, &[]).unexplained);
     if unexplained && causes.contains(&Cause::DistributedFlexibility) && !fits.iter().any(bends) {
         // from the base model's motion its own may not be found
-        fits.extend(ground.refit_anew(&alone, &[], ground::BEYOND_HOPE * fits[0].chi2));
+        fits.extend(ground.refit_anew(&alone, &[], fits[0].chi2));
     }
     let asked_for = least(&fits).is_some_and(bends);
     let Some(coarse) = fits.iter().find(|fit| asked_for && fit.hypothesis == alone) else { return fits };

@@ -198,8 +198,8 @@ impl<'a> Ground<'a> {
     }
 
     /// Fits a hypothesis from the start values of the experiment, by multiple shooting first: for a base model whose motion is out of step.
-    /// It ends after its first steps unless they lead below `bound`.
-    pub fn refit_anew(&self, hypothesis: &Hypothesis, start: &[(Parameter, f64)], bound: f64) -> Option<Refit<'a>> {
+    /// It ends after its first steps unless they lead below a multiple of `known`, what is known to be left without.
+    pub fn refit_anew(&self, hypothesis: &Hypothesis, start: &[(Parameter, f64)], known: f64) -> Option<Refit<'a>> {
         let mut problem = self.problem(hypothesis).ok()?;
         for (parameter, value) in start {
             set(&mut problem.experiment, *parameter, *value);
@@ -208,7 +208,7 @@ impl<'a> Ground<'a> {
         let x = multiple_shooting(&mut problem).ok()?.x;
         problem.noise.clone_from(&self.noise);
         problem.accuracy = accuracy;
-        self.descend_by(descent_below(bound), hypothesis, problem, x)
+        self.descend_by(descent_below(BEYOND_HOPE * known), hypothesis, problem, x)
     }
 
     /// The same hypothesis with the noise as it is known now.

@@ -98,10 +98,8 @@ pub(super) fn alone<'a>(
     let near = || score.and_then(|score| ground.refit_below(lacks.leads, &hypothesis, null, &score.start));
     let softened = || (lacks.unexplained || lacks.seen).then(|| softened(ground, null, lacks.leads)).flatten();
     // in every joint of a strip, and from no memory in each stretch, it is too dear
-    let anew = || {
-        let known = ground::BEYOND_HOPE * null.chi2;
-        (lacks.unsolved && !ground.is_strip()).then(|| ground.refit_anew(&hypothesis, &[], known)).flatten()
-    };
+    let anew =
+        || (lacks.unsolved && !ground.is_strip()).then(|| ground.refit_anew(&hypothesis, &[], null.chi2)).flatten();
     let (near, (softened, anew)) = rayon::join(near, || rayon::join(softened, anew));
     [near, softened, anew].into_iter().flatten().min_by(|a, b| a.chi2.total_cmp(&b.chi2))
 }

@@ -84,7 +84,7 @@ pub(super) fn single<'a>(
                 let begun = begun.filter(|b| b.chi2 < ground::HOPEFUL * null.chi2);
                 tries.push(begun.and_then(|b| if b.converged { Some(b) } else { ground.again(&b, ground::FEW_STEPS) }));
                 if out_of_step && tries.iter().flatten().all(Refit::is_out_of_step) {
-                    tries.push(ground.refit_anew(&hypothesis, &[], ground::BEYOND_HOPE * null.chi2));
+                    tries.push(ground.refit_anew(&hypothesis, &[], null.chi2));
                 }
             }
         }
@@ -100,7 +100,7 @@ pub(super) fn single<'a>(
             // a base model may have damped away what a better one keeps: short stretches remember it
             let slow = unexplained && is_loss(cause) && near.as_ref().is_none_or(|n| !n.converged);
             if lost || slow {
-                tries.push(ground.refit_anew(&hypothesis, &score.start, ground::BEYOND_HOPE * null.chi2));
+                tries.push(ground.refit_anew(&hypothesis, &score.start, null.chi2));
             }
             if unexplained && near.as_ref().is_none_or(|n| n.chi2 > too_much) {
                 tries.extend(score.further.iter().map(|start| ground.refit_below(leads, &hypothesis, null, start)));
@@ -112,7 +112,7 @@ pub(super) fn single<'a>(
     let unsolved = unexplained && tries.iter().flatten().all(|t| t.chi2 > too_much);
     if cause == Cause::RestCurl && unsolved {
         // a base model that has given its second mode up is no place to start from
-        tries.push(ground.refit_anew(&null.hypothesis.and(cause, None), &[], ground::BEYOND_HOPE * null.chi2));
+        tries.push(ground.refit_anew(&null.hypothesis.and(cause, None), &[], null.chi2));
     }
     tries.into_iter().flatten().min_by(|a, b| a.chi2.total_cmp(&b.chi2))
 }
