@@ -2,31 +2,49 @@
 //!
 //! The mask only says where to look. Around the mark's rough centre the picture is read in polar sectors. In each
 //! sector the ring outside the mark gives the background there (a strip, its edge, the dark chamber), the core
-//! gives the mark, and every pixel of the boundary band its share α of mark:
+//! gives the mark, and every pixel of the boundary band its [share of mark](share) α, from luma and both colour
+//! differences, so that what scatters in the surroundings does not count.
+//!
+//! 1. The moments of α give a first centre, the radius and the sweep.
+//! 2. A [swept disc](disc) is [fitted](fit) to α. All its other parameters act alike on opposite sides, so they
+//!    cannot pull its centre.
+//! 3. What the band holds beside disc and background is the scatter of each sector; α and the disc are made anew
+//!    with it. So luma counts where one background explains it, and the strip's edge nowhere.
+//!
+//! The variance is that of least squares. Where no disc fits, the centroid is the first moment
 //!
 //! ```text
-//! α = Σ_k w_k (F_k − B_k)(p_k − B_k) / Σ_k w_k (F_k − B_k)²,   w_k = 1/σ_k²,   k = luma, colour component
-//! centroid = Σ α x / Σ α,   α = 1 in the core, 0 beyond the band
-//! ```
-//! So luma is used where the mark differs in luma from what lies beside it, and the colour where it does not. The
-//! colour component is read at its own sites (chroma siting) and interpolated to luma pixels, a symmetric kernel
-//! that leaves the centroid where it is. The variance follows from that of α:
-//!
-//! ```text
-//! var x = Σ_band σ_α² (x − x̄)² / (Σ α)²,   σ_α² = 1 / Σ_k w_k (F_k − B_k)²
+//! centroid = Σ α x / Σ α,   var x = Σ_band σ_α² (x − x̄)² / (Σ α)²,   α = 1 in the core, 0 beyond the band
 //! ```
 
+mod disc;
+mod fit;
 mod outline;
 mod patch;
+mod profile;
 mod share;
 mod surroundings;
 
 use super::component::HueAxis;
 use crate::video::Picture;
-use outline::Outline;
+use disc::Disc;
+use fit::{Fit, Pixel};
+use outline::{Outline, Zone};
 use patch::Patch;
-use share::{Profile, Share};
+use profile::Profile;
+use share::Share;
 use surroundings::Surroundings;
+
+/// Which channels a mark is measured by.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Channels {
+    /// All three.
+    All,
+    /// Luma alone.
+    Luma,
+    /// The colour differences alone.
+    Chroma,
+}
 
 /// A mark's rough place and shape, from the mask.
 #[derive(Debug, Clone)]
@@ -50,30 +68,93 @@ pub struct Centroid {
     pub variance_px2: [f64; 3],
     /// Σ α: the area of the mark.
     pub area_px2: f64,
+    /// How much of the position comes from the colour differences rather than from luma, 0 to 1.
+    pub chroma_share: f64,
     /// The boundary band reaches over the picture's edge.
     pub cut: bool,
 }
 
+/// Pixels that share one independent error: chroma samples of four pixels, and interpolation.
+const PIXELS_SHARING: f64 = 4.0;
+/// Standard deviation of the blur of lens, subsampling and codec, px, with and without subsampled chroma.
+const BLUR_PX: [f32; 2] = [1.3, 0.9];
+
 /// Measures the mark under `silhouette`. `None` where the mark has no contrast or fills the picture.
-pub fn measure(picture: &Picture<'_>, axis: HueAxis, silhouette: &Silhouette) -> Option<Centroid> {
+pub fn measure(
+    picture: &Picture<'_>,
+    axis: HueAxis,
+    silhouette: &Silhouette,
+    channels: Channels,
+) -> Option<Centroid> {
     let mut outline = Outline::of(picture, axis, silhouette);
-    let patch = Patch::read(picture, axis, &outline, surroundings::RING_PX);
-    let surroundings = Surroundings::survey(&patch, &outline)?;
+    let patch = Patch::read(picture, &outline);
+    let surroundings = Surroundings::survey(&patch, &outline, channels)?;
     let shares = surroundings.shares(&outline)?;
     // the mask's outline is a staircase of chroma samples: the shares of mark give a finer one
     outline.refine(&sector_areas(&patch, &outline, &surroundings, &shares));
-    let shares = surroundings.shares(&outline)?;
+    let mut shares = surroundings.shares(&outline)?;
     let mut moments = Moments::default();
     for_each_share(&patch, &outline, &surroundings, &shares, |sample, share, variance| {
         moments.add(share, variance, sample.dx_px, sample.dy_px);
     });
     let mut centroid = moments.centroid()?;
+    let blur_px = BLUR_PX[usize::from(picture.layout.chroma_shift_x == 0)];
+    let mut fitted = fit::fit(moments.disc(blur_px), &band(&patch, &outline, &surroundings, &shares));
+    if let Some(first) = &fitted {
+        // mask and moments know the outline to a pixel, the disc to a tenth: the ring is read again
+        outline = outline.of_disc(&first.disc);
+        if let Some((surroundings, again)) = resurvey(&patch, &outline, &first.disc, channels) {
+            fitted = fit::fit(first.disc, &band(&patch, &outline, &surroundings, &again)).or(fitted);
+            shares = again;
+        }
+    }
+    if let Some(Fit { disc, covariance_px2, .. }) = fitted {
+        (centroid.x_px, centroid.y_px) = (f64::from(disc.centre_px[0]), f64::from(disc.centre_px[1]));
+        centroid.variance_px2 = covariance_px2.map(|v| PIXELS_SHARING * v);
+    }
+    centroid.chroma_share = share::of_chroma(&shares);
     let reach = patch.reach_px();
     let inside = centroid.x_px.abs() < reach && centroid.y_px.abs() < reach;
     centroid.x_px += outline.centre_px[0];
     centroid.y_px += outline.centre_px[1];
     centroid.cut = outline.is_cut(&patch, picture);
     inside.then_some(centroid)
+}
+
+/// The pixels of the band that are mixtures of mark and background.
+fn band(patch: &Patch, outline: &Outline, surroundings: &Surroundings, shares: &[Share]) -> Vec<Pixel> {
+    let pixel = |sample: &patch::Sample| {
+        let sector = usize::from(sample.sector);
+        if outline.zone(sample) != Zone::Band || !shares[sector].variance.is_finite() {
+            return None;
+        }
+        let share = shares[sector].of(sample.levels, surroundings.background_at(sector, sample))?;
+        Some(Pixel { x_px: sample.dx_px, y_px: sample.dy_px, share, variance: shares[sector].variance })
+    };
+    patch.samples.iter().filter_map(pixel).collect()
+}
+
+/// The surroundings of a disc, with what every sector's band holds beside it and the background.
+fn resurvey(
+    patch: &Patch,
+    outline: &Outline,
+    disc: &Disc,
+    channels: Channels,
+) -> Option<(Surroundings, Vec<Share>)> {
+    let mut surroundings = Surroundings::survey(patch, outline, channels)?;
+    let shares = surroundings.shares(outline)?;
+    let shape = disc.evaluator(disc.positions());
+    let rest = |sample: &patch::Sample| {
+        let sector = usize::from(sample.sector);
+        (outline.zone(sample) == Zone::Band).then(|| {
+            let share = shape.at(sample.dx_px, sample.dy_px).share;
+            shares[sector].rest(sample.levels, surroundings.background_at(sector, sample), share)
+        })
+    };
+    let rests: Vec<Option<nalgebra::Vector3<f32>>> = patch.samples.iter().map(rest).collect();
+    surroundings.learn_scatter(patch, &rests);
+    let shares = surroundings.shares(outline)?;
+    Some((surroundings, shares))
 }
 
 /// Area of mark in every sector.
@@ -97,14 +178,14 @@ fn for_each_share(
     let mut foreign = Vec::new();
     for sample in &patch.samples {
         let sector = usize::from(sample.sector);
-        let depth = sample.distance_px - outline.radii_px[sector];
-        if depth < -outline.band_px {
-            visit(sample, 1.0, 0.0);
-        } else if depth <= outline.band_px {
-            match shares[sector].of(sample.levels, surroundings.background_at(sector, sample)) {
+        let depth = outline.depth_px(sample);
+        match outline.zone(sample) {
+            Zone::Core => visit(sample, 1.0, 0.0),
+            Zone::Band => match shares[sector].of(sample.levels, surroundings.background_at(sector, sample)) {
                 Some(share) => visit(sample, share, shares[sector].variance),
                 None => foreign.push((sample, depth)),
-            }
+            },
+            Zone::Ring | Zone::Beyond => {}
         }
     }
     if foreign.is_empty() {
@@ -122,6 +203,8 @@ struct Moments {
     area: f64,
     mx: f64,
     my: f64,
+    /// Σ α x², Σ α y², Σ α x y.
+    second: [f64; 3],
     /// Σ v, Σ v x, Σ v y, Σ v x², Σ v y², Σ v x y with v the variance of a pixel's share.
     spread: [f64; 6],
 }
@@ -132,10 +215,29 @@ impl Moments {
         self.area += share;
         self.mx += share * x;
         self.my += share * y;
+        self.second.iter_mut().zip([x * x, y * y, x * y]).for_each(|(sum, term)| *sum += share * term);
         if v > 0.0 {
             for (sum, term) in self.spread.iter_mut().zip([1.0, x, y, x * x, y * y, x * y]) {
                 *sum += v * term;
             }
+        }
+    }
+
+    /// The disc with these moments. A sweep leaves the area π(r² + σ²) as it is and adds |s|²/12 to the second moment
+    /// along it.
+    fn disc(&self, blur_px: f32) -> Disc {
+        let (x, y) = (self.mx / self.area, self.my / self.area);
+        let [xx, yy, xy] = self.second.map(|s| s / self.area);
+        let (xx, yy, xy) = (xx - x * x, yy - y * y, xy - x * y);
+        let difference = 2.0 * (0.5 * (xx - yy)).hypot(xy);
+        let (sin, cos) = (0.5 * (2.0 * xy).atan2(xx - yy)).sin_cos();
+        let length = (12.0 * difference).sqrt();
+        let radius = (self.area / std::f64::consts::PI - f64::from(blur_px).powi(2)).max(1.0).sqrt();
+        Disc {
+            centre_px: [x as f32, y as f32],
+            radius_px: radius as f32,
+            sweep_px: [(length * cos) as f32, (length * sin) as f32],
+            blur_px,
         }
     }
 
@@ -156,6 +258,7 @@ impl Moments {
             y_px: y,
             variance_px2,
             area_px2: self.area,
+            chroma_share: 0.0,
             cut: false,
         })
     }

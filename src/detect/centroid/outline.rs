@@ -4,7 +4,8 @@ use std::f32::consts::TAU;
 
 use super::super::component::HueAxis;
 use super::Silhouette;
-use super::patch::Patch;
+use super::disc::Disc;
+use super::patch::{Patch, Sample};
 use crate::video::Picture;
 
 /// The narrowest half width of the boundary band: codecs and chroma interpolation soften every edge this much.
@@ -13,14 +14,33 @@ const LEAST_BAND_PX: f32 = 2.5;
 const MOST_BAND_PX: f32 = 14.0;
 
 /// The outline about a whole-pixel centre.
+#[derive(Debug, Clone)]
 pub struct Outline {
     /// Stored pixels.
     pub centre_px: [f64; 2],
     /// Distance of the boundary in each sector.
     pub radii_px: Vec<f32>,
-    /// Half width of the band.
-    pub band_px: f32,
+    /// Half width of the boundary band in each sector.
+    pub bands_px: Vec<f32>,
 }
+
+/// Where a pixel lies.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Zone {
+    /// All mark.
+    Core,
+    /// Where the mark fades into its surroundings.
+    Band,
+    /// Just outside, where the background is read.
+    Ring,
+    /// Farther away.
+    Beyond,
+}
+
+/// Width of the ring from which the background is read.
+pub const RING_PX: f32 = 3.0;
+/// Standard deviations of the blur in which an edge fades to a hundredth.
+const FADE: f32 = 2.3;
 
 impl Outline {
     /// From the mask.
@@ -31,10 +51,44 @@ impl Outline {
         let radius = (area / std::f64::consts::PI).sqrt() as f32;
         // a sector is about two pixels wide at the ring; an odd number has no sector boundaries along both axes
         let count = ((TAU * (radius + 3.5) / 2.0) as usize).clamp(16, 96) | 1;
-        let mut outline = Self { centre_px, radii_px: vec![0.0; count], band_px: LEAST_BAND_PX };
+        let mut outline = Self { centre_px, radii_px: vec![0.0; count], bands_px: vec![LEAST_BAND_PX; count] };
         outline.follow_mask(silhouette);
-        outline.band_px = outline.band_from_profile(picture, axis, silhouette);
+        let band_px = outline.band_from_profile(picture, axis, silhouette);
+        outline.bands_px.fill(band_px);
         outline
+    }
+
+    /// That of a disc, about the same centre.
+    pub fn of_disc(&self, disc: &Disc) -> Self {
+        let mut outline = self.clone();
+        for sector in 0..self.count() {
+            let (sin, cos) = self.direction(sector);
+            let along = |v: [f32; 2]| v[0] * cos + v[1] * sin;
+            outline.radii_px[sector] = (disc.radius_px + along(disc.centre_px)).max(1.0);
+            outline.bands_px[sector] = FADE * disc.blur_px + 0.5 * along(disc.sweep_px).abs();
+        }
+        outline
+    }
+
+    /// How far outside the boundary a pixel lies.
+    #[inline]
+    pub fn depth_px(&self, sample: &Sample) -> f32 {
+        sample.distance_px - self.radii_px[usize::from(sample.sector)]
+    }
+
+    /// Where a pixel lies.
+    #[inline]
+    pub fn zone(&self, sample: &Sample) -> Zone {
+        let (depth, band) = (self.depth_px(sample), self.bands_px[usize::from(sample.sector)]);
+        if depth < -band {
+            Zone::Core
+        } else if depth <= band {
+            Zone::Band
+        } else if depth <= band + RING_PX {
+            Zone::Ring
+        } else {
+            Zone::Beyond
+        }
     }
 
     /// Number of sectors.
@@ -42,9 +96,9 @@ impl Outline {
         self.radii_px.len()
     }
 
-    /// Largest distance of the boundary.
+    /// Largest distance of a pixel of the ring.
     pub fn reach_px(&self) -> f32 {
-        self.radii_px.iter().copied().fold(0.0, f32::max)
+        self.radii_px.iter().zip(&self.bands_px).map(|(radius, band)| radius + band + RING_PX).fold(0.0, f32::max)
     }
 
     /// The sector of a direction.
@@ -117,7 +171,7 @@ impl Outline {
             let area = near.iter().sum::<f32>().max(0.0) / 5.0;
             let old = self.radii_px[sector];
             self.radii_px[sector] =
-                (2.0 * area * count as f32 / TAU).sqrt().clamp(old - self.band_px, old + self.band_px).max(1.0);
+                (2.0 * area * count as f32 / TAU).sqrt().clamp(old - self.bands_px[sector], old + self.bands_px[sector]).max(1.0);
         }
     }
 
@@ -127,7 +181,7 @@ impl Outline {
         patch.samples.iter().any(|s| {
             let (x, y) = (self.centre_px[0] as f32 + s.dx_px, self.centre_px[1] as f32 + s.dy_px);
             (x <= 0.0 || y <= 0.0 || x >= right || y >= bottom)
-                && s.distance_px - self.radii_px[usize::from(s.sector)] <= self.band_px
+                && matches!(self.zone(s), Zone::Core | Zone::Band)
         })
     }
 }

@@ -1,8 +1,12 @@
-//! The pixels around a mark: luma and colour component at luma resolution, in polar coordinates.
+//! The pixels around a mark: luma and both colour differences at luma resolution, in polar coordinates.
 
-use super::super::component::HueAxis;
 use super::outline::Outline;
-use crate::video::Picture;
+use crate::video::{Picture, Plane};
+
+/// Luma, C_b and C_r as 8-bit codes, all equally sharp.
+pub const CHANNELS: usize = 3;
+/// One value a channel.
+pub type Levels = [f32; CHANNELS];
 
 /// One pixel.
 #[derive(Debug, Clone, Copy)]
@@ -15,9 +19,12 @@ pub struct Sample {
     pub distance_px: f32,
     /// Sector of the outline.
     pub sector: u16,
-    /// Luma and component, 8-bit codes.
-    pub levels: [f32; 2],
+    /// The pixel's codes.
+    pub levels: Levels,
 }
+
+/// How much farther a refined outline may reach.
+const REFINED_PX: f32 = 3.0;
 
 /// The pixels within reach of a mark.
 pub struct Patch {
@@ -30,18 +37,20 @@ pub struct Patch {
 }
 
 impl Patch {
-    /// Reads everything up to `ring_px` beyond the band.
-    pub fn read(picture: &Picture<'_>, axis: HueAxis, outline: &Outline, ring_px: f32) -> Self {
+    /// Reads core, band and ring, and a little more for an outline that is refined later.
+    pub fn read(picture: &Picture<'_>, outline: &Outline) -> Self {
         let layout = picture.layout;
-        let reach = (outline.reach_px() + outline.band_px + ring_px + 1.0).ceil();
+        let reach = (outline.reach_px() + REFINED_PX).ceil();
         let from = |c: f64, size: usize| (c - f64::from(reach)).clamp(0.0, size as f64) as usize;
         let to = |c: f64, size: usize| (c + f64::from(reach) + 1.0).clamp(0.0, size as f64) as usize;
         let [cx, cy] = outline.centre_px;
         let (left, top) = (from(cx, layout.width_px), from(cy, layout.height_px));
         let (width, height) = (to(cx, layout.width_px) - left, to(cy, layout.height_px) - top);
         let mut patch = Self { left, top, width, height, samples: Vec::new() };
-        let component = patch.component(picture, axis);
-        patch.gather(picture, outline, reach, &component);
+        if width > 0 && height > 0 {
+            let planes = [patch.luma(picture), patch.chroma(picture, &picture.cb), patch.chroma(picture, &picture.cr)];
+            patch.gather(outline, reach, &planes);
+        }
         patch
     }
 
@@ -50,9 +59,7 @@ impl Patch {
         self.width.max(self.height) as f64
     }
 
-    fn gather(&mut self, picture: &Picture<'_>, outline: &Outline, reach: f32, component: &[f32]) {
-        let wide = picture.wide();
-        let scale = 1.0 / f32::from(1u16 << (picture.layout.bits - 8)) / f32::from(1u16 << picture.layout.low_bits);
+    fn gather(&mut self, outline: &Outline, reach: f32, planes: &[Vec<f32>; CHANNELS]) {
         self.samples.reserve(self.width * self.height);
         // whole rows first, in loops that the compiler can turn into vector instructions
         let dx: Vec<f32> = (0..self.width).map(|i| ((self.left + i) as f64 - outline.centre_px[0]) as f32).collect();
@@ -64,34 +71,53 @@ impl Patch {
                 *sector = outline.sector(*dx, dy) as u16;
             }
             for i in (0..self.width).filter(|i| squares[*i] <= reach * reach) {
-                let luma = f32::from(picture.luma.code(wide, self.left + i, self.top + j)) * scale;
-                let levels = [luma, component[j * self.width + i]];
+                let at = j * self.width + i;
+                let levels = [planes[0][at], planes[1][at], planes[2][at]];
                 let (distance_px, sector) = (squares[i].sqrt(), sectors[i]);
                 self.samples.push(Sample { dx_px: dx[i], dy_px: dy, distance_px, sector, levels });
             }
         }
     }
 
-    /// The projection on the hue (8-bit codes), interpolated between the chroma sites.
-    fn component(&self, picture: &Picture<'_>, axis: HueAxis) -> Vec<f32> {
+    /// Luma, as soft as the colour differences are after subsampling and interpolation: where a strip's edge is
+    /// cancelled between luma and colour, both must fade alike.
+    fn luma(&self, picture: &Picture<'_>) -> Vec<f32> {
         let layout = picture.layout;
-        let (u, v) = axis.unit();
-        let (u, v) = (u as f32, v as f32);
+        let (wide, scale) = (picture.wide(), code_scale(picture));
+        // two more pixels on every side, the picture's border repeated
+        let column = |i: usize| (self.left + i).saturating_sub(2).min(layout.width_px - 1);
+        let row = |j: usize| (self.top + j).saturating_sub(2).min(layout.height_px - 1);
+        let (width, height) = (self.width + 4, self.height + 4);
+        let mut raw = Vec::with_capacity(width * height);
+        for j in 0..height {
+            raw.extend((0..width).map(|i| f32::from(picture.luma.code(wide, column(i), row(j))) * scale));
+        }
+        let (across, down) = (softening(layout.chroma_shift_x), softening(layout.chroma_shift_y));
+        let mut rows = Vec::with_capacity(self.width * height);
+        for line in raw.chunks_exact(width) {
+            rows.extend((0..self.width).map(|i| tapped(&across, |k| line[i + k])));
+        }
+        let mut soft = Vec::with_capacity(self.width * self.height);
+        for j in 0..self.height {
+            soft.extend((0..self.width).map(|i| tapped(&down, |k| rows[(j + k) * self.width + i])));
+        }
+        soft
+    }
+
+    /// A colour difference (8-bit codes about 0), interpolated between the chroma sites.
+    fn chroma(&self, picture: &Picture<'_>, plane: &Plane<'_>) -> Vec<f32> {
+        let layout = picture.layout;
         let (cw, ch) = layout.chroma_size();
-        let scale = 1.0 / f32::from(1u16 << (layout.bits - 8)) / f32::from(1u16 << layout.low_bits);
+        let scale = code_scale(picture);
         let (x0, y0) = layout.luma_to_chroma(self.left as f64, self.top as f64);
         let (x1, y1) = layout.luma_to_chroma((self.left + self.width) as f64, (self.top + self.height) as f64);
-        let first = |v: f64| v.floor().max(0.0) as usize;
-        let (cx0, cy0) = (first(x0), first(y0));
-        let (cx1, cy1) = ((first(x1) + 2).min(cw), (first(y1) + 2).min(ch));
-        let columns = cx1.saturating_sub(cx0);
-        let mut coarse = Vec::with_capacity(columns * cy1.saturating_sub(cy0));
+        let first = |v: f64, size: usize| (v.floor().max(0.0) as usize).min(size - 1);
+        let (cx0, cy0) = (first(x0, cw), first(y0, ch));
+        let (cx1, cy1) = ((first(x1, cw) + 2).min(cw), (first(y1, ch) + 2).min(ch));
+        let columns = cx1 - cx0;
+        let mut coarse = Vec::with_capacity(columns * (cy1 - cy0));
         for y in cy0..cy1 {
-            for x in cx0..cx1 {
-                let b = f32::from(picture.cb.code(picture.wide(), x, y)) * scale - 128.0;
-                let r = f32::from(picture.cr.code(picture.wide(), x, y)) * scale - 128.0;
-                coarse.push(u * b + v * r);
-            }
+            coarse.extend((cx0..cx1).map(|x| f32::from(plane.code(picture.wide(), x, y)) * scale - 128.0));
         }
         let taps = |at: f64, from: usize, to: usize| {
             let at = at.clamp(from as f64, (to - 1) as f64);
@@ -100,16 +126,32 @@ impl Patch {
         };
         let across: Vec<_> =
             (0..self.width).map(|i| taps(layout.luma_to_chroma((self.left + i) as f64, 0.0).0, cx0, cx1)).collect();
-        let mut component = Vec::with_capacity(self.width * self.height);
+        let mut fine = Vec::with_capacity(self.width * self.height);
         for j in 0..self.height {
             let (a, b, t) = taps(layout.luma_to_chroma(0.0, (self.top + j) as f64).1, cy0, cy1);
             let (upper, lower) = (&coarse[a * columns..(a + 1) * columns], &coarse[b * columns..(b + 1) * columns]);
             for &(l, r, s) in &across {
                 let up = upper[l] + s * (upper[r] - upper[l]);
                 let down = lower[l] + s * (lower[r] - lower[l]);
-                component.push(up + t * (down - up));
+                fine.push(up + t * (down - up));
             }
         }
-        component
+        fine
     }
+}
+
+/// 8-bit codes per code of the file.
+fn code_scale(picture: &Picture<'_>) -> f32 {
+    1.0 / f32::from(1u16 << (picture.layout.bits - 8)) / f32::from(1u16 << picture.layout.low_bits)
+}
+
+/// The binomial kernel of variance 1 px², that of averaging pairs and interpolating between them, where chroma has
+/// half the samples; nothing where it has all.
+fn softening(shift: u32) -> [f32; 5] {
+    if shift == 0 { [0.0, 0.0, 1.0, 0.0, 0.0] } else { [0.0625, 0.25, 0.375, 0.25, 0.0625] }
+}
+
+#[inline]
+fn tapped(kernel: &[f32; 5], at: impl Fn(usize) -> f32) -> f32 {
+    kernel.iter().enumerate().map(|(k, w)| w * at(k)).sum()
 }
