@@ -4,7 +4,7 @@ use std::path::Path;
 
 use crate::angles::{AngleSource, Angles, angles_from_tracks};
 use crate::calibrate::Calibration;
-use crate::detect::{self, Blob, Detector, Hue};
+use crate::detect::{Album, Blob, Detector, Hue};
 use crate::error::{Error, Result};
 use crate::experiment::{MarkColour, Rig};
 use crate::progress::Progress;
@@ -69,7 +69,7 @@ impl Measurement {
 }
 
 /// Pictures from which the thresholds are chosen.
-const SAMPLE_PICTURES: usize = 6;
+const SAMPLE_PICTURES: usize = 8;
 
 /// Measures a recording. Paths in the rig are relative to `folder`.
 ///
@@ -80,7 +80,7 @@ pub fn measure(path: &Path, options: &Options, folder: &Path, progress: &dyn Pro
     let stream = recording.info().clone();
     let calibration = Calibration::new(&options.rig, stream.pixel_aspect, folder)?;
     let (hues, slots) = hues_of(&options.marks);
-    let (hues, strongest) = calibrate_thresholds(&recording, hues, options.threshold)?;
+    let (hues, strongest) = calibrate_hues(&recording, hues, options.threshold)?;
     let detector = Detector::new(hues.clone());
     let mut tracker = Tracker::new(slots.clone(), options.rig.pivot_px);
     progress.begin("tracking", stream.stated_frames);
@@ -131,7 +131,7 @@ fn hues_of(marks: &[MarkColour]) -> (Vec<Hue>, Vec<MarkSlot>) {
     let mut slots = Vec::new();
     for colour in marks {
         let index = hues.iter().position(|h| h.colour.rgb == colour.rgb).unwrap_or_else(|| {
-            hues.push(Hue { colour: colour.clone(), marks: 0, threshold: detect::LEAST_COMPONENT, thin: false });
+            hues.push(Hue { colour: colour.clone(), ..Hue::default() });
             hues.len() - 1
         });
         hues[index].marks += 1;
@@ -140,20 +140,14 @@ fn hues_of(marks: &[MarkColour]) -> (Vec<Hue>, Vec<MarkSlot>) {
     (hues, slots)
 }
 
-/// Looks at pictures spread over the recording and chooses the threshold of each hue. Returns the strongest
-/// component of each as well.
-fn calibrate_thresholds(recording: &Recording, mut hues: Vec<Hue>, fixed: Option<f64>) -> Result<(Vec<Hue>, Vec<f64>)> {
-    let colours: Vec<MarkColour> = hues.iter().map(|h| h.colour.clone()).collect();
-    let mut calibration = detect::Calibration::new(hues.len());
-    recording.sample(SAMPLE_PICTURES, &mut |frame| calibration.see(&frame.picture, &colours))?;
-    let strongest = (0..hues.len()).map(|i| calibration.strongest(i)).collect();
-    for (index, hue) in hues.iter_mut().enumerate() {
-        let chosen = calibration.threshold(index, hue.marks);
-        if let Some((threshold, thin)) = chosen {
-            (hue.threshold, hue.thin) = (threshold, thin);
-        }
-        hue.threshold = fixed.unwrap_or(hue.threshold);
-    }
+/// Looks at pictures spread over the recording and learns how each hue is found. Returns the strongest component of
+/// each as well.
+fn calibrate_hues(recording: &Recording, mut hues: Vec<Hue>, fixed: Option<f64>) -> Result<(Vec<Hue>, Vec<f64>)> {
+    let mut album = Album::default();
+    recording.sample(SAMPLE_PICTURES, &mut |frame| album.see(&frame.picture))?;
+    album.compare();
+    album.calibrate(&mut hues, fixed)?;
+    let strongest = hues.iter().map(|hue| album.strongest(hue)).collect::<Result<_>>()?;
     Ok((hues, strongest))
 }
 

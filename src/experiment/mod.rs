@@ -13,7 +13,7 @@ use serde::Deserialize;
 
 pub use model::{Effects, Hysteresis, Model, SupportMotion};
 pub use render::{Caption, Codec, CodecName, Distractor, Lens, Noise, Occlusion, PixelFormat, Render, Rgb, Siting};
-pub use rig::{MarkColour, Rig};
+pub use rig::{Look, MarkColour, Rig};
 pub use specimen::{Inertia, Link, Reflectivity, Specimen};
 
 use crate::error::{Error, Result};

@@ -7,7 +7,21 @@ use serde::Deserialize;
 
 use super::positive;
 
-/// The colour of a mark: a name or `#rrggbb`.
+/// What tells a mark from its surroundings.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Look {
+    /// Its hue.
+    Hue,
+    /// It is darker than what lies around it.
+    Dark,
+    /// It is lighter.
+    Light,
+}
+
+/// Codes by which the channels of a colour must differ to have a hue.
+const LEAST_SATURATION: u8 = 32;
+
+/// The colour of a mark: a name or `#rrggbb`. `dark` (or `black`) and `light` (or `white`) have no hue.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct MarkColour {
     /// As the user wrote it.
@@ -17,7 +31,7 @@ pub struct MarkColour {
 }
 
 impl MarkColour {
-    const NAMES: [(&'static str, [u8; 3]); 8] = [
+    const NAMES: [(&'static str, [u8; 3]); 12] = [
         ("red", [255, 0, 0]),
         ("green", [0, 160, 0]),
         ("blue", [0, 0, 255]),
@@ -26,11 +40,30 @@ impl MarkColour {
         ("magenta", [255, 0, 255]),
         ("cyan", [0, 255, 255]),
         ("violet", [128, 0, 255]),
+        ("dark", [0, 0, 0]),
+        ("black", [0, 0, 0]),
+        ("light", [255, 255, 255]),
+        ("white", [255, 255, 255]),
     ];
 
     /// The paper's marks.
     pub fn red() -> Self {
         Self { name: "red".to_owned(), rgb: [255, 0, 0] }
+    }
+
+    /// What tells such a mark from its surroundings.
+    pub fn look(&self) -> Look {
+        let [least, most] = [self.rgb.iter().min(), self.rgb.iter().max()].map(|c| c.copied().unwrap_or(0));
+        match (most - least >= LEAST_SATURATION, least >= 128) {
+            (true, _) => Look::Hue,
+            (false, false) => Look::Dark,
+            (false, true) => Look::Light,
+        }
+    }
+
+    /// It was given by a name, which stands for a family of hues, rather than measured.
+    pub fn is_named(&self) -> bool {
+        !self.name.starts_with('#')
     }
 }
 
@@ -50,8 +83,11 @@ impl FromStr for MarkColour {
         let channel = |i: usize| u8::from_str_radix(&digits[i..i + 2], 16).map_err(|e| e.to_string());
         let rgb = [channel(0)?, channel(2)?, channel(4)?];
         let spread = rgb.iter().max().copied().unwrap_or(0) - rgb.iter().min().copied().unwrap_or(0);
-        if spread < 32 {
-            return Err(format!("colour `{text}` is a grey; a mark is found by its hue, so give a coloured one"));
+        if spread < LEAST_SATURATION {
+            return Err(format!(
+                "colour `{text}` is a grey, which has no hue to be found by; for a mark darker or lighter than what \
+                 lies around it say dark or light"
+            ));
         }
         Ok(Self { name: lower, rgb })
     }
