@@ -6,7 +6,7 @@
 use super::component::{HueAxis, from_255, hue_angle_rad, to_255};
 use super::mask::{Mask, Part};
 use super::plane::Plane;
-use super::samples::{Album, turn};
+use super::samples::{Album, Samples, turn};
 use super::threshold::{self, LEAST_COMPONENT, LEAST_CONTRAST, Relief, Summit};
 use super::{Hue, LEAST_AREA_PX2, blobs::LEAST_ROUNDNESS};
 use crate::error::Result;
@@ -163,7 +163,7 @@ impl Album {
         let mut planes = Vec::new();
         let mut summits: [Vec<Vec<Summit>>; 2] = [Vec::new(), Vec::new()];
         for (n, picture) in self.pictures.iter().enumerate() {
-            let plane = Plane::of_samples(picture, ask.axis, ask.level)?;
+            let plane = self.plane(picture, ask.axis, ask.level)?;
             let mut relief = Relief::new(&plane, moved.get(n).map(Vec::as_slice));
             summits[1].push(relief.summits(least, floor));
             relief.open();
@@ -207,6 +207,42 @@ impl Album {
         (0..rows).flat_map(|y| (0..columns).map(move |x| (x, y))).map(|(x, y)| 4 * count(x, y) >= side * side).collect()
     }
 
+    /// The colour of a trial's likely spots as `#rrggbb`, or `dark` or `light` where it has no hue.
+    pub fn colour_name(&self, trial: &Trial) -> Option<String> {
+        let moves = trial.spots.iter().flatten().any(|s| s.moves);
+        let mut samples = Vec::new();
+        for (n, spots) in trial.spots.iter().enumerate() {
+            for spot in spots.iter().filter(|s| s.roundness >= LEAST_ROUNDNESS && (s.moves || !moves)) {
+                let picture = &self.pictures[n];
+                let half = (1usize << trial.level) >> 1;
+                let at = |p: &[usize; 2]| {
+                    let [x, y] = p.map(|v| (v << trial.level) + half);
+                    (n, y.min(picture.height - 1) * picture.width + x.min(picture.width - 1))
+                };
+                samples.extend(spot.part.points.iter().map(at));
+            }
+        }
+        let [r, g, b] = self.colour_of(&samples)?;
+        let name = format!("#{r:02x}{g:02x}{b:02x}");
+        name.parse::<crate::experiment::MarkColour>().ok().map(|_| name)
+    }
+
+    /// The component of a picture, nothing where nothing is looked at.
+    fn plane(&self, picture: &Samples, axis: HueAxis, level: u32) -> Result<Plane> {
+        let mut plane = Plane::of_samples(picture, axis, level)?;
+        if self.allowed.is_some() {
+            let width = plane.width;
+            for (at, value) in plane.values.iter_mut().enumerate() {
+                let middle = |v: usize, size: usize| ((v << level) + ((1 << level) >> 1)).min(size - 1);
+                let (x, y) = (middle(at % width, picture.width), middle(at / width, picture.height));
+                if !self.allows(y * picture.width + x) {
+                    *value = 0;
+                }
+            }
+        }
+        Ok(plane)
+    }
+
     /// The strongest component of a hue in any picture, 0 to 255.
     ///
     /// # Errors
@@ -215,7 +251,7 @@ impl Album {
         let axis = hue.axis(self.matrix);
         let mut top = 0i16;
         for picture in &self.pictures {
-            let plane = Plane::of_samples(picture, axis, hue.level)?;
+            let plane = self.plane(picture, axis, hue.level)?;
             top = plane.values.iter().copied().fold(top, i16::max);
         }
         Ok(to_255(f64::from(top)))

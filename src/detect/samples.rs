@@ -62,8 +62,12 @@ pub struct Album {
     pub moved: Vec<Vec<bool>>,
     /// How colours are coded.
     pub matrix: Matrix,
-    /// Luma pixels in a chroma sample, and its shifts.
+    /// log₂ of luma columns and rows in a chroma sample.
     pub shifts: [u32; 2],
+    /// Codes go from 0 to 255 rather than from 16 to 235.
+    pub full_range: bool,
+    /// Which samples are looked at; all where absent.
+    pub allowed: Option<Vec<bool>>,
 }
 
 impl Album {
@@ -72,9 +76,20 @@ impl Album {
         let samples = Samples::of(picture);
         if self.pictures.first().is_none_or(|p| (p.width, p.height) == (samples.width, samples.height)) {
             self.matrix = picture.layout.matrix;
+            self.full_range = picture.layout.full_range;
             self.shifts = [picture.layout.chroma_shift_x, picture.layout.chroma_shift_y];
             self.pictures.push(samples);
         }
+    }
+
+    /// Looks only at these samples.
+    pub fn allow(&mut self, samples: Option<Vec<bool>>) {
+        self.allowed = samples;
+    }
+
+    /// A sample is looked at.
+    pub(super) fn allows(&self, at: usize) -> bool {
+        self.allowed.as_ref().is_none_or(|a| a[at])
     }
 
     /// Finds what moves, once all pictures are there.
@@ -144,7 +159,7 @@ impl Album {
             for at in 0..picture.cb.len() {
                 let [b, r] = picture.chroma(at);
                 let chroma = b.hypot(r);
-                if chroma < LEAST_CHROMA {
+                if chroma < LEAST_CHROMA || !self.allows(at) {
                     continue;
                 }
                 let off = turn(r.atan2(b) - centre_rad);
@@ -176,13 +191,17 @@ impl Album {
         peaks
     }
 
-    /// The usual colour (Y′, C_b, C_r in codes) of some samples of one picture.
-    pub fn colour_of(&self, picture: usize, samples: &[usize]) -> Option<[f64; 3]> {
-        let picture = &self.pictures[picture];
-        let mut codes =
-            picture.channels().map(|plane| samples.iter().map(|at| f64::from(plane[*at])).collect::<Vec<_>>());
-        let [y, cb, cr] = [0, 1, 2].map(|k| median(&mut codes[k]));
-        Some([y?, cb?, cr?])
+    /// The usual colour of some samples, (picture, sample): red, green, blue, 0 to 255.
+    pub fn colour_of(&self, samples: &[(usize, usize)]) -> Option<[u8; 3]> {
+        let code = |channel: usize| {
+            let mut codes: Vec<f64> =
+                samples.iter().map(|(n, at)| f64::from(self.pictures[*n].channels()[channel][*at])).collect();
+            median(&mut codes)
+        };
+        let (black, luma_span, chroma_span) = if self.full_range { (0.0, 255.0, 255.0) } else { (16.0, 219.0, 224.0) };
+        let ycbcr =
+            [(code(0)? - black) / luma_span, (code(1)? - 128.0) / chroma_span, (code(2)? - 128.0) / chroma_span];
+        Some(self.matrix.rgb(ycbcr).map(|c| (255.0 * c).round().clamp(0.0, 255.0) as u8))
     }
 }
 

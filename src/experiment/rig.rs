@@ -117,6 +117,18 @@ pub struct Rig {
     pub pixel_aspect: Option<f64>,
     /// An OpenCV calibration file (`camera_matrix`, `distortion_coefficients`), relative to the experiment file.
     pub lens_calibration: Option<PathBuf>,
+    /// Marks are sought only in here: left, top, width, height.
+    pub roi_px: Option<[f64; 4]>,
+    /// A picture, white where marks are sought, relative to the experiment file.
+    pub mask: Option<PathBuf>,
+    /// What comes before is not measured, seconds of the file.
+    pub from_s: Option<f64>,
+    /// What comes after is not measured, seconds of the file.
+    pub until_s: Option<f64>,
+    /// Frames a second at which the camera ran, where the file plays slower (slow motion).
+    pub true_rate_hz: Option<f64>,
+    /// Fixed points with clear edges, displayed pixels: they show how the camera moves.
+    pub reference_marks: Vec<[f64; 2]>,
 }
 
 impl Default for Rig {
@@ -129,18 +141,42 @@ impl Default for Rig {
             plumb_px: None,
             pixel_aspect: None,
             lens_calibration: None,
+            roi_px: None,
+            mask: None,
+            from_s: None,
+            until_s: None,
+            true_rate_hz: None,
+            reference_marks: Vec::new(),
         }
     }
 }
 
 impl Rig {
-    pub(super) fn validate(&self) -> Result<(), String> {
+    /// The numbers make sense.
+    ///
+    /// # Errors
+    /// A line that names the key.
+    pub(crate) fn validate(&self) -> Result<(), String> {
         positive("rig.gravity_m_s2", self.gravity_m_s2)?;
         self.pixel_aspect.map_or(Ok(()), |v| positive("rig.pixel_aspect", v))?;
         if let Some([upper, lower]) = self.plumb_px
             && !((upper[0] - lower[0]).hypot(upper[1] - lower[1]) >= 1.0)
         {
             return Err("rig.plumb_px: the two points must be at least a pixel apart".to_owned());
+        }
+        self.true_rate_hz.map_or(Ok(()), |v| positive("rig.true_rate_hz", v))?;
+        if let Some(roi) = self.roi_px
+            && !(roi.iter().all(|v| v.is_finite()) && roi[2] >= 8.0 && roi[3] >= 8.0)
+        {
+            return Err("rig.roi_px: give left, top, width and height, at least 8 px wide and high".to_owned());
+        }
+        if let (Some(from), Some(until)) = (self.from_s, self.until_s)
+            && !(until > from)
+        {
+            return Err(format!("rig.until_s = {until}: must be later than rig.from_s = {from}"));
+        }
+        if self.reference_marks.iter().flatten().any(|v| !v.is_finite()) {
+            return Err("rig.reference_marks: must be points of two finite numbers".to_owned());
         }
         if self.pivot_px.is_some_and(|p| !p[0].is_finite() || !p[1].is_finite()) {
             return Err("rig.pivot_px: must be two finite numbers".to_owned());
