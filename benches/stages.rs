@@ -47,7 +47,7 @@ fn decode(bencher: Bencher, workers: usize) {
 fn detect(bencher: Bencher, scale: f64) {
     let recording = recording(1.0, scale);
     let pictures: Vec<OwnedPicture> = (0..8).map(|i| recording.frame(i).picture).collect();
-    let hue = Hue { colour: MarkColour::red(), marks: 3, threshold: 60.0, thin: false };
+    let hue = Hue { colour: MarkColour::red(), marks: 3, threshold: 60.0, ..Hue::default() };
     let detector = Detector::new(vec![hue]);
     let mut next = 0;
     bencher.counter(ItemsCount::new(1usize)).bench_local(|| {

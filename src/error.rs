@@ -48,19 +48,13 @@ pub enum Error {
     #[error("{}: {detail}", path.display())]
     StillTimes { path: PathBuf, detail: String },
 
-    /// No region of the wanted colour in any frame.
-    #[error(
-        "{}: no {colour} mark in any of {frames} frames (strongest {colour} component {strongest:.0} of 255, threshold {threshold:.0}); name the marks' colour with --color, or lower --threshold",
-        path.display()
-    )]
-    NoMarks { path: PathBuf, colour: String, frames: u64, strongest: f64, threshold: f64 },
+    /// No mark of the wanted colour: what was found instead, and what would accept it.
+    #[error("{}: no {colour} mark in any of {frames} frames: {found}; {remedy}", path.display())]
+    NoMarks { path: PathBuf, colour: String, frames: u64, found: String, remedy: String },
 
     /// Fewer marks than asked for.
-    #[error(
-        "{}: found {found} {colour} mark{} where {wanted} are needed; light or uncover the missing one, lower --threshold, or say --markers {found}",
-        path.display(), if *found == 1 { "" } else { "s" }
-    )]
-    TooFewMarks { path: PathBuf, colour: String, found: usize, wanted: usize },
+    #[error("{}: found {found} {colour} mark{} where {wanted} are needed{beside}; {remedy}", path.display(), if *found == 1 { "" } else { "s" })]
+    TooFewMarks { path: PathBuf, colour: String, found: usize, wanted: usize, beside: String, remedy: String },
 
     /// A configuration file that cannot be used.
     #[error("{}{}: {message}", path.display(), line.map(|l| format!(":{l}")).unwrap_or_default())]

@@ -5,6 +5,7 @@
 //! | stage | module | in → out |
 //! |---|---|---|
 //! | decode | [`video`] | file → frames with their own time stamps |
+//! | steady | [`steady`] | frame → how the camera moved, from what stands still |
 //! | detect | [`detect`] | frame → blobs, centroids to a small fraction of a pixel |
 //! | track | [`track`] | blobs → one track a mark |
 //! | calibrate | [`calibrate`] | pixels, y down → metres, y up |
@@ -25,11 +26,15 @@ pub mod progress;
 mod statistics;
 
 pub mod video;
+pub mod steady;
+pub mod area;
 pub mod detect;
 pub mod track;
 pub mod calibrate;
 pub mod angles;
 pub mod measure;
+mod rejected;
+mod caution;
 pub mod sidecar;
 pub mod overlay;
 pub mod series;

@@ -1,15 +1,30 @@
 //! A recording → tracks and angles, with everything a reader of the table should know beside it.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use crate::angles::{AngleSource, Angles, angles_from_tracks};
+use crate::area::Area;
 use crate::calibrate::Calibration;
-use crate::detect::{self, Blob, Detector, Hue};
+use crate::detect::{Album, Blob, Detector, Hue};
 use crate::error::{Error, Result};
 use crate::experiment::{MarkColour, Rig};
 use crate::progress::Progress;
+use crate::rejected::Rejected;
+use crate::steady::{Background, CameraShift};
 use crate::track::{FrameBlobs, MarkSlot, Measured, Sighting, Tracker, Tracks};
 use crate::video::{DamageSpread, Decoded, Frame, Orientation, Outcome, Recording, StillTimes, StreamInfo, Timing};
+
+/// Whether the camera's own motion is taken out.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub enum Steadying {
+    /// Where the pictures show that the camera moves, or reference marks are named.
+    #[default]
+    WhereNeeded,
+    /// Always.
+    Always,
+    /// Never.
+    Never,
+}
 
 /// How a recording is measured.
 #[derive(Debug, Clone)]
@@ -26,6 +41,8 @@ pub struct Options {
     pub binary_centroid: bool,
     /// When the stills of a folder were taken.
     pub still_times: StillTimes,
+    /// Whether the camera's own motion is taken out.
+    pub steadying: Steadying,
     /// Cores.
     pub workers: usize,
 }
@@ -39,6 +56,7 @@ impl Default for Options {
             angle_source: AngleSource::default(),
             binary_centroid: false,
             still_times: StillTimes::default(),
+            steadying: Steadying::default(),
             workers: std::thread::available_parallelism().map_or(1, std::num::NonZero::get),
         }
     }
@@ -59,6 +77,27 @@ pub struct Measurement {
     pub tracks: Tracks,
     /// One angle a link.
     pub angles: Angles,
+    /// The stamps of the rows as they stand in the file, where `true_rate_hz` makes them others.
+    pub file_t_s: Vec<f64>,
+    /// Seconds of the recording's own time in a second of the file's.
+    pub time_scale: f64,
+    /// How far the camera moved.
+    pub camera: Camera,
+}
+
+/// What is known of the camera's own motion.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub struct Camera {
+    /// Greatest shift seen, px, in the pictures looked at beforehand or, where it is taken out, in any frame.
+    pub greatest_shift_px: f64,
+    /// It is taken out of the marks' positions.
+    pub taken_out: bool,
+    /// Frames in which too little of the background was found again; nothing is measured in them.
+    pub lost_frames: usize,
+    /// Usual number of background patches that agree.
+    pub patches: usize,
+    /// Root mean square of the shift's own standard deviation.
+    pub sd_px: f64,
 }
 
 impl Measurement {
@@ -68,61 +107,213 @@ impl Measurement {
     }
 }
 
-/// Pictures from which the thresholds are chosen.
-const SAMPLE_PICTURES: usize = 6;
+/// Pictures from which hue, scale and threshold are learnt.
+const SAMPLE_PICTURES: usize = 8;
+/// Shift between two pictures from which the camera is taken to move, px: ten times what a patch's error is.
+const CAMERA_MOVES_PX: f64 = 0.3;
 
 /// Measures a recording. Paths in the rig are relative to `folder`.
 ///
 /// # Errors
 /// Whatever makes the recording unusable; see [`Error`].
 pub fn measure(path: &Path, options: &Options, folder: &Path, progress: &dyn Progress) -> Result<Measurement> {
-    let mut recording = Recording::open(path, &options.still_times)?;
-    let stream = recording.info().clone();
-    let calibration = Calibration::new(&options.rig, stream.pixel_aspect, folder)?;
-    let (hues, slots) = hues_of(&options.marks);
-    let (hues, strongest) = calibrate_thresholds(&recording, hues, options.threshold)?;
-    let detector = Detector::new(hues.clone());
-    let mut tracker = Tracker::new(slots.clone(), options.rig.pivot_px);
-    progress.begin("tracking", stream.stated_frames);
-    let view = View { orientation: stream.orientation, size: stream.stored_size_px, binary: options.binary_centroid };
-    let mut spread = DamageSpread::new(stream.delay_frames);
-    let see = |frame: Frame<'_>| view.sightings(&detector, &frame);
-    let decoded = recording.decode_in_order(options.workers, &see, &mut |outcome| {
-        if progress.is_cancelled() {
-            return Err(Error::Interrupted);
-        }
-        progress.advance(1);
-        if let Some(certain) = spread.push(outcome?) {
-            tracker.push(frame_blobs(certain));
-        }
-        Ok(())
-    })?;
-    spread.finish().for_each(|certain| tracker.push(frame_blobs(certain)));
-    if decoded.frames == 0 {
-        return Err(Error::NoFrames { path: path.to_owned(), packets: decoded.packets });
+    Session::open(path, options, folder)?.run(progress)
+}
+
+/// A recording that is about to be measured: what is sought is known.
+pub struct Session<'a> {
+    path: PathBuf,
+    options: &'a Options,
+    recording: Recording,
+    stream: StreamInfo,
+    calibration: Calibration,
+    area: Area,
+    album: Album,
+    hues: Vec<Hue>,
+    slots: Vec<MarkSlot>,
+    background: Option<Background>,
+    camera: Camera,
+    stamps_s: Vec<f64>,
+}
+
+impl<'a> Session<'a> {
+    /// Looks at pictures spread over the recording and learns how each hue is found, and whether the camera moves.
+    ///
+    /// # Errors
+    /// As [`measure`].
+    pub fn open(path: &Path, options: &'a Options, folder: &Path) -> Result<Self> {
+        let recording = Recording::open(path, &options.still_times)?;
+        let stream = recording.info().clone();
+        let calibration = Calibration::new(&options.rig, stream.pixel_aspect, folder)?;
+        let area = Area::new(&options.rig, folder, stream.orientation.size(stream.stored_size_px))?;
+        let (mut hues, slots) = hues_of(&options.marks);
+        let mut album = Album::default();
+        let mut look = Lookout::new(options, &stream);
+        recording.sample(SAMPLE_PICTURES, &mut |frame| {
+            album.allow(area.samples(&frame.picture.layout, stream.orientation));
+            album.see(&frame.picture);
+            look.see(frame);
+        })?;
+        album.compare();
+        album.calibrate(&mut hues, options.threshold)?;
+        let (background, camera) = look.finish(options.steadying);
+        let (path, stamps_s) = (path.to_owned(), Vec::new());
+        Ok(Self {
+            path,
+            options,
+            recording,
+            stream,
+            calibration,
+            area,
+            album,
+            hues,
+            slots,
+            background,
+            camera,
+            stamps_s,
+        })
     }
-    let (tracks, found) = tracker.finish();
-    for (index, hue) in hues.iter().enumerate() {
-        let seen = found.iter().filter(|f| usize::from(f.hue) == index && f.frames > 0).count();
-        let colour = hue.colour.name.clone();
-        if seen == 0 {
-            let strongest = strongest[index];
-            let (frames, threshold) = (decoded.frames, hue.threshold);
-            return Err(Error::NoMarks { path: path.to_owned(), colour, frames, strongest, threshold });
+
+    /// What is sought.
+    pub fn hues(&self) -> &[Hue] {
+        &self.hues
+    }
+
+    /// Stamps of the frames measured so far, as they stand in the file.
+    pub fn stamps_s(&self) -> &[f64] {
+        &self.stamps_s
+    }
+
+    /// Measures every frame.
+    ///
+    /// # Errors
+    /// As [`measure`].
+    pub fn run(&mut self, progress: &dyn Progress) -> Result<Measurement> {
+        let rig = &self.options.rig;
+        let detector = Detector::new(self.hues.clone());
+        let mut tracker = Tracker::new(self.slots.clone(), rig.pivot_px);
+        progress.begin("tracking", self.stream.stated_frames);
+        let view = View {
+            orientation: self.stream.orientation,
+            size: self.stream.stored_size_px,
+            binary: self.options.binary_centroid,
+            area: &self.area,
+            background: self.background.as_ref(),
+            span_s: [rig.from_s.unwrap_or(f64::NEG_INFINITY), rig.until_s.unwrap_or(f64::INFINITY)],
+        };
+        let mut spread = DamageSpread::new(self.stream.delay_frames);
+        let (stamps_s, camera) = (&mut self.stamps_s, &mut self.camera);
+        let mut take = |frame: Outcome<Seen>| {
+            if frame.value.outside {
+                return;
+            }
+            stamps_s.push(frame.value.t_s);
+            camera.note(&frame.value);
+            tracker.push(frame_blobs(frame));
+        };
+        let decoded =
+            self.recording.decode_in_order(self.options.workers, &|f| view.look(&detector, &f), &mut |outcome| {
+                if progress.is_cancelled() {
+                    return Err(Error::Interrupted);
+                }
+                progress.advance(1);
+                spread.push(outcome?).into_iter().for_each(&mut take);
+                Ok(())
+            })?;
+        spread.finish().for_each(&mut take);
+        self.conclude(decoded, tracker)
+    }
+
+    fn conclude(&mut self, decoded: Decoded, tracker: Tracker) -> Result<Measurement> {
+        if decoded.frames == 0 {
+            return Err(Error::NoFrames { path: self.path.clone(), packets: decoded.packets });
         }
-        if seen < hue.marks {
-            return Err(Error::TooFewMarks { path: path.to_owned(), colour, found: seen, wanted: hue.marks });
+        if self.stamps_s.is_empty() {
+            let message = format!("no frame lies between --from and --until; the file holds {} frames", decoded.frames);
+            return Err(Error::Option { option: "--from".to_owned(), message });
+        }
+        let (mut tracks, found) = tracker.finish();
+        let rejected =
+            Rejected { path: &self.path, album: &self.album, hues: &self.hues, frames: self.stamps_s.len() as u64 };
+        rejected.check(&found, &tracks)?;
+        let rig = &self.options.rig;
+        let file_t_s = tracks.t_s.clone();
+        let file_timing = Timing::audit(&file_t_s, self.stream.nominal_rate_hz, self.stream.tick_s);
+        let time_scale = match (rig.true_rate_hz, file_timing.real_rate_hz) {
+            (Some(true_hz), Some(file_hz)) => file_hz / true_hz,
+            _ => 1.0,
+        };
+        tracks.scale_time(time_scale);
+        let nominal_hz = rig.true_rate_hz.or(self.stream.nominal_rate_hz);
+        let timing = Timing::audit(&tracks.t_s, nominal_hz, self.stream.tick_s * time_scale);
+        let angles = angles_from_tracks(&tracks, &self.calibration, rig.pivot_px, self.options.angle_source)?;
+        self.camera.finish(self.stamps_s.len());
+        let (stream, hues, camera) = (self.stream.clone(), self.hues.clone(), self.camera);
+        Ok(Measurement { stream, decoded, timing, hues, tracks, angles, file_t_s, time_scale, camera })
+    }
+}
+
+/// Watches for a camera that moves, in pictures spread over the recording.
+struct Lookout {
+    points_px: Vec<[f64; 2]>,
+    background: Option<Background>,
+    greatest_px: f64,
+}
+
+impl Lookout {
+    fn new(options: &Options, stream: &StreamInfo) -> Self {
+        let stored = |p: &[f64; 2]| stream.orientation.stored_point(*p, stream.stored_size_px);
+        let points_px = options.rig.reference_marks.iter().map(stored).collect();
+        Self { points_px, background: None, greatest_px: 0.0 }
+    }
+
+    fn see(&mut self, frame: &Frame<'_>) {
+        match &self.background {
+            None => self.background = Some(Background::of(&frame.picture, &self.points_px)),
+            Some(background) => {
+                if let Some(camera) = background.locate(&frame.picture) {
+                    self.greatest_px = self.greatest_px.max(camera.size_px());
+                }
+            }
         }
     }
-    let angles = angles_from_tracks(&tracks, &calibration, options.rig.pivot_px, options.angle_source)?;
-    let timing = Timing::audit(&tracks.t_s, stream.nominal_rate_hz, stream.tick_s);
-    Ok(Measurement { stream, decoded, timing, hues, tracks, angles })
+
+    fn finish(self, steadying: Steadying) -> (Option<Background>, Camera) {
+        let taken_out = match steadying {
+            Steadying::Always => true,
+            Steadying::Never => false,
+            Steadying::WhereNeeded => !self.points_px.is_empty() || self.greatest_px > CAMERA_MOVES_PX,
+        };
+        let camera = Camera { greatest_shift_px: self.greatest_px, taken_out, ..Camera::default() };
+        (self.background.filter(|_| taken_out), camera)
+    }
+}
+
+impl Camera {
+    /// Sums up what a frame shows; [`Camera::finish`] makes means of the sums.
+    fn note(&mut self, seen: &Seen) {
+        match seen.camera {
+            Some(camera) => {
+                self.greatest_shift_px = self.greatest_shift_px.max(camera.size_px());
+                self.patches += camera.patches;
+                self.sd_px += camera.sd_px.powi(2);
+            }
+            None if self.taken_out => self.lost_frames += 1,
+            None => {}
+        }
+    }
+
+    fn finish(&mut self, frames: usize) {
+        let n = frames.saturating_sub(self.lost_frames).max(1);
+        self.patches /= n;
+        self.sd_px = (self.sd_px / n as f64).sqrt();
+    }
 }
 
 /// What was seen in a frame and when; nothing is measured in a damaged one.
-fn frame_blobs(frame: Outcome<(f64, Vec<Sighting>)>) -> FrameBlobs {
-    let (t_s, seen) = frame.value;
-    FrameBlobs { t_s, damaged: frame.damaged, sightings: if frame.damaged { Vec::new() } else { seen } }
+fn frame_blobs(frame: Outcome<Seen>) -> FrameBlobs {
+    let Seen { t_s, sightings, .. } = frame.value;
+    FrameBlobs { t_s, damaged: frame.damaged, sightings: if frame.damaged { Vec::new() } else { sightings } }
 }
 
 /// One hue for each distinct colour, and each mark's hue.
@@ -131,7 +322,7 @@ fn hues_of(marks: &[MarkColour]) -> (Vec<Hue>, Vec<MarkSlot>) {
     let mut slots = Vec::new();
     for colour in marks {
         let index = hues.iter().position(|h| h.colour.rgb == colour.rgb).unwrap_or_else(|| {
-            hues.push(Hue { colour: colour.clone(), marks: 0, threshold: detect::LEAST_COMPONENT, thin: false });
+            hues.push(Hue { colour: colour.clone(), ..Hue::default() });
             hues.len() - 1
         });
         hues[index].marks += 1;
@@ -140,36 +331,42 @@ fn hues_of(marks: &[MarkColour]) -> (Vec<Hue>, Vec<MarkSlot>) {
     (hues, slots)
 }
 
-/// Looks at pictures spread over the recording and chooses the threshold of each hue. Returns the strongest
-/// component of each as well.
-fn calibrate_thresholds(recording: &Recording, mut hues: Vec<Hue>, fixed: Option<f64>) -> Result<(Vec<Hue>, Vec<f64>)> {
-    let colours: Vec<MarkColour> = hues.iter().map(|h| h.colour.clone()).collect();
-    let mut calibration = detect::Calibration::new(hues.len());
-    recording.sample(SAMPLE_PICTURES, &mut |frame| calibration.see(&frame.picture, &colours))?;
-    let strongest = (0..hues.len()).map(|i| calibration.strongest(i)).collect();
-    for (index, hue) in hues.iter_mut().enumerate() {
-        let chosen = calibration.threshold(index, hue.marks);
-        if let Some((threshold, thin)) = chosen {
-            (hue.threshold, hue.thin) = (threshold, thin);
-        }
-        hue.threshold = fixed.unwrap_or(hue.threshold);
-    }
-    Ok((hues, strongest))
+/// One frame, looked at.
+struct Seen {
+    t_s: f64,
+    /// Before --from or after --until.
+    outside: bool,
+    sightings: Vec<Sighting>,
+    camera: Option<CameraShift>,
 }
 
 /// From stored to displayed pixels.
-struct View {
+struct View<'a> {
     orientation: Orientation,
     size: (usize, usize),
     binary: bool,
+    area: &'a Area,
+    background: Option<&'a Background>,
+    span_s: [f64; 2],
 }
 
-impl View {
-    /// Time stamp and blobs of a frame, as displayed.
-    fn sightings(&self, detector: &Detector, frame: &Frame<'_>) -> Result<Outcome<(f64, Vec<Sighting>)>> {
-        let blobs = if frame.damaged { Vec::new() } else { detector.detect(&frame.picture)? };
-        let sightings = blobs.iter().map(|b| self.sighting(b)).collect();
-        Ok(Outcome { key: frame.key, damaged: frame.damaged, value: (frame.t_s, sightings) })
+impl View<'_> {
+    /// Time stamp and blobs of a frame, as displayed, the camera's motion taken out.
+    fn look(&self, detector: &Detector, frame: &Frame<'_>) -> Result<Outcome<Seen>> {
+        let outside = !(self.span_s[0]..=self.span_s[1]).contains(&frame.t_s);
+        let mut seen = Seen { t_s: frame.t_s, outside, sightings: Vec::new(), camera: None };
+        if !frame.damaged && !outside {
+            seen.camera = self.background.and_then(|b| b.locate(&frame.picture));
+            if self.background.is_none() || seen.camera.is_some() {
+                let mut blobs = detector.detect(&frame.picture)?;
+                if let Some(camera) = seen.camera {
+                    blobs.iter_mut().for_each(|b| undo(b, &camera));
+                }
+                let sightings = blobs.iter().map(|b| self.sighting(b));
+                seen.sightings = sightings.filter(|s| self.area.holds(s.measured.position_px)).collect();
+            }
+        }
+        Ok(Outcome { key: frame.key, damaged: frame.damaged, value: seen })
     }
 
     fn sighting(&self, blob: &Blob) -> Sighting {
@@ -190,4 +387,13 @@ impl View {
             cut: c.cut,
         }
     }
+}
+
+/// Puts a blob where it would be had the camera not moved.
+fn undo(blob: &mut Blob, camera: &CameraShift) {
+    [blob.centroid.x_px, blob.centroid.y_px] = camera.undo([blob.centroid.x_px, blob.centroid.y_px]);
+    blob.binary_px = camera.undo(blob.binary_px);
+    let variance = camera.sd_px.powi(2);
+    blob.centroid.variance_px2[0] += variance;
+    blob.centroid.variance_px2[1] += variance;
 }

@@ -6,6 +6,7 @@ use serde::Serialize;
 use sha2::{Digest, Sha256};
 
 use crate::angles::AngleSource;
+use crate::caution::cautions;
 use crate::error::{Error, Result};
 use crate::measure::{Measurement, Options};
 use crate::track::Point;
@@ -25,6 +26,7 @@ pub struct Sidecar {
     marks: Vec<Mark>,
     angles: Vec<Link>,
     damage: Damage,
+    camera: CameraMotion,
     /// Everything that a person should know.
     pub warnings: Vec<String>,
 }
@@ -48,6 +50,14 @@ struct Settings {
     angles_from: &'static str,
     centroid: &'static str,
     threshold: Vec<Threshold>,
+    roi_px: Option<[f64; 4]>,
+    mask: Option<String>,
+    from_s: Option<f64>,
+    until_s: Option<f64>,
+    /// Frames a second at which the camera ran; the stamps in the table are the file's times `time_scale`.
+    true_rate_hz: Option<f64>,
+    time_scale: f64,
+    reference_marks: Vec<[f64; 2]>,
 }
 
 #[derive(Debug, Serialize)]
@@ -55,6 +65,10 @@ struct Threshold {
     colour: String,
     of_255: f64,
     chosen: bool,
+    /// The hue as the recording shows it, from C_b towards C_r.
+    hue_deg: Option<f64>,
+    /// Scale at which it was looked for: 2^level chroma samples.
+    level: u32,
 }
 
 #[derive(Debug, Serialize)]
@@ -90,6 +104,15 @@ struct Link {
     frames_measured: usize,
     /// Median stated standard deviation, the noise estimate.
     noise_rad: f64,
+}
+
+#[derive(Debug, Serialize)]
+struct CameraMotion {
+    greatest_shift_px: f64,
+    taken_out: bool,
+    patches: usize,
+    sd_px: f64,
+    frames_lost: usize,
 }
 
 #[derive(Debug, Serialize)]
@@ -137,9 +160,17 @@ impl Sidecar {
                 frames_without_time_stamp: m.decoded.unstamped_frames,
                 read_error: m.decoded.read_error.clone(),
             },
+            camera: CameraMotion {
+                greatest_shift_px: m.camera.greatest_shift_px,
+                taken_out: m.camera.taken_out,
+                patches: m.camera.patches,
+                sd_px: m.camera.sd_px,
+                frames_lost: m.camera.lost_frames,
+            },
             warnings: Vec::new(),
         };
         sidecar.warnings = sidecar.find_warnings(m);
+        sidecar.warnings.extend(cautions(m, options));
         Ok(sidecar)
     }
 
@@ -252,8 +283,17 @@ impl Settings {
                     colour: h.colour.name.clone(),
                     of_255: h.threshold,
                     chosen: options.threshold.is_none(),
+                    hue_deg: h.angle_rad.map(f64::to_degrees),
+                    level: h.level,
                 })
                 .collect(),
+            roi_px: options.rig.roi_px,
+            mask: options.rig.mask.as_ref().map(|p| p.display().to_string()),
+            from_s: options.rig.from_s,
+            until_s: options.rig.until_s,
+            true_rate_hz: options.rig.true_rate_hz,
+            time_scale: m.time_scale,
+            reference_marks: options.rig.reference_marks.clone(),
         }
     }
 }

@@ -6,10 +6,11 @@ use clap::{Args, ValueEnum};
 
 use super::Bar;
 use crate::angles::{self, AngleSource};
+use crate::caution::slow_motion;
 use crate::detect::debug::DebugFolder;
 use crate::error::{Error, Result};
 use crate::experiment::{Experiment, MarkColour};
-use crate::measure::{Measurement, Options, measure};
+use crate::measure::{Measurement, Options, Session, Steadying};
 use crate::output::OutputFile;
 use crate::overlay::{self, Overlay};
 use crate::sidecar::Sidecar;
@@ -56,6 +57,28 @@ pub struct TrackArgs {
     /// The camera looks into a mirror.
     #[arg(long)]
     mirrored: bool,
+    /// Seek marks only in this part of the picture: left, top, width, height, displayed pixels.
+    #[arg(long, value_name = "X,Y,W,H", value_parser = rectangle)]
+    roi: Option<[f64; 4]>,
+    /// Seek marks only where this picture, as large as the recording's, is white.
+    #[arg(long, value_name = "PNG")]
+    mask: Option<PathBuf>,
+    /// Leave out what comes before, seconds of the file.
+    #[arg(long, value_name = "S")]
+    from: Option<f64>,
+    /// Leave out what comes after, seconds of the file.
+    #[arg(long, value_name = "S")]
+    until: Option<f64>,
+    /// Frames a second at which the camera ran, where the file plays slower (slow motion).
+    #[arg(long, value_name = "HZ")]
+    true_rate: Option<f64>,
+    /// A fixed point with clear edges, displayed pixels, against which the camera's own motion is taken out; may be
+    /// given several times. The standing background is used otherwise.
+    #[arg(long, value_name = "X,Y", value_parser = point)]
+    reference: Vec<[f64; 2]>,
+    /// Take out the camera's own motion.
+    #[arg(long, value_name = "WHEN", default_value = "needed")]
+    steady: Steady,
     /// Least colour component of a mark, 0 to 255; chosen from the recording otherwise.
     #[arg(long, value_name = "0..255")]
     threshold: Option<f64>,
@@ -95,6 +118,24 @@ enum CentroidKind {
     Binary,
 }
 
+#[derive(Debug, Clone, Copy, ValueEnum)]
+enum Steady {
+    /// Where the pictures show that the camera moves.
+    Needed,
+    /// In any case.
+    Always,
+    /// The camera's motion stays in the positions.
+    Never,
+}
+
+fn rectangle(text: &str) -> std::result::Result<[f64; 4], String> {
+    let numbers: Vec<f64> = text.split(',').filter_map(|n| n.trim().parse().ok()).collect();
+    match numbers[..] {
+        [x, y, width, height] if numbers.iter().all(|v| v.is_finite()) => Ok([x, y, width, height]),
+        _ => Err("give four numbers as X,Y,W,H".to_owned()),
+    }
+}
+
 fn point(text: &str) -> std::result::Result<[f64; 2], String> {
     let numbers: Vec<f64> = text.split(',').filter_map(|n| n.trim().parse().ok()).collect();
     match numbers[..] {
@@ -109,9 +150,9 @@ impl TrackArgs {
     /// # Errors
     /// Whatever [`measure`] and the outputs report.
     pub fn run(&self) -> Result<()> {
-        let experiment = self.config.as_deref().map(Experiment::read).transpose()?.unwrap_or_default();
+        let experiment = self.config.as_deref().map(Experiment::read_rig).transpose()?.unwrap_or_default();
         let folder = self.config.as_deref().and_then(Path::parent).unwrap_or(Path::new("")).to_owned();
-        let options = self.options(experiment)?;
+        let options = self.options(experiment.clone())?;
         self.keep_inputs()?;
         // before the first temporary file, so that Ctrl-C leaves none behind
         let bar = Bar::new(self.quiet);
@@ -119,18 +160,25 @@ impl TrackArgs {
         let mut beside = self.sidecar_path().map(|path| OutputFile::create(&path)).transpose()?;
         self.overlay.as_deref().map(overlay::check_target).transpose()?;
         let debug = self.debug_frames.as_deref().map(DebugFolder::create).transpose()?;
-        let measurement = measure(&self.video, &options, &folder, &bar)?;
-        let sidecar = Sidecar::new(&self.video, &options, &measurement)?;
+        let mut session = Session::open(&self.video, &options, &folder)?;
+        let outcome = session.run(&bar);
+        // what was seen is wanted most where nothing came of it
+        if let Some(debug) = debug.filter(|_| !matches!(outcome, Err(Error::Interrupted))) {
+            let recording = Recording::open(&self.video, &options.still_times)?;
+            debug.show(&recording, session.hues(), session.stamps_s(), self.debug_count, &bar)?;
+        }
+        let measurement = outcome?;
+        let mut sidecar = Sidecar::new(&self.video, &options, &measurement)?;
+        sidecar.warnings.extend(slow_motion(&measurement, &experiment));
         if let Some(target) = &self.overlay {
             let Measurement { tracks, angles, timing, .. } = &measurement;
-            let rate_hz = timing.real_rate_hz.or(timing.nominal_rate_hz);
-            let overlay = Overlay { tracks, angles, pivot_px: options.rig.pivot_px, rate_hz };
+            // the pictures carry the file's stamps
+            let mut tracks = tracks.clone();
+            tracks.t_s.clone_from(&measurement.file_t_s);
+            let rate_hz = timing.real_rate_hz.or(timing.nominal_rate_hz).map(|r| r * measurement.time_scale);
+            let overlay = Overlay { tracks: &tracks, angles, pivot_px: options.rig.pivot_px, rate_hz };
             let recording = Recording::open(&self.video, &options.still_times)?;
             overlay.write(recording, target, options.workers, &bar)?;
-        }
-        if let Some(debug) = debug {
-            let recording = Recording::open(&self.video, &options.still_times)?;
-            debug.show(&recording, &measurement.hues, &measurement.tracks.t_s, self.debug_count, &bar)?;
         }
         drop(bar);
         if let Some(beside) = &mut beside {
@@ -149,6 +197,15 @@ impl TrackArgs {
         let mut rig = experiment.rig;
         rig.mirrored |= self.mirrored;
         rig.pivot_px = self.pivot.or(rig.pivot_px);
+        rig.roi_px = self.roi.or(rig.roi_px);
+        rig.mask = self.mask_path()?.or(rig.mask);
+        rig.from_s = self.from.or(rig.from_s);
+        rig.until_s = self.until.or(rig.until_s);
+        rig.true_rate_hz = self.true_rate.or(rig.true_rate_hz);
+        if !self.reference.is_empty() {
+            rig.reference_marks.clone_from(&self.reference);
+        }
+        rig.validate().map_err(|message| option("options", &message))?;
         let threshold = self.threshold;
         if threshold.is_some_and(|t| !(t > 0.0 && t < 255.0)) {
             return Err(option("--threshold", "must lie between 0 and 255"));
@@ -164,6 +221,11 @@ impl TrackArgs {
             angle_source: match self.angles_from {
                 AnglesFrom::Measured => AngleSource::Measured,
                 AnglesFrom::Smoothed => AngleSource::Smoothed,
+            },
+            steadying: match self.steady {
+                Steady::Needed => Steadying::WhereNeeded,
+                Steady::Always => Steadying::Always,
+                Steady::Never => Steadying::Never,
             },
             binary_centroid: self.centroid == CentroidKind::Binary,
             still_times: match (&self.times, self.rate) {
@@ -187,11 +249,16 @@ impl TrackArgs {
         if let Some(wanted) = self.markers.filter(|wanted| *wanted != count) {
             return Err(option("--markers", &format!("{wanted} marks asked for, {count} colours given")));
         }
-        let (least, help) = if pivot { (1, " below the pivot") } else { (2, " or a --pivot") };
-        if !(least..=12).contains(&count) {
-            return Err(option("--markers", &format!("an angle needs {least} to 12 marks{help}")));
+        if !(1..=12).contains(&count) {
+            return Err(option("--markers", "1 to 12 marks can be followed"));
         }
         Ok(colour.map_or_else(|| given.to_vec(), |one| vec![one; count]))
+    }
+
+    /// The mask where the user stands, not where the experiment file is.
+    fn mask_path(&self) -> Result<Option<PathBuf>> {
+        let absolute = |p: &PathBuf| std::path::absolute(p).map_err(|e| Error::unreadable(p, e));
+        self.mask.as_ref().map(absolute).transpose()
     }
 
     /// No output may take the place of an input, nor one output that of the other.

@@ -7,8 +7,10 @@
 //! ```text
 //! component = u·C_b + v·C_r − |u·C_r − v·C_b|,   (u, v) the unit vector of the mark's hue
 //! ```
+//! A mark without a hue is dark or light; its component is −Y′ or Y′, and only means something against what lies
+//! around it (see [`super::plane`]).
 
-use crate::experiment::MarkColour;
+use crate::experiment::{Look, MarkColour};
 use crate::video::{Matrix, Picture};
 
 /// Fixed-point ones in [`HueAxis`].
@@ -22,33 +24,57 @@ pub(super) const BLOCK: usize = 32;
 pub struct HueAxis {
     u: i16,
     v: i16,
+    /// ±64ths of luma for a mark without a hue, else 0.
+    luma: i16,
 }
 
 impl HueAxis {
     /// The hue of `colour` as `matrix` codes it.
     pub fn new(colour: &MarkColour, matrix: Matrix) -> Self {
-        let [_, cb, cr] = matrix.ycbcr(colour.rgb.map(|c| f64::from(c) / 255.0));
-        let norm = cb.hypot(cr).max(1e-9);
-        Self { u: (ONE * cb / norm).round() as i16, v: (ONE * cr / norm).round() as i16 }
+        match colour.look() {
+            Look::Dark => Self { u: 0, v: 0, luma: -(ONE as i16) },
+            Look::Light => Self { u: 0, v: 0, luma: ONE as i16 },
+            Look::Hue => Self::at_angle(hue_angle_rad(colour, matrix)),
+        }
     }
 
-    /// The unit vector (C_b, C_r).
+    /// The hue at an angle from C_b towards C_r.
+    pub fn at_angle(angle_rad: f64) -> Self {
+        let (sin, cos) = angle_rad.sin_cos();
+        Self { u: (ONE * cos).round() as i16, v: (ONE * sin).round() as i16, luma: 0 }
+    }
+
+    /// The mark is dark or light and has no hue.
+    pub fn is_luma(self) -> bool {
+        self.luma != 0
+    }
+
+    /// The unit vector (C_b, C_r); (0, 0) for a mark without a hue.
     pub fn unit(self) -> (f64, f64) {
         let (u, v) = (f64::from(self.u), f64::from(self.v));
-        let norm = u.hypot(v);
+        let norm = u.hypot(v).max(1.0);
         (u / norm, v / norm)
     }
 
     /// The component of 8-bit codes, in 64ths of a code.
     #[inline]
-    fn of(self, cb: u8, cr: u8) -> i16 {
+    pub(super) fn of(self, cb: u8, cr: u8) -> i16 {
         let (b, r) = (i16::from(cb) - 128, i16::from(cr) - 128);
         (self.u * b + self.v * r) - (self.u * r - self.v * b).abs()
+    }
+
+    /// The component of a luma code, for a mark without a hue.
+    #[inline]
+    pub(super) fn of_luma(self, luma: u8) -> i16 {
+        self.luma * (i16::from(luma) - 128)
     }
 
     /// The component at chroma sample (x, y), in 64ths of an 8-bit code.
     #[inline]
     pub fn at(self, picture: &Picture<'_>, x: usize, y: usize) -> i16 {
+        if self.is_luma() {
+            return self.of_luma(luma_at(picture, x, y));
+        }
         let wide = picture.wide();
         let down = picture.layout.low_bits + picture.layout.bits - 8;
         let code = |p: &crate::video::Plane<'_>| (p.code(wide, x, y) >> down) as u8;
@@ -57,7 +83,7 @@ impl HueAxis {
 
     /// The components of chroma row `y` in `columns`, added to `row`.
     pub(super) fn row(self, picture: &Picture<'_>, y: usize, columns: std::ops::Range<usize>, row: &mut Vec<i16>) {
-        if picture.wide() || picture.cb.step != 1 {
+        if self.is_luma() || picture.wide() || picture.cb.step != 1 {
             row.extend(columns.map(|x| self.at(picture, x, y)));
             return;
         }
@@ -69,7 +95,7 @@ impl HueAxis {
     /// Largest component in each run of [`BLOCK`] samples of chroma row `y`.
     pub(super) fn block_maxima(self, picture: &Picture<'_>, y: usize, maxima: &mut [i16]) {
         let (width, _) = picture.layout.chroma_size();
-        if picture.wide() || picture.cb.step != 1 {
+        if self.is_luma() || picture.wide() || picture.cb.step != 1 {
             for (block, max) in maxima.iter_mut().enumerate() {
                 let columns = block * BLOCK..((block + 1) * BLOCK).min(width);
                 *max = columns.map(|x| self.at(picture, x, y)).max().unwrap_or(i16::MIN);
@@ -83,6 +109,27 @@ impl HueAxis {
             *max = cb.iter().zip(cr).fold(i16::MIN, |m, (b, r)| m.max(self.of(*b, *r)));
         }
     }
+}
+
+/// Mean luma of the pixels at chroma sample (x, y), 8-bit code.
+pub(super) fn luma_at(picture: &Picture<'_>, x: usize, y: usize) -> u8 {
+    let layout = &picture.layout;
+    let (sx, sy) = (layout.chroma_shift_x, layout.chroma_shift_y);
+    let down = layout.low_bits + layout.bits - 8;
+    let (mut sum, mut count) = (0u32, 0u32);
+    for j in (y << sy)..(((y + 1) << sy).min(layout.height_px)) {
+        for i in (x << sx)..(((x + 1) << sx).min(layout.width_px)) {
+            sum += u32::from(picture.luma.code(picture.wide(), i, j) >> down);
+            count += 1;
+        }
+    }
+    (sum / count.max(1)) as u8
+}
+
+/// The angle of a colour's hue, from C_b towards C_r.
+pub(super) fn hue_angle_rad(colour: &MarkColour, matrix: Matrix) -> f64 {
+    let [_, cb, cr] = matrix.ycbcr(colour.rgb.map(|c| f64::from(c) / 255.0));
+    cr.atan2(cb)
 }
 
 /// Codes (in 64ths) → the scale on which a fully saturated colour counts about 255.

@@ -16,8 +16,10 @@ use image::{DynamicImage, GrayImage, ImageFormat, Luma, Rgb, RgbImage};
 use opencv::core::{Mat, Point, Scalar, Vec3b};
 use opencv::imgproc;
 
-use super::blobs::{self, Mask, Target};
+use super::blobs::{self, Target};
 use super::component::to_255;
+use super::mask::Mask;
+use super::plane::Plane;
 use super::{Blob, Detector, Hue};
 use crate::error::{Error, Result};
 use crate::output::OutputFile;
@@ -50,7 +52,7 @@ impl Steps {
         let blobs = detector.detect(picture)?;
         let rgb = View { picture, orientation }.rgb();
         let mut steps = Self {
-            component: View { picture, orientation }.component(&targets),
+            component: View { picture, orientation }.component(&targets)?,
             binary: View { picture, orientation }.binary(&targets)?,
             marks: rgb.clone(),
             picture: rgb,
@@ -178,24 +180,39 @@ impl View<'_> {
         })
     }
 
-    fn component(self, targets: &[Target]) -> GrayImage {
+    fn component(self, targets: &[Target]) -> Result<GrayImage> {
+        let planes = targets.iter().map(|t| Plane::of(self.picture, t.axis, t.level)).collect::<Result<Vec<_>>>()?;
         let (width, height) = self.size();
-        GrayImage::from_fn(width, height, |x, y| {
+        Ok(GrayImage::from_fn(width, height, |x, y| {
             let [cx, cy] = self.chroma(x, y);
-            let strongest = targets.iter().map(|t| t.axis.at(self.picture, cx, cy)).max().unwrap_or(0);
+            let at = |p: &Plane| {
+                let (i, j) = ((cx >> p.level).min(p.width - 1), (cy >> p.level).min(p.height - 1));
+                p.values[j * p.width + i]
+            };
+            let strongest = planes.iter().map(at).max().unwrap_or(0);
             Luma([to_255(f64::from(strongest)).round().clamp(0.0, 255.0) as u8])
-        })
+        }))
     }
 
     fn binary(self, targets: &[Target]) -> Result<GrayImage> {
         let (columns, rows) = self.picture.layout.chroma_size();
         let mut samples = vec![0u8; columns * rows];
-        for target in targets {
+        for target in targets.iter().filter(|t| !t.is_sought_everywhere()) {
             for region in blobs::regions(self.picture, target.axis, target.threshold) {
                 let mask = Mask::of(self.picture, target.axis, target.threshold, target.thin, region);
                 for (y, row) in mask.rows() {
                     let to = &mut samples[y * columns + mask.left()..][..row.len()];
                     to.iter_mut().zip(row).for_each(|(t, m)| *t |= *m);
+                }
+            }
+        }
+        for target in targets.iter().filter(|t| t.is_sought_everywhere()) {
+            let plane = Plane::of(self.picture, target.axis, target.level)?;
+            let mask = Mask::of_plane(&plane, target.threshold, target.thin);
+            for (y, row) in mask.rows() {
+                for j in (y << target.level)..((y + 1) << target.level).min(rows) {
+                    let to = &mut samples[j * columns..(j + 1) * columns];
+                    to.iter_mut().enumerate().for_each(|(i, t)| *t |= row[(i >> target.level).min(row.len() - 1)]);
                 }
             }
         }

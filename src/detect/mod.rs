@@ -2,14 +2,21 @@
 //! centroid a region, each with its variance.
 
 mod blobs;
+mod calibration;
 mod centroid;
 mod component;
 pub mod debug;
+mod mask;
 mod morphology;
+mod plane;
+mod samples;
 mod threshold;
 
 pub use blobs::Blob;
+pub use calibration::{Spot, Trial};
 pub use centroid::Centroid;
+pub use mask::Part;
+pub use samples::{Album, HuePeak};
 pub use threshold::LEAST_COMPONENT;
 
 use blobs::Target;
@@ -17,12 +24,12 @@ use component::{HueAxis, from_255};
 
 use crate::error::Result;
 use crate::experiment::MarkColour;
-use crate::video::Picture;
+use crate::video::{Matrix, Picture};
 
-/// One hue to look for.
+/// What marks look like, and how they are found.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Hue {
-    /// The colour.
+    /// The colour as it was asked for.
     pub colour: MarkColour,
     /// How many marks have it.
     pub marks: usize,
@@ -30,6 +37,39 @@ pub struct Hue {
     pub threshold: f64,
     /// The marks are a few samples wide, so lines are not filtered out.
     pub thin: bool,
+    /// Its hue as the recording shows it, from C_b towards C_r; that of the colour where it is not known.
+    pub angle_rad: Option<f64>,
+    /// The scale at which it is looked for: 2^level chroma samples.
+    pub level: u32,
+    /// Usual area of a mark, where it is known.
+    pub area_px2: Option<f64>,
+}
+
+impl Default for Hue {
+    fn default() -> Self {
+        Self {
+            colour: MarkColour::red(),
+            marks: 0,
+            threshold: LEAST_COMPONENT,
+            thin: false,
+            angle_rad: None,
+            level: 0,
+            area_px2: None,
+        }
+    }
+}
+
+impl Hue {
+    fn axis(&self, matrix: Matrix) -> HueAxis {
+        self.angle_rad.map_or_else(|| HueAxis::new(&self.colour, matrix), HueAxis::at_angle)
+    }
+
+    /// Takes over what a trial showed.
+    pub fn adopt(&mut self, trial: &Trial, sample_px2: f64) {
+        (self.threshold, self.thin, self.level) = (trial.threshold, trial.thin, trial.level);
+        self.angle_rad = trial.angle_rad;
+        self.area_px2 = trial.usual_samples().map(|n| n * sample_px2 * f64::from(1u32 << (2 * trial.level)));
+    }
 }
 
 /// Finds marks in pictures.
@@ -40,7 +80,7 @@ pub struct Detector {
 }
 
 /// Smallest mark that is looked for.
-pub const LEAST_AREA_PX2: f64 = 20.0;
+pub const LEAST_AREA_PX2: f64 = 12.0;
 
 impl Detector {
     /// A detector for `hues`.
@@ -66,59 +106,29 @@ impl Detector {
     }
 
     fn target(&self, index: usize, hue: &Hue, picture: &Picture<'_>) -> Target {
+        let axis = hue.axis(picture.layout.matrix);
+        let samples = |area_px2: f64| least_samples(picture, area_px2) >> (2 * hue.level);
+        // a mark that is partly hidden is smaller, one that is blurred or merged with another larger
+        let [smaller, larger] = if axis.is_luma() { ROUND_SPOT } else { COLOURED_SPOT };
+        let least = hue.area_px2.map_or(0.0, |a| a / smaller).max(self.least_area_px2);
         Target {
             hue: index as u8,
-            axis: HueAxis::new(&hue.colour, picture.layout.matrix),
+            axis,
             threshold: from_255(hue.threshold),
             thin: hue.thin,
-            least_samples: least_samples(picture, self.least_area_px2) as u32,
+            level: hue.level,
+            samples: [samples(least).max(3), hue.area_px2.map_or(usize::MAX, |a| samples(larger * a))],
         }
     }
 }
 
-/// Thresholds chosen from pictures of the recording.
-#[derive(Debug, Clone, Default)]
-pub struct Calibration {
-    /// For each hue, for each picture: summits without thin lines, and with them.
-    summits: Vec<[Vec<Vec<threshold::Summit>>; 2]>,
-}
-
-impl Calibration {
-    /// For `hues` hues.
-    pub fn new(hues: usize) -> Self {
-        Self { summits: vec![[Vec::new(), Vec::new()]; hues] }
-    }
-
-    /// Learns from a picture.
-    pub fn see(&mut self, picture: &Picture<'_>, colours: &[MarkColour]) {
-        let least = least_samples(picture, LEAST_AREA_PX2);
-        for (seen, colour) in self.summits.iter_mut().zip(colours) {
-            let mut relief = threshold::Relief::new(picture, HueAxis::new(colour, picture.layout.matrix));
-            seen[1].push(relief.summits(least));
-            relief.open();
-            seen[0].push(relief.summits(least));
-        }
-    }
-
-    /// The threshold of hue `index` with `marks` marks, on the scale to 255, and whether the marks are thin; `None`
-    /// where nothing has that hue.
-    pub fn threshold(&self, index: usize, marks: usize) -> Option<(f64, bool)> {
-        let [opened, raw] = self.summits.get(index)?;
-        match threshold::choose(opened, marks) {
-            Some(threshold) => Some((threshold, false)),
-            None => threshold::choose(raw, marks).map(|t| (t, true)),
-        }
-    }
-
-    /// The strongest component of hue `index` in any picture, on the scale to 255.
-    pub fn strongest(&self, index: usize) -> f64 {
-        let raw = self.summits.get(index).map(|s| &s[1]);
-        raw.into_iter().flatten().flatten().map(|s| s.top).fold(0.0, f64::max)
-    }
-}
+/// Factors by which a spot may be smaller and larger than a mark: one that is told by its shape alone,
+const ROUND_SPOT: [f64; 2] = [4.0, 4.0];
+/// and one that is told by its hue.
+const COLOURED_SPOT: [f64; 2] = [30.0, 30.0];
 
 /// Chroma samples of an area in luma pixels.
 fn least_samples(picture: &Picture<'_>, area_px2: f64) -> usize {
     let sample = f64::from(1u32 << (picture.layout.chroma_shift_x + picture.layout.chroma_shift_y));
-    ((area_px2 / sample) as usize).max(4)
+    ((area_px2 / sample) as usize).max(3)
 }

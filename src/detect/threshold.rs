@@ -4,12 +4,16 @@
 //! difference is its persistence. The marks are the most persistent summits, and the threshold lies between the
 //! saddle and the summit of the weakest of them, so an amber film or a bright background shifts it where it must be.
 
-use super::component::{HueAxis, from_255, to_255};
+use super::component::{from_255, to_255};
 use super::morphology::{dilate, erode};
-use crate::video::Picture;
+use super::plane::Plane;
 
 /// Below this, on the scale to 255, nothing is taken for a mark: the chroma noise of cameras and codecs.
 pub const LEAST_COMPONENT: f64 = 16.0;
+/// The same for a mark without a hue: a twelfth of the range of luma, for every wall has shadows.
+pub const LEAST_CONTRAST: f64 = 40.0;
+/// Share of a summit's samples that move where the summit does.
+const MOVING_SHARE: f64 = 0.04;
 /// Where between saddle (0) and summit (1) the threshold lies; a blurred mark keeps more than this of its summit.
 const POSITION: f64 = 0.4;
 /// Share of the greatest persistence below which a summit is a ripple.
@@ -22,8 +26,10 @@ pub struct Summit {
     pub top: f64,
     /// Component at which it joins a higher summit or the background.
     pub saddle: f64,
-    /// Chroma samples above the saddle.
+    /// Samples above the saddle.
     pub samples: usize,
+    /// Those of them that move.
+    pub moved: usize,
 }
 
 impl Summit {
@@ -31,24 +37,28 @@ impl Summit {
         self.top - self.saddle
     }
 
+    /// Something in it moves.
+    pub fn moves(&self) -> bool {
+        self.moved >= 2 && self.moved as f64 >= MOVING_SHARE * self.samples as f64
+    }
+
     fn threshold(&self) -> f64 {
         self.saddle + POSITION * self.persistence()
     }
 }
 
-/// The colour component as a landscape over the chroma samples.
-pub struct Relief {
+/// The component as a landscape over the samples.
+pub struct Relief<'a> {
     width: usize,
     heights: Vec<i16>,
+    /// Where something moves, as far as that is known.
+    moved: Option<&'a [bool]>,
 }
 
-impl Relief {
-    /// Of a picture.
-    pub fn new(picture: &Picture<'_>, axis: HueAxis) -> Self {
-        let (width, height) = picture.layout.chroma_size();
-        let mut heights = Vec::with_capacity(width * height);
-        (0..height).for_each(|y| axis.row(picture, y, 0..width, &mut heights));
-        Self { width, heights }
+impl<'a> Relief<'a> {
+    /// Of a picture's component.
+    pub fn new(plane: &Plane, moved: Option<&'a [bool]>) -> Self {
+        Self { width: plane.width, heights: plane.values.clone(), moved }
     }
 
     /// Grey opening over 3×3 samples: ridges of up to two samples, such as burnt-in lines, are worn away.
@@ -57,17 +67,17 @@ impl Relief {
         dilate(&mut self.heights, self.width, 1);
     }
 
-    /// The summits with at least `least_samples` samples, most persistent first.
-    pub fn summits(&self, least_samples: usize) -> Vec<Summit> {
+    /// The summits above `floor` (0 to 255) with at least `least_samples` samples, most persistent first.
+    pub fn summits(&self, least_samples: usize, floor: f64) -> Vec<Summit> {
         let (width, height) = (self.width, self.heights.len() / self.width);
-        let floor = from_255(LEAST_COMPONENT);
+        let floor = from_255(floor);
         let mut order: Vec<(i16, u32)> =
             self.heights.iter().enumerate().filter(|(_, h)| **h > floor).map(|(i, h)| (*h, i as u32)).collect();
         order.sort_unstable_by(|a, b| b.cmp(a));
         let mut forest = Forest::new(width * height);
         let mut found = Vec::new();
         for &(level, at) in &order {
-            forest.add(at, level);
+            forest.add(at, level, self.moved.is_some_and(|m| m[at as usize]));
             let (x, y) = (at as usize % width, at as usize / width);
             let neighbours = [
                 (x > 0).then(|| at - 1),
@@ -76,19 +86,20 @@ impl Relief {
                 (y + 1 < height).then(|| at + width as u32),
             ];
             for neighbour in neighbours.into_iter().flatten() {
-                if let Some((top, samples)) = forest.join(at, neighbour) {
-                    found.push((top, level, samples));
+                if let Some(tree) = forest.join(at, neighbour) {
+                    found.push((tree, level));
                 }
             }
         }
-        found.extend(forest.survivors().map(|(top, samples)| (top, floor, samples)));
+        found.extend(forest.survivors().map(|tree| (tree, floor)));
         let mut summits: Vec<Summit> = found
             .into_iter()
-            .filter(|(_, _, samples)| *samples >= least_samples)
-            .map(|(top, saddle, samples)| Summit {
-                top: to_255(f64::from(top)),
+            .filter(|(tree, _)| tree.samples >= least_samples)
+            .map(|(tree, saddle)| Summit {
+                top: to_255(f64::from(tree.top)),
                 saddle: to_255(f64::from(saddle)),
-                samples,
+                samples: tree.samples,
+                moved: tree.moved,
             })
             .collect();
         summits.sort_by(|a, b| b.persistence().total_cmp(&a.persistence()));
@@ -105,20 +116,28 @@ fn clear_ones(summits: &[Summit]) -> &[Summit] {
 
 /// The threshold, on the scale to 255, for `marks` marks of this hue seen in several pictures; `None` where no
 /// picture shows one.
-pub fn choose(pictures: &[Vec<Summit>], marks: usize) -> Option<f64> {
+pub fn choose(pictures: &[Vec<Summit>], marks: usize, floor: f64) -> Option<f64> {
     let clear: Vec<&[Summit]> = pictures.iter().map(|summits| clear_ones(summits)).collect();
     let full: Vec<f64> = clear.iter().filter_map(|s| s.get(marks.max(1) - 1)).map(Summit::threshold).collect();
     let any: Vec<f64> = clear.iter().filter_map(|s| s.last()).map(Summit::threshold).collect();
     let mut thresholds = if full.is_empty() { any } else { full };
     thresholds.sort_by(f64::total_cmp);
     // the lower quartile: a mark seen once through blur or shade should still be found
-    thresholds.get(thresholds.len().checked_sub(1)? / 4).map(|t| t.max(LEAST_COMPONENT))
+    thresholds.get(thresholds.len().checked_sub(1)? / 4).map(|t| t.max(floor))
 }
 
 /// Union–find over samples, each tree knowing its summit.
 struct Forest {
     parent: Vec<u32>,
-    trees: std::collections::HashMap<u32, (i16, usize)>,
+    trees: std::collections::HashMap<u32, Tree>,
+}
+
+/// One summit while its region grows.
+#[derive(Clone, Copy)]
+struct Tree {
+    top: i16,
+    samples: usize,
+    moved: usize,
 }
 
 const ABSENT: u32 = u32::MAX;
@@ -128,9 +147,9 @@ impl Forest {
         Self { parent: vec![ABSENT; samples], trees: std::collections::HashMap::new() }
     }
 
-    fn add(&mut self, at: u32, level: i16) {
+    fn add(&mut self, at: u32, top: i16, moved: bool) {
         self.parent[at as usize] = at;
-        self.trees.insert(at, (level, 1));
+        self.trees.insert(at, Tree { top, samples: 1, moved: usize::from(moved) });
     }
 
     fn root(&mut self, mut at: u32) -> u32 {
@@ -142,8 +161,8 @@ impl Forest {
         at
     }
 
-    /// Joins two trees; returns summit and size of the lower one, which ends here.
-    fn join(&mut self, a: u32, b: u32) -> Option<(i16, usize)> {
+    /// Joins two trees; returns the lower one, which ends here.
+    fn join(&mut self, a: u32, b: u32) -> Option<Tree> {
         if self.parent[b as usize] == ABSENT {
             return None;
         }
@@ -152,16 +171,17 @@ impl Forest {
             return None;
         }
         let (ta, tb) = (*self.trees.get(&ra)?, *self.trees.get(&rb)?);
-        let (high, low) = if ta.0 >= tb.0 { (ra, rb) } else { (rb, ra) };
+        let (high, low) = if ta.top >= tb.top { (ra, rb) } else { (rb, ra) };
         let ended = self.trees.remove(&low)?;
         self.parent[low as usize] = high;
         if let Some(tree) = self.trees.get_mut(&high) {
-            tree.1 += ended.1;
+            tree.samples += ended.samples;
+            tree.moved += ended.moved;
         }
         Some(ended)
     }
 
-    fn survivors(&self) -> impl Iterator<Item = (i16, usize)> + '_ {
+    fn survivors(&self) -> impl Iterator<Item = Tree> + '_ {
         self.trees.values().copied()
     }
 }

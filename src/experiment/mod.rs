@@ -6,6 +6,7 @@ mod model;
 mod render;
 mod rig;
 mod specimen;
+mod unmeasured;
 
 use std::path::Path;
 
@@ -13,7 +14,7 @@ use serde::Deserialize;
 
 pub use model::{Effects, Hysteresis, Model, SupportMotion};
 pub use render::{Caption, Codec, CodecName, Distractor, Lens, Noise, Occlusion, PixelFormat, Render, Rgb, Siting};
-pub use rig::{MarkColour, Rig};
+pub use rig::{Look, MarkColour, Rig};
 pub use specimen::{Inertia, Link, Reflectivity, Specimen};
 
 use crate::error::{Error, Result};
@@ -42,6 +43,16 @@ impl Experiment {
         Self::parse(&text, path)
     }
 
+    /// Reads a file for what only the camera needs: what is still to be measured of the specimen is left at its
+    /// default.
+    ///
+    /// # Errors
+    /// As [`Experiment::read`].
+    pub fn read_rig(path: &Path) -> Result<Self> {
+        let text = std::fs::read_to_string(path).map_err(|e| Error::unreadable(path, e))?;
+        Self::parse(&unmeasured::without(&text), path)
+    }
+
     /// Parses the text of a file; `path` only appears in errors.
     ///
     /// # Errors
@@ -52,6 +63,7 @@ impl Experiment {
             line: e.span().map(|s| text[..s.start.min(text.len())].matches('\n').count() + 1),
             message: with_nearest_key(e.message()),
         };
+        unmeasured::refuse(text, path)?;
         let mut experiment: Self = toml::from_str(text).map_err(wrong)?;
         let keys: toml::Table = toml::from_str(text).map_err(wrong)?;
         experiment.model.states_damping = keys.get("model").is_some_and(|m| m.get("c_eq_n_m_s_per_rad").is_some());

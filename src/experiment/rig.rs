@@ -7,7 +7,21 @@ use serde::Deserialize;
 
 use super::positive;
 
-/// The colour of a mark: a name or `#rrggbb`.
+/// What tells a mark from its surroundings.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Look {
+    /// Its hue.
+    Hue,
+    /// It is darker than what lies around it.
+    Dark,
+    /// It is lighter.
+    Light,
+}
+
+/// Codes by which the channels of a colour must differ to have a hue.
+const LEAST_SATURATION: u8 = 32;
+
+/// The colour of a mark: a name or `#rrggbb`. `dark` (or `black`) and `light` (or `white`) have no hue.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct MarkColour {
     /// As the user wrote it.
@@ -17,7 +31,7 @@ pub struct MarkColour {
 }
 
 impl MarkColour {
-    const NAMES: [(&'static str, [u8; 3]); 8] = [
+    const NAMES: [(&'static str, [u8; 3]); 12] = [
         ("red", [255, 0, 0]),
         ("green", [0, 160, 0]),
         ("blue", [0, 0, 255]),
@@ -26,11 +40,30 @@ impl MarkColour {
         ("magenta", [255, 0, 255]),
         ("cyan", [0, 255, 255]),
         ("violet", [128, 0, 255]),
+        ("dark", [0, 0, 0]),
+        ("black", [0, 0, 0]),
+        ("light", [255, 255, 255]),
+        ("white", [255, 255, 255]),
     ];
 
     /// The paper's marks.
     pub fn red() -> Self {
         Self { name: "red".to_owned(), rgb: [255, 0, 0] }
+    }
+
+    /// What tells such a mark from its surroundings.
+    pub fn look(&self) -> Look {
+        let [least, most] = [self.rgb.iter().min(), self.rgb.iter().max()].map(|c| c.copied().unwrap_or(0));
+        match (most - least >= LEAST_SATURATION, least >= 128) {
+            (true, _) => Look::Hue,
+            (false, false) => Look::Dark,
+            (false, true) => Look::Light,
+        }
+    }
+
+    /// It was given by a name, which stands for a family of hues, rather than measured.
+    pub fn is_named(&self) -> bool {
+        !self.name.starts_with('#')
     }
 }
 
@@ -50,8 +83,11 @@ impl FromStr for MarkColour {
         let channel = |i: usize| u8::from_str_radix(&digits[i..i + 2], 16).map_err(|e| e.to_string());
         let rgb = [channel(0)?, channel(2)?, channel(4)?];
         let spread = rgb.iter().max().copied().unwrap_or(0) - rgb.iter().min().copied().unwrap_or(0);
-        if spread < 32 {
-            return Err(format!("colour `{text}` is a grey; a mark is found by its hue, so give a coloured one"));
+        if spread < LEAST_SATURATION {
+            return Err(format!(
+                "colour `{text}` is a grey, which has no hue to be found by; for a mark darker or lighter than what \
+                 lies around it say dark or light"
+            ));
         }
         Ok(Self { name: lower, rgb })
     }
@@ -81,6 +117,18 @@ pub struct Rig {
     pub pixel_aspect: Option<f64>,
     /// An OpenCV calibration file (`camera_matrix`, `distortion_coefficients`), relative to the experiment file.
     pub lens_calibration: Option<PathBuf>,
+    /// Marks are sought only in here: left, top, width, height.
+    pub roi_px: Option<[f64; 4]>,
+    /// A picture, white where marks are sought, relative to the experiment file.
+    pub mask: Option<PathBuf>,
+    /// What comes before is not measured, seconds of the file.
+    pub from_s: Option<f64>,
+    /// What comes after is not measured, seconds of the file.
+    pub until_s: Option<f64>,
+    /// Frames a second at which the camera ran, where the file plays slower (slow motion).
+    pub true_rate_hz: Option<f64>,
+    /// Fixed points with clear edges, displayed pixels: they show how the camera moves.
+    pub reference_marks: Vec<[f64; 2]>,
 }
 
 impl Default for Rig {
@@ -93,18 +141,42 @@ impl Default for Rig {
             plumb_px: None,
             pixel_aspect: None,
             lens_calibration: None,
+            roi_px: None,
+            mask: None,
+            from_s: None,
+            until_s: None,
+            true_rate_hz: None,
+            reference_marks: Vec::new(),
         }
     }
 }
 
 impl Rig {
-    pub(super) fn validate(&self) -> Result<(), String> {
+    /// The numbers make sense.
+    ///
+    /// # Errors
+    /// A line that names the key.
+    pub(crate) fn validate(&self) -> Result<(), String> {
         positive("rig.gravity_m_s2", self.gravity_m_s2)?;
         self.pixel_aspect.map_or(Ok(()), |v| positive("rig.pixel_aspect", v))?;
         if let Some([upper, lower]) = self.plumb_px
             && !((upper[0] - lower[0]).hypot(upper[1] - lower[1]) >= 1.0)
         {
             return Err("rig.plumb_px: the two points must be at least a pixel apart".to_owned());
+        }
+        self.true_rate_hz.map_or(Ok(()), |v| positive("rig.true_rate_hz", v))?;
+        if let Some(roi) = self.roi_px
+            && !(roi.iter().all(|v| v.is_finite()) && roi[2] >= 8.0 && roi[3] >= 8.0)
+        {
+            return Err("rig.roi_px: give left, top, width and height, at least 8 px wide and high".to_owned());
+        }
+        if let (Some(from), Some(until)) = (self.from_s, self.until_s)
+            && !(until > from)
+        {
+            return Err(format!("rig.until_s = {until}: must be later than rig.from_s = {from}"));
+        }
+        if self.reference_marks.iter().flatten().any(|v| !v.is_finite()) {
+            return Err("rig.reference_marks: must be points of two finite numbers".to_owned());
         }
         if self.pivot_px.is_some_and(|p| !p[0].is_finite() || !p[1].is_finite()) {
             return Err("rig.pivot_px: must be two finite numbers".to_owned());

@@ -1,7 +1,10 @@
 //! Which of the things of the right colour are the marks.
 //!
-//! Marks are seen most of the time, look alike, and keep their distances: a link is rigid, a strip hardly shortens.
-//! A knob on the stand keeps its distance from nothing that swings.
+//! Marks are seen most of the time, look alike, swing, and keep their distances: a link is rigid, a strip hardly
+//! shortens. Only the uppermost may stand still, at the hinge: then it is where the next mark's distance from it does
+//! not change while that mark swings. A knob on the stand keeps its distance from nothing that swings.
+
+use std::cmp::Ordering;
 
 use super::tracklet::Tracklet;
 use super::{FrameBlobs, MarkSlot, Sighting};
@@ -12,9 +15,35 @@ use crate::statistics::median;
 pub(super) struct Choice {
     pub chosen: Vec<Option<usize>>,
     /// Other lasting things of a mark's hue.
-    pub others: usize,
+    pub spares: Vec<Spare>,
+    /// Something that was chosen swings.
+    pub moves: bool,
 }
 
+/// A lasting thing of a mark's hue that was not taken for a mark.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Spare {
+    /// Index of its hue.
+    pub hue: u8,
+    /// Where it usually is.
+    pub position_px: [f64; 2],
+    /// Half the range of its motion.
+    pub travel_px: f64,
+    /// It swings.
+    pub moves: bool,
+}
+
+/// Half a range of motion below which a thing stands still, px, beyond its own scatter.
+const STILL_PX: f64 = 0.5;
+/// The same as a share of the largest motion: a hinge gives a little.
+const STILL_SHARE: f64 = 0.01;
+/// Scatters of a position that are no motion.
+const STILL_SCATTERS: f64 = 4.0;
+/// A link's change of length over the motion of its lower end, beyond which it is none. A plane of swing turned by
+/// 45° out of the picture gives 0.1 at an amplitude of 30°.
+const MOST_STRETCH: f64 = 0.15;
+/// What it costs to take a thing for a mark that cannot be one.
+const UNFIT: f64 = 2.0;
 /// Share of the window in which a candidate must be seen.
 const LEAST_PRESENCE: f64 = 0.2;
 /// Candidates beyond the marks that are considered, most seen first.
@@ -30,6 +59,9 @@ struct Candidate {
     ln_area: f64,
     /// How far down the picture it comes, or how far from the pivot; one frame in twenty apart.
     order: f64,
+    /// Half the range of its motion, the outermost twentieths apart.
+    travel_px: f64,
+    moves: bool,
     /// Position by frame.
     path: Vec<Option<[f64; 2]>>,
 }
@@ -42,9 +74,17 @@ pub(super) fn choose(
     pivot_px: Option<[f64; 2]>,
 ) -> Choice {
     let mut candidates = candidates(tracklets, window, pivot_px);
-    candidates.sort_by(|a, b| b.presence.total_cmp(&a.presence));
-    let mut kept: Vec<Candidate> = Vec::new();
-    for candidate in candidates {
+    let farthest_px = candidates.iter().map(|c| c.travel_px).fold(0.0, f64::max);
+    candidates.iter_mut().for_each(|c| c.moves &= c.travel_px > STILL_SHARE * farthest_px);
+    candidates.sort_by(|a, b| (b.moves, b.presence).partial_cmp(&(a.moves, a.presence)).unwrap_or(Ordering::Equal));
+    let spares_of = |taken: &[usize]| spares(&candidates_but(&candidates, taken));
+    // of what stands still only a possible hinge is considered, if anything swings at all
+    let swings = candidates.iter().any(|c| c.moves);
+    let hinge = |c: &Candidate| candidates.iter().any(|m| m.moves && stretch(c, m) < MOST_STRETCH);
+    let possible: Vec<usize> =
+        (0..candidates.len()).filter(|i| candidates[*i].moves || !swings || hinge(&candidates[*i])).collect();
+    let mut kept: Vec<&Candidate> = Vec::new();
+    for candidate in possible.into_iter().map(|i| &candidates[i]) {
         let wanted = slots.iter().filter(|s| s.hue == candidate.hue).count();
         let have = kept.iter().filter(|k| k.hue == candidate.hue).count();
         if have < wanted + SPARE_CANDIDATES {
@@ -59,10 +99,57 @@ pub(super) fn choose(
             best = Some((score, assignment.to_vec()));
         }
     });
-    let chosen: Vec<Option<usize>> =
-        best.map(|(_, a)| a).unwrap_or(partial).into_iter().map(|c| c.map(|i| kept[i].tracklet)).collect();
-    let others = kept.len() - chosen.iter().flatten().count();
-    Choice { chosen, others }
+    let mut assignment = best.map(|(_, a)| a).unwrap_or(partial);
+    if swings {
+        drop_unfit(&kept, &mut assignment);
+    }
+    let moves = assignment.iter().flatten().any(|i| kept[*i].moves);
+    let chosen: Vec<Option<usize>> = assignment.into_iter().map(|c| c.map(|i| kept[i].tracklet)).collect();
+    let taken: Vec<usize> = chosen.iter().flatten().copied().collect();
+    let spares = spares_of(&taken);
+    Choice { chosen, spares, moves }
+}
+
+/// What was not taken, but was seen beside what was.
+fn candidates_but<'a>(candidates: &'a [Candidate], taken: &[usize]) -> Vec<&'a Candidate> {
+    let chosen: Vec<&Candidate> = candidates.iter().filter(|c| taken.contains(&c.tracklet)).collect();
+    let beside = |c: &&Candidate| {
+        !taken.contains(&c.tracklet)
+            && chosen.iter().filter(|other| other.hue == c.hue).all(|other| {
+                let both = c.path.iter().zip(&other.path).filter(|(p, q)| p.is_some() && q.is_some()).count();
+                2 * both > c.path.iter().flatten().count()
+            })
+    };
+    candidates.iter().filter(beside).collect()
+}
+
+fn spares(candidates: &[&Candidate]) -> Vec<Spare> {
+    candidates
+        .iter()
+        .map(|c| {
+            let middle = |axis: usize| median(&mut c.path.iter().flatten().map(|p| p[axis]).collect::<Vec<_>>());
+            let position_px = [0, 1].map(|axis| middle(axis).unwrap_or(0.0));
+            Spare { hue: c.hue, position_px, travel_px: c.travel_px, moves: c.moves }
+        })
+        .collect()
+}
+
+/// Takes back what cannot be a mark: what stands still and is no hinge.
+fn drop_unfit(kept: &[&Candidate], assignment: &mut [Option<usize>]) {
+    for slot in 0..assignment.len() {
+        let unfit = assignment[slot].is_some_and(|i| !kept[i].moves && !is_hinge(kept, assignment, slot));
+        if unfit {
+            assignment[slot] = None;
+        }
+    }
+}
+
+/// What stands still in this slot is the first of the chain, and the next keeps its distance from it.
+fn is_hinge(kept: &[&Candidate], assignment: &[Option<usize>], slot: usize) -> bool {
+    let Some(own) = assignment[slot] else { return false };
+    let next = assignment[slot + 1..].iter().flatten().next();
+    assignment[..slot].iter().all(Option::is_none)
+        && next.is_some_and(|next| kept[*next].moves && stretch(kept[own], kept[*next]) < MOST_STRETCH)
 }
 
 fn candidates(tracklets: &[Tracklet], window: &[FrameBlobs], pivot_px: Option<[f64; 2]>) -> Vec<Candidate> {
@@ -85,7 +172,10 @@ fn candidates(tracklets: &[Tracklet], window: &[FrameBlobs], pivot_px: Option<[f
             orders.sort_unstable_by(f64::total_cmp);
             let mut ln_areas: Vec<f64> =
                 t.sightings.iter().map(|s| f64::from(sighting(s).measured.area_px2).ln()).collect();
+            let (travel_px, scatter_px) = motion(&path);
             Candidate {
+                travel_px,
+                moves: travel_px > STILL_PX + STILL_SCATTERS * scatter_px,
                 tracklet,
                 hue: t.hue,
                 presence: t.sightings.len() as f64 / window.len() as f64,
@@ -101,7 +191,7 @@ fn candidates(tracklets: &[Tracklet], window: &[FrameBlobs], pivot_px: Option<[f
 /// Visits every way to fill the slots, those of one hue in order down the picture. A slot stays empty only where
 /// its hue has too few candidates.
 fn search(
-    kept: &[Candidate],
+    kept: &[&Candidate],
     slots: &[MarkSlot],
     slot: usize,
     partial: &mut Vec<Option<usize>>,
@@ -130,28 +220,59 @@ fn search(
     }
 }
 
-fn score(kept: &[Candidate], assignment: &[Option<usize>]) -> f64 {
-    let chosen: Vec<&Candidate> = assignment.iter().flatten().map(|i| &kept[*i]).collect();
+fn score(kept: &[&Candidate], assignment: &[Option<usize>]) -> f64 {
+    let chosen: Vec<&Candidate> = assignment.iter().flatten().map(|i| kept[*i]).collect();
     // of two halves of a track, before a gap and after it, the first: what follows it will be found again
     let presence: f64 = chosen.iter().map(|c| c.presence - c.lateness).sum();
-    let stretch = chosen.windows(2).map(|w| length_spread(w[0], w[1])).fold(0.0, f64::max);
+    let stretch = chosen.windows(2).map(|w| stretch(w[0], w[1])).fold(0.0, f64::max);
     let mean = chosen.iter().map(|c| c.ln_area).sum::<f64>() / chosen.len().max(1) as f64;
     let unlike = (chosen.iter().map(|c| (c.ln_area - mean).powi(2)).sum::<f64>() / chosen.len().max(1) as f64).sqrt();
-    presence - 3.0 * stretch - 0.5 * unlike
+    let swings = kept.iter().any(|c| c.moves);
+    let still = |slot: &usize| assignment[*slot].is_some_and(|i| !kept[i].moves);
+    let unfit = (0..assignment.len()).filter(still).filter(|slot| !is_hinge(kept, assignment, *slot)).count();
+    presence - 3.0 * stretch - 0.5 * unlike - if swings { UNFIT * unfit as f64 } else { 0.0 }
 }
 
-/// Relative spread of the distance of two candidates over the frames that show both; 1 where there are none.
-fn length_spread(a: &Candidate, b: &Candidate) -> f64 {
-    let mut lengths: Vec<f64> = a
+/// Half the range of a path along its longer axis, the outermost twentieths apart, and its scatter from frame to
+/// frame.
+fn motion(path: &[Option<[f64; 2]>]) -> (f64, f64) {
+    let of_axis = |axis: usize| {
+        let mut at: Vec<f64> = path.iter().flatten().map(|p| p[axis]).collect();
+        at.sort_unstable_by(f64::total_cmp);
+        let last = at.len().saturating_sub(1);
+        if at.is_empty() { 0.0 } else { 0.5 * (at[last * 19 / 20] - at[last / 20]) }
+    };
+    // the third difference of white scatter has √20 times its standard deviation; a swing's is next to nothing
+    let mut thirds: Vec<f64> = path
+        .windows(4)
+        .flat_map(|w| [0, 1].map(|axis| Some(w[3]?[axis] - 3.0 * w[2]?[axis] + 3.0 * w[1]?[axis] - w[0]?[axis])))
+        .flatten()
+        .map(f64::abs)
+        .collect();
+    let scatter_px = median(&mut thirds).unwrap_or(0.0) / (0.6745 * 20f64.sqrt());
+    let travel_px = of_axis(0).max(of_axis(1));
+    // a swing of few frames a turn has differences of its own: they are no scatter
+    (travel_px, scatter_px.min(0.1 * travel_px))
+}
+
+/// How much the distance of two candidates changes, as a share of how they move against each other; 1 where they
+/// do not, or are never seen together.
+fn stretch(a: &Candidate, b: &Candidate) -> f64 {
+    let between: Vec<[f64; 2]> = a
         .path
         .iter()
         .zip(&b.path)
         .filter_map(|(p, q)| {
             let (p, q) = (p.as_ref()?, q.as_ref()?);
-            Some((p[0] - q[0]).hypot(p[1] - q[1]))
+            Some([q[0] - p[0], q[1] - p[1]])
         })
         .collect();
+    let mut lengths: Vec<f64> = between.iter().map(|d| d[0].hypot(d[1])).collect();
     let Some(usual) = median(&mut lengths).filter(|l| *l > 0.0) else { return 1.0 };
-    let mean_deviation = lengths.iter().map(|l| (l - usual).abs()).sum::<f64>() / lengths.len() as f64;
-    (mean_deviation / usual).min(1.0)
+    let n = between.len() as f64;
+    let mean = [0, 1].map(|axis| between.iter().map(|d| d[axis]).sum::<f64>() / n);
+    let motion = between.iter().map(|d| (d[0] - mean[0]).hypot(d[1] - mean[1])).sum::<f64>() / n;
+    let change = lengths.iter().map(|l| (l - usual).abs()).sum::<f64>() / n;
+    let moved_px = motion.max(a.travel_px.max(b.travel_px) * 0.05);
+    if moved_px <= 0.0 { 1.0 } else { (change / moved_px).max(change / usual).min(1.0) }
 }

@@ -83,7 +83,7 @@ impl Tracker {
         self.step_s = median_step_s(&stamps).unwrap_or(self.step_s);
         let tracklets = link(&self.window, self.step_s);
         let choice = choose(&tracklets, &self.window, &self.slots, self.pivot_px);
-        if may_wait && choice.chosen.iter().any(Option::is_none) {
+        if may_wait && (choice.chosen.iter().any(Option::is_none) || !choice.moves) {
             return;
         }
         self.learn(&choice, &tracklets);
@@ -216,7 +216,8 @@ impl Tracker {
             scatter: Vec::new(),
             area_px2: Vec::new(),
             damaged_frames: self.damaged,
-            other_candidates: choice.others,
+            spares: choice.spares,
+            moves: choice.moves,
             t_s: self.t_s,
         };
         let scatters = scatters(&self.points, &tracks.t_s);

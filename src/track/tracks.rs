@@ -1,6 +1,7 @@
 //! The marks' tracks: measured positions with the variances that their own scatter shows, and the paper's filter over
 //! them, with the true time steps.
 
+use super::choose::Spare;
 use super::follower::measurement;
 use super::kalman::{Belief, Motion};
 use super::noise::{Scatter, speeds_px, variance_factor};
@@ -23,8 +24,10 @@ pub struct Tracks {
     pub area_px2: Vec<f64>,
     /// Frames that the decoder reported as damaged.
     pub damaged_frames: Vec<usize>,
-    /// How many things of a mark's colour were seen beside the marks when they were chosen.
-    pub other_candidates: usize,
+    /// Lasting things of a mark's colour that were seen beside the marks when they were chosen.
+    pub spares: Vec<Spare>,
+    /// Something that was chosen swings.
+    pub moves: bool,
 }
 
 impl Tracks {
@@ -56,6 +59,24 @@ impl Tracks {
         self.motion.push(motion);
         self.scatter.push(scatter);
         self.area_px2.push(area);
+    }
+
+    /// Makes every second `scale` seconds: a recording played slower than it was taken.
+    pub fn scale_time(&mut self, scale: f64) {
+        if scale == 1.0 {
+            return;
+        }
+        self.t_s.iter_mut().for_each(|t| *t *= scale);
+        self.motion.iter_mut().for_each(|m| m.acceleration_psd_px2_s3 /= scale.powi(3));
+        for filtered in self.marks.iter_mut().flatten().filter_map(|p| p.filtered.as_mut()) {
+            filtered.state[2] /= scale;
+            filtered.state[3] /= scale;
+            // the upper triangle, row by row: one velocity in 2, 3, 5, 6, two of them in 7, 8, 9
+            for (k, value) in filtered.covariance.iter_mut().enumerate() {
+                let powers = [0, 0, 1, 1, 0, 1, 1, 2, 2, 2][k];
+                *value /= (scale as f32).powi(powers);
+            }
+        }
     }
 
     /// The fixed-interval smoothed track of mark `mark`.

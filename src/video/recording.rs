@@ -20,6 +20,9 @@ pub enum Recording {
 
 /// Frames decoded after a seek to get one whole picture.
 const SAMPLE_FRAMES: usize = 2;
+/// Frames from one sample to the next where a seek leads back to where the last one did: a recording with few key
+/// frames is still seen at different times.
+const FRAMES_BETWEEN: usize = 8;
 
 impl Recording {
     /// Opens a file, or a folder of stills with their times.
@@ -128,14 +131,20 @@ fn sample_container(path: &Path, count: usize, see: &mut dyn FnMut(&Frame<'_>)) 
     let mut container = Container::open(path)?;
     let duration_s = container.stated_duration_s().unwrap_or(0.0);
     let mut decoder = DecoderRecipe::new(&container).decoder(1).map_err(|e| decode::cannot_open(&container, &e))?;
+    let mut last_s = f64::NEG_INFINITY;
     for sample in 0..count {
         if sample > 0 && (duration_s <= 0.0 || container.seek(duration_s * sample as f64 / count as f64).is_err()) {
             break;
         }
-        let mut last_of_sample = 0;
+        let (mut last_of_sample, mut repeated) = (0, false);
         let _ = decoder.decode(&mut || container.next_packet().ok().flatten(), &mut |frame| {
-            last_of_sample += 1;
-            if last_of_sample == SAMPLE_FRAMES {
+            if frame.t_s > last_s {
+                last_of_sample += 1;
+            }
+            let seeks_lead_back = last_s > 0.0 && last_of_sample == 0;
+            repeated |= seeks_lead_back;
+            if last_of_sample == if repeated { FRAMES_BETWEEN } else { SAMPLE_FRAMES } {
+                last_s = frame.t_s;
                 see(&frame);
                 return ControlFlow::Break(());
             }

@@ -49,7 +49,7 @@ fn paint(width: usize, height: usize, colour: impl Fn(f64, f64) -> [f64; 3]) -> 
 
 /// Largest and mean error over sixteen positions of a red disc of 22 px over `behind`.
 fn errors(behind: impl Fn(f64, f64, [f64; 2]) -> [f64; 3]) -> (f64, [f64; 2]) {
-    let detector = Detector::new(vec![Hue { colour: MarkColour::red(), marks: 1, threshold: 60.0, thin: false }]);
+    let detector = Detector::new(vec![Hue { colour: MarkColour::red(), marks: 1, threshold: 60.0, ..Hue::default() }]);
     let (mut worst, mut mean) = (0.0f64, [0.0; 2]);
     for k in 0..16 {
         let truth = [40.0 + f64::from(k) * 0.137, 38.0 + f64::from(k * 5 % 16) * 0.131];

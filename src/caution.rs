@@ -1,0 +1,286 @@
+//! What a careful colleague would say about a measurement: each with the number and what to do.
+
+use crate::experiment::Experiment;
+use crate::measure::{Measurement, Options};
+use crate::statistics::median;
+use crate::track::Point;
+
+/// A link whose length scatters by more than this share is no rigid link in the plane of the picture: lenses bend by
+/// less.
+const MOST_LENGTH_SPREAD: f64 = 0.01;
+/// And by more than so many times what the marks' scatter explains.
+const LENGTH_SCATTERS: f64 = 4.0;
+/// Frames below which nothing is said about a link or a mark.
+const FEWEST_FRAMES: usize = 30;
+/// A plane of swing turned by less than this share of x does not show.
+const LEAST_SQUEEZE: f64 = 0.03;
+/// Noise of a mark that calls for a word: a quarter of a pixel, and half a hundredth of the mark's width.
+const MOST_NOISE_PX: f64 = 0.25;
+const NOISE_OF_WIDTH: f64 = 0.005;
+/// Rates at which cameras record slow motion, and rates at which they play it.
+const SLOW_MOTION: [(f64, f64); 8] = [
+    (120.0, 30.0),
+    (240.0, 30.0),
+    (120.0, 60.0),
+    (240.0, 60.0),
+    (120.0, 25.0),
+    (240.0, 25.0),
+    (960.0, 30.0),
+    (480.0, 30.0),
+];
+
+/// Every caution about a measurement.
+pub fn cautions(m: &Measurement, options: &Options) -> Vec<String> {
+    let mut cautions = Vec::new();
+    cautions.extend(spares(m));
+    let first = usize::from(options.rig.pivot_px.is_none());
+    for link in 0..m.angles.links.len() {
+        cautions.extend(link_length(m, options, link, first));
+    }
+    for mark in 0..m.tracks.marks.len() {
+        cautions.extend(mark_noise(m, mark));
+        cautions.extend(blur(m, mark));
+    }
+    cautions.extend(camera(m));
+    cautions
+}
+
+/// Things of the marks' colour that were not used.
+fn spares(m: &Measurement) -> Vec<String> {
+    let listed = |moves: bool| -> Vec<String> {
+        let chosen = m.tracks.spares.iter().filter(|s| s.moves == moves);
+        chosen.map(|s| format!("({:.0}, {:.0})", s.position_px[0], s.position_px[1])).collect()
+    };
+    let (moving, still) = (listed(true), listed(false));
+    let marks = m.tracks.marks.len();
+    let mut said = Vec::new();
+    if !moving.is_empty() {
+        said.push(format!(
+            "{} more thing{} of the marks' colour move{} about {} px and {} not used; say --markers {} if {} a mark, or leave it out with --roi",
+            moving.len(),
+            if moving.len() == 1 { "" } else { "s" },
+            if moving.len() == 1 { "s" } else { "" },
+            moving.join(" and "),
+            if moving.len() == 1 { "was" } else { "were" },
+            marks + moving.len(),
+            if moving.len() == 1 { "it is" } else { "they are" },
+        ));
+    }
+    if !still.is_empty() {
+        said.push(format!(
+            "{} thing{} of the marks' colour never move{} and {} taken for no mark: about {} px",
+            still.len(),
+            if still.len() == 1 { "" } else { "s" },
+            if still.len() == 1 { "s" } else { "" },
+            if still.len() == 1 { "was" } else { "were" },
+            still.join(" and "),
+        ));
+    }
+    said
+}
+
+/// The ends of a link in every frame that shows both: (Δx, Δy, variance of the distance).
+fn spans(m: &Measurement, options: &Options, link: usize, first: usize) -> Vec<[f64; 3]> {
+    let aspect = options.rig.pixel_aspect.unwrap_or(m.stream.pixel_aspect);
+    let node = |index: usize, frame: usize| -> Option<([f64; 2], f64)> {
+        if first == 0 && index == 0 {
+            return options.rig.pivot_px.map(|p| (p, 0.0));
+        }
+        let point: &Point = &m.tracks.marks[index - (1 - first)][frame];
+        let usual = point.flags == crate::track::Flags::default();
+        let measured = point.measured.filter(|_| usual)?;
+        let c = measured.covariance_px2;
+        Some((measured.position_px, 0.5 * (c[0] + c[1])))
+    };
+    (0..m.tracks.t_s.len())
+        .filter_map(|frame| {
+            let ((p, v), (q, w)) = (node(link, frame)?, node(link + 1, frame)?);
+            Some([aspect * (q[0] - p[0]), q[1] - p[1], v + w])
+        })
+        .collect()
+}
+
+/// A link keeps its length; where it changes with the angle alone, the plane of the swing is turned.
+fn link_length(m: &Measurement, options: &Options, link: usize, first: usize) -> Option<String> {
+    let spans = spans(m, options, link, first);
+    if spans.len() < FEWEST_FRAMES {
+        return None;
+    }
+    let mut lengths: Vec<f64> = spans.iter().map(|s| s[0].hypot(s[1])).collect();
+    let usual = median(&mut lengths)?;
+    let mut off: Vec<f64> = lengths.iter().map(|l| (l - usual).abs()).collect();
+    let spread = 1.4826 * median(&mut off)?;
+    let expected = (spans.iter().map(|s| s[2]).sum::<f64>() / spans.len() as f64).sqrt();
+    if spread <= MOST_LENGTH_SPREAD * usual || spread <= LENGTH_SCATTERS * expected {
+        return None;
+    }
+    let number = link + 1;
+    if let Some(squeeze) = squeeze(&spans).filter(|s| *s < 1.0 - LEAST_SQUEEZE) {
+        let aspect = options.rig.pixel_aspect.unwrap_or(m.stream.pixel_aspect) / squeeze;
+        let turn_deg = squeeze.acos().to_degrees();
+        return Some(format!(
+            "link {number} looks shorter the farther it swings, by {:.1} % of its {usual:.0} px: it swings in a plane turned by about {turn_deg:.0}° out of the picture, and its angles are up to {:.0} % too small; face the camera to the swing, or write pixel_aspect = {aspect:.3} in [rig]",
+            100.0 * spread / usual,
+            100.0 * (1.0 - squeeze),
+        ));
+    }
+    Some(format!(
+        "link {number} is {usual:.1} ± {spread:.1} px long, where the marks' scatter explains ± {expected:.2}: its ends are not on one rigid link, a mark was taken for another, or the pivot is elsewhere; look at --overlay, and name the marks with --markers or --roi"
+    ))
+}
+
+/// The factor c by which x is shortened, from Δy² = L² − Δx²/c² by least squares; `None` where the link does not
+/// swing far enough, or where this does not explain most of the change.
+fn squeeze(spans: &[[f64; 3]]) -> Option<f64> {
+    let n = spans.len() as f64;
+    let mean = |f: &dyn Fn(&[f64; 3]) -> f64| spans.iter().map(f).sum::<f64>() / n;
+    let (mx, my) = (mean(&|s| s[0] * s[0]), mean(&|s| s[1] * s[1]));
+    let xx = mean(&|s| (s[0] * s[0] - mx).powi(2));
+    let xy = mean(&|s| (s[0] * s[0] - mx) * (s[1] * s[1] - my));
+    let slope = xy / xx.max(1e-12);
+    let length2 = my - slope * mx;
+    let rest = |factor: f64, of: f64| mean(&|s| (s[1] * s[1] + factor * s[0] * s[0] - of).powi(2)).sqrt();
+    let explained = rest(-slope, length2) < 0.5 * rest(1.0, mx + my);
+    (slope < -1.0 && explained && mx.sqrt() > 0.05 * length2.max(0.0).sqrt()).then(|| (-1.0 / slope).sqrt())
+}
+
+/// The scatter of a mark, held against its size.
+fn mark_noise(m: &Measurement, mark: usize) -> Option<String> {
+    let measured: Vec<[f64; 3]> =
+        m.tracks.marks[mark].iter().filter_map(|p| p.measured).map(|m| m.covariance_px2).collect();
+    let n = measured.len().max(1) as f64;
+    let noise_px = (measured.iter().map(|c| 0.5 * (c[0] + c[1])).sum::<f64>() / n).sqrt();
+    let width_px = 2.0 * (m.tracks.area_px2[mark] / std::f64::consts::PI).sqrt();
+    let expected_px = MOST_NOISE_PX + NOISE_OF_WIDTH * width_px;
+    (noise_px > expected_px && measured.len() >= FEWEST_FRAMES).then(|| {
+        format!(
+            "mark {} scatters by {noise_px:.2} px, where one {width_px:.0} px wide should by less than {expected_px:.2}: look at it with --debug-frames; light it evenly, or name its colour closer with --color '#rrggbb'",
+            mark + 1
+        )
+    })
+}
+
+/// How far a mark is smeared by the exposure, from how its area grows with its speed.
+///
+/// ```text
+/// A = A₀ + d v t_e,   d the width of the mark at rest, v its speed, t_e the exposure
+/// ```
+fn blur(m: &Measurement, mark: usize) -> Option<String> {
+    let points = &m.tracks.marks[mark];
+    let t_s = &m.file_t_s;
+    let mut rows: Vec<[f64; 2]> = Vec::new();
+    for i in 1..points.len().saturating_sub(1) {
+        let (Some(a), Some(b), Some(c)) = (points[i - 1].measured, points[i].measured, points[i + 1].measured) else {
+            continue;
+        };
+        let step_s = t_s[i + 1] - t_s[i - 1];
+        if step_s > 0.0 && !points[i].flags.contains(crate::track::Flags::CUT) {
+            let path_px = (c.position_px[0] - a.position_px[0]).hypot(c.position_px[1] - a.position_px[1]);
+            rows.push([path_px / step_s, f64::from(b.area_px2)]);
+        }
+    }
+    if rows.len() < FEWEST_FRAMES {
+        return None;
+    }
+    rows.sort_by(|a, b| a[0].total_cmp(&b[0]));
+    let third = rows.len() / 3;
+    let of = |rows: &[[f64; 2]], k: usize| median(&mut rows.iter().map(|r| r[k]).collect::<Vec<_>>());
+    let (slow, fast) = (&rows[..third], &rows[rows.len() - third..]);
+    let (v0, v1, a0, a1) = (of(slow, 0)?, of(fast, 0)?, of(slow, 1)?, of(fast, 1)?);
+    let slope = (a1 - a0) / (v1 - v0).max(1e-9);
+    let rest_px2 = (a0 - slope * v0).max(0.3 * a0);
+    let width_px = 2.0 * (rest_px2 / std::f64::consts::PI).sqrt();
+    let exposure_s = slope / width_px;
+    let fastest = rows[rows.len() - 1 - rows.len() / 50][0];
+    let blur_px = exposure_s * fastest;
+    (blur_px > width_px && exposure_s.is_finite()).then(|| {
+        format!(
+            "mark {} is smeared over {blur_px:.0} px where it is fastest, more than its width of {width_px:.0} px: the exposure is about 1/{:.0} s; set it to 1/{:.0} s or shorter, with more light",
+            mark + 1,
+            1.0 / exposure_s,
+            (1.0 / exposure_s * blur_px / (0.5 * width_px)).ceil(),
+        )
+    })
+}
+
+fn camera(m: &Measurement) -> Vec<String> {
+    let camera = &m.camera;
+    let mut said = Vec::new();
+    if camera.taken_out && camera.greatest_shift_px > 0.0 {
+        said.push(format!(
+            "the camera moved by up to {:.1} px; taken out with {} patches of what stands still (to {:.2} px); --steady never leaves it in",
+            camera.greatest_shift_px, camera.patches, camera.sd_px
+        ));
+    } else if camera.greatest_shift_px > 0.3 {
+        said.push(format!(
+            "the camera moved by up to {:.1} px and that is left in; --steady always takes it out with the background",
+            camera.greatest_shift_px
+        ));
+    }
+    if camera.lost_frames > 0 {
+        said.push(format!(
+            "in {} frames too little of the background was found again to say where the camera looked; nothing is measured there",
+            camera.lost_frames
+        ));
+    }
+    said
+}
+
+/// Slow motion shows where the length is known: a pendulum of that length cannot swing so slowly.
+///
+/// ```text
+/// f ≤ √(g / L) / 2π for a mass at the end; of rods and chains it lies within 1.0 and 1.4 of that
+/// ```
+pub fn slow_motion(m: &Measurement, experiment: &Experiment) -> Option<String> {
+    if experiment.rig.true_rate_hz.is_some() {
+        return None;
+    }
+    let length_m: f64 = experiment.specimen.link_lengths_m.iter().sum();
+    let file_hz = m.timing.real_rate_hz?;
+    let seen_hz = crossing_rate_hz(m)?;
+    if !(length_m > 0.0) {
+        return None;
+    }
+    let least_hz = (experiment.rig.gravity_m_s2 / length_m).sqrt() / std::f64::consts::TAU;
+    let factor = least_hz * 1.15 / seen_hz;
+    let (true_hz, played_hz) = SLOW_MOTION
+        .into_iter()
+        .filter(|(_, played)| (played / file_hz - 1.0).abs() < 0.02)
+        .find(|(taken, played)| (factor / (taken / played) - 1.0).abs() < 0.3)?;
+    Some(format!(
+        "it swings at {seen_hz:.3} Hz, where {length_m:.3} m of pendulum swing at {least_hz:.2} Hz or faster: this looks like {true_hz:.0} frames a second played at {played_hz:.0}; write true_rate_hz = {true_hz:.0} in [rig]"
+    ))
+}
+
+/// Full turns a second of the first link's motion about its middle.
+fn crossing_rate_hz(m: &Measurement) -> Option<f64> {
+    let rows: Vec<(f64, f64)> =
+        m.angles.links.first()?.iter().zip(&m.tracks.t_s).filter_map(|(a, t)| a.map(|a| (*t, a.theta_rad))).collect();
+    let middle = median(&mut rows.iter().map(|r| r.1).collect::<Vec<_>>())?;
+    let rises: Vec<f64> = rows.windows(2).filter(|w| w[0].1 < middle && w[1].1 >= middle).map(|w| w[1].0).collect();
+    let (first, last) = (rises.first()?, rises.last()?);
+    (rises.len() >= 3 && last > first).then(|| (rises.len() - 1) as f64 / (last - first))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn swing(factor: f64) -> Vec<[f64; 3]> {
+        (0..200)
+            .map(|i| {
+                let theta = 0.5 * (0.1 * f64::from(i)).sin();
+                [factor * 200.0 * theta.sin(), 200.0 * theta.cos(), 0.01]
+            })
+            .collect()
+    }
+
+    #[test]
+    fn a_turned_plane_of_swing_is_told_from_a_link_that_is_none() {
+        assert!((squeeze(&swing(0.75)).unwrap() - 0.75).abs() < 1e-6);
+        assert!(squeeze(&swing(1.0)).is_none_or(|c| (c - 1.0).abs() < 1e-6));
+        let loose: Vec<[f64; 3]> =
+            swing(1.0).iter().enumerate().map(|(i, s)| [s[0], s[1] * (1.0 + 0.1 * (i as f64).sin()), s[2]]).collect();
+        assert!(squeeze(&loose).is_none_or(|c| c > 0.97));
+    }
+}

@@ -1,0 +1,311 @@
+//! How marks are best found in a recording, tried on pictures spread over it.
+//!
+//! A colour's name stands for a family of hues. Which of them the marks have, at which scale they are looked for and
+//! above which threshold is what shows most round, moving spots, as many as there are marks.
+
+use super::component::{HueAxis, from_255, hue_angle_rad, to_255};
+use super::mask::{Mask, Part};
+use super::plane::Plane;
+use super::samples::{Album, Samples, turn};
+use super::threshold::{self, LEAST_COMPONENT, LEAST_CONTRAST, Relief, Summit};
+use super::{Hue, LEAST_AREA_PX2, blobs::LEAST_ROUNDNESS};
+use crate::error::Result;
+use crate::experiment::Look;
+use crate::statistics::median;
+
+/// Half width of a family of hues, rad: of a name, and of a measured colour.
+const FAMILY_RAD: [f64; 2] = [0.75, 0.35];
+/// Hues of a family that are tried.
+const MOST_HUES: usize = 3;
+/// What the far end of the family counts less than the named hue.
+const OFF_NAME: f64 = 0.3;
+/// A mark more samples wide than this is looked for at a coarser scale.
+const MOST_SAMPLES_WIDE: f64 = 40.0;
+/// Coarsest scale: 2^4 chroma samples.
+const LAST_LEVEL: u32 = 4;
+/// Contrast at which a spot counts half, 0 to 255.
+const HALF_CONTRAST: f64 = 40.0;
+/// What a spot that stands still counts where others move.
+const STILL_COUNTS: f64 = 0.3;
+
+/// One spot above the threshold in one picture.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Spot {
+    /// Its samples at the trial's level.
+    pub part: Part,
+    /// Shape; see [`Part::roundness`].
+    pub roundness: f64,
+    /// Something in it moves.
+    pub moves: bool,
+    /// Highest component, 0 to 255.
+    pub top: f64,
+}
+
+/// One way to look for marks, and what it shows.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Trial {
+    /// Hue, for marks that have one.
+    pub angle_rad: Option<f64>,
+    /// Scale.
+    pub level: u32,
+    /// 0 to 255.
+    pub threshold: f64,
+    /// Lines are not filtered out.
+    pub thin: bool,
+    /// By picture.
+    pub spots: Vec<Vec<Spot>>,
+    /// 1: as many round moving spots as there are marks, in every picture.
+    pub quality: f64,
+}
+
+/// What to look for, and how.
+#[derive(Debug, Clone, Copy)]
+struct Ask {
+    axis: HueAxis,
+    level: u32,
+    marks: usize,
+    threshold: Option<f64>,
+}
+
+impl Album {
+    /// Learns hue, scale and threshold of every hue; `fixed` is a threshold that the user gave. Returns what each
+    /// trial showed.
+    ///
+    /// # Errors
+    /// [`crate::Error::OpenCv`].
+    pub fn calibrate(&self, hues: &mut [Hue], fixed: Option<f64>) -> Result<Vec<Option<Trial>>> {
+        let angles: Vec<Option<f64>> = hues
+            .iter()
+            .map(|h| (h.colour.look() == Look::Hue).then(|| hue_angle_rad(&h.colour, self.matrix)))
+            .collect();
+        let mut trials = Vec::new();
+        for (index, hue) in hues.iter_mut().enumerate() {
+            let others: Vec<f64> = (0..angles.len()).filter(|i| *i != index).filter_map(|i| angles[i]).collect();
+            let trial = self.best_trial(hue, angles[index], &others, fixed)?;
+            if let Some(trial) = &trial {
+                hue.adopt(trial, self.sample_px2());
+            }
+            hue.threshold = fixed.unwrap_or(hue.threshold);
+            trials.push(trial);
+        }
+        Ok(trials)
+    }
+
+    fn best_trial(&self, hue: &Hue, angle: Option<f64>, others: &[f64], fixed: Option<f64>) -> Result<Option<Trial>> {
+        let Some(named_rad) = angle else {
+            let axis = HueAxis::new(&hue.colour, self.matrix);
+            return self.try_all_levels(Ask { axis, level: 0, marks: hue.marks, threshold: fixed });
+        };
+        // two colours of marks share what lies between them
+        let nearest = others.iter().map(|o| 0.5 * turn(o - named_rad).abs()).fold(f64::MAX, f64::min);
+        let half_width = FAMILY_RAD[usize::from(!hue.colour.is_named())].min(nearest);
+        let mut peaks = self.hues(named_rad, half_width);
+        peaks.truncate(MOST_HUES);
+        let mut best: Option<(f64, Trial)> = None;
+        for angle_rad in peaks.iter().map(|p| p.angle_rad).chain([named_rad]) {
+            let Some(trial) = self.try_hue(angle_rad, hue.marks, fixed)? else { continue };
+            let worth = trial.quality - OFF_NAME * turn(angle_rad - named_rad).abs() / half_width;
+            if best.as_ref().is_none_or(|(most, _)| worth > *most) {
+                best = Some((worth, trial));
+            }
+        }
+        Ok(best.map(|(_, trial)| trial))
+    }
+
+    /// Tries a hue at the scale that its spots ask for.
+    ///
+    /// # Errors
+    /// [`crate::Error::OpenCv`].
+    pub fn try_hue(&self, angle_rad: f64, marks: usize, fixed: Option<f64>) -> Result<Option<Trial>> {
+        let axis = HueAxis::at_angle(angle_rad);
+        let mut best: Option<Trial> = None;
+        for level in 0..=LAST_LEVEL {
+            let trial = self.try_once(Ask { axis, level, marks, threshold: fixed })?;
+            let Some(mut trial) = trial else { break };
+            trial.angle_rad = Some(angle_rad);
+            let wide = trial.diameter_samples();
+            if best.as_ref().is_none_or(|b| trial.quality > b.quality) {
+                best = Some(trial);
+            }
+            if wide <= MOST_SAMPLES_WIDE {
+                break;
+            }
+        }
+        Ok(best)
+    }
+
+    fn try_all_levels(&self, ask: Ask) -> Result<Option<Trial>> {
+        let mut best: Option<Trial> = None;
+        for level in 0..=LAST_LEVEL {
+            let Some(trial) = self.try_once(Ask { level, ..ask })? else { continue };
+            if best.as_ref().is_none_or(|b| trial.quality > b.quality) {
+                best = Some(trial);
+            }
+        }
+        Ok(best)
+    }
+
+    /// Dark marks, or light ones, at whatever scale shows them best.
+    ///
+    /// # Errors
+    /// [`crate::Error::OpenCv`].
+    pub fn try_luma(&self, dark: bool, marks: usize) -> Result<Option<Trial>> {
+        let name = if dark { "dark" } else { "light" };
+        let Ok(colour) = name.parse::<crate::experiment::MarkColour>() else { return Ok(None) };
+        let axis = HueAxis::new(&colour, self.matrix);
+        self.try_all_levels(Ask { axis, level: 0, marks, threshold: None })
+    }
+
+    fn try_once(&self, ask: Ask) -> Result<Option<Trial>> {
+        let floor = if ask.axis.is_luma() { LEAST_CONTRAST } else { LEAST_COMPONENT };
+        let least = ((LEAST_AREA_PX2 / self.sample_px2()) as usize >> (2 * ask.level)).max(3);
+        let moved: Vec<Vec<bool>> = self.moved.iter().map(|m| self.coarse(m, ask.level)).collect();
+        let mut planes = Vec::new();
+        let mut summits: [Vec<Vec<Summit>>; 2] = [Vec::new(), Vec::new()];
+        for (n, picture) in self.pictures.iter().enumerate() {
+            let plane = self.plane(picture, ask.axis, ask.level)?;
+            let mut relief = Relief::new(&plane, moved.get(n).map(Vec::as_slice));
+            summits[1].push(relief.summits(least, floor));
+            relief.open();
+            summits[0].push(relief.summits(least, floor));
+            planes.push(plane);
+        }
+        // what moves is a mark rather than furniture; where it moves in no picture, all is still in the running
+        let moves = summits[1].iter().filter(|s| s.iter().any(Summit::moves)).count() * 2 >= planes.len();
+        if moves {
+            summits.iter_mut().flatten().for_each(|s| s.retain(Summit::moves));
+        }
+        let chosen = [false, true].into_iter().find_map(|thin| {
+            threshold::choose(&summits[usize::from(thin)], ask.marks, floor).map(|threshold| (threshold, thin))
+        });
+        let Some((threshold, thin)) = chosen.map(|(t, thin)| (ask.threshold.unwrap_or(t), thin)) else {
+            return Ok(None);
+        };
+        let mut spots = Vec::new();
+        for (n, plane) in planes.iter().enumerate() {
+            spots.push(spots_of(plane, threshold, thin, least, moved.get(n).map(Vec::as_slice))?);
+        }
+        let quality = quality(&spots, ask.marks, moves, ask.axis.is_luma());
+        Ok(Some(Trial { angle_rad: None, level: ask.level, threshold, thin, spots, quality }))
+    }
+
+    /// What moves, at a coarser scale: where a quarter of the samples do.
+    fn coarse(&self, moved: &[bool], level: u32) -> Vec<bool> {
+        let Some(first) = self.pictures.first() else { return Vec::new() };
+        if level == 0 {
+            return moved.to_vec();
+        }
+        let side = 1usize << level;
+        let (columns, rows) = ((first.width >> level).max(1), (first.height >> level).max(1));
+        let count = |x: usize, y: usize| {
+            let rows = (y * side..(y + 1) * side).filter(|j| *j < first.height);
+            rows.map(|j| {
+                moved[j * first.width..][x * side..((x + 1) * side).min(first.width)].iter().filter(|m| **m).count()
+            })
+            .sum::<usize>()
+        };
+        (0..rows).flat_map(|y| (0..columns).map(move |x| (x, y))).map(|(x, y)| 4 * count(x, y) >= side * side).collect()
+    }
+
+    /// The colour of a trial's likely spots as `#rrggbb`, or `dark` or `light` where it has no hue.
+    pub fn colour_name(&self, trial: &Trial) -> Option<String> {
+        let moves = trial.spots.iter().flatten().any(|s| s.moves);
+        let mut samples = Vec::new();
+        for (n, spots) in trial.spots.iter().enumerate() {
+            for spot in spots.iter().filter(|s| s.roundness >= LEAST_ROUNDNESS && (s.moves || !moves)) {
+                let picture = &self.pictures[n];
+                let half = (1usize << trial.level) >> 1;
+                let at = |p: &[usize; 2]| {
+                    let [x, y] = p.map(|v| (v << trial.level) + half);
+                    (n, y.min(picture.height - 1) * picture.width + x.min(picture.width - 1))
+                };
+                samples.extend(spot.part.points.iter().map(at));
+            }
+        }
+        let [r, g, b] = self.colour_of(&samples)?;
+        let name = format!("#{r:02x}{g:02x}{b:02x}");
+        name.parse::<crate::experiment::MarkColour>().ok().map(|_| name)
+    }
+
+    /// The component of a picture, nothing where nothing is looked at.
+    fn plane(&self, picture: &Samples, axis: HueAxis, level: u32) -> Result<Plane> {
+        let mut plane = Plane::of_samples(picture, axis, level)?;
+        if self.allowed.is_some() {
+            let width = plane.width;
+            for (at, value) in plane.values.iter_mut().enumerate() {
+                let middle = |v: usize, size: usize| ((v << level) + ((1 << level) >> 1)).min(size - 1);
+                let (x, y) = (middle(at % width, picture.width), middle(at / width, picture.height));
+                if !self.allows(y * picture.width + x) {
+                    *value = 0;
+                }
+            }
+        }
+        Ok(plane)
+    }
+
+    /// The strongest component of a hue in any picture, 0 to 255.
+    ///
+    /// # Errors
+    /// [`crate::Error::OpenCv`].
+    pub fn strongest(&self, hue: &Hue) -> Result<f64> {
+        let axis = hue.axis(self.matrix);
+        let mut top = 0i16;
+        for picture in &self.pictures {
+            let plane = self.plane(picture, axis, hue.level)?;
+            top = plane.values.iter().copied().fold(top, i16::max);
+        }
+        Ok(to_255(f64::from(top)))
+    }
+}
+
+fn spots_of(plane: &Plane, threshold: f64, thin: bool, least: usize, moved: Option<&[bool]>) -> Result<Vec<Spot>> {
+    let mask = Mask::of_plane(plane, from_255(threshold), thin);
+    let spots = mask.parts()?.into_iter().filter(|part| part.points.len() >= least).map(|part| {
+        let at = |p: &[usize; 2]| p[1] * plane.width + p[0];
+        let moving = moved.map_or(0, |m| part.points.iter().filter(|p| m[at(p)]).count());
+        let top = part.points.iter().map(|p| plane.values[at(p)]).max().unwrap_or(0);
+        let summit = Summit { top: 0.0, saddle: 0.0, samples: part.points.len(), moved: moving };
+        Spot { roundness: part.roundness(), moves: summit.moves(), top: to_255(f64::from(top)), part }
+    });
+    Ok(spots.collect())
+}
+
+/// How well the spots of the pictures look like `marks` marks.
+fn quality(pictures: &[Vec<Spot>], marks: usize, moves: bool, luma: bool) -> f64 {
+    let of_picture = |spots: &Vec<Spot>| {
+        let mut worth: Vec<f64> = spots
+            .iter()
+            .filter(|s| s.roundness >= LEAST_ROUNDNESS)
+            .map(|s| {
+                let still = if moves && !s.moves { STILL_COUNTS } else { 1.0 };
+                let contrast = if luma { s.top / (s.top + HALF_CONTRAST) } else { 1.0 };
+                still * contrast * s.roundness.min(1.0)
+            })
+            .collect();
+        worth.sort_by(|a, b| b.total_cmp(a));
+        let spare = spots.iter().filter(|s| s.moves).count().saturating_sub(marks) as f64;
+        worth.iter().take(marks).sum::<f64>() / marks.max(1) as f64 / (1.0 + 0.05 * spare)
+    };
+    pictures.iter().map(of_picture).sum::<f64>() / pictures.len().max(1) as f64
+}
+
+impl Trial {
+    /// Spots that look like marks: round, and moving where anything does.
+    pub fn likely(&self) -> impl Iterator<Item = &Spot> {
+        let moves = self.spots.iter().flatten().any(|s| s.moves);
+        self.spots.iter().flatten().filter(move |s| s.roundness >= LEAST_ROUNDNESS && (s.moves || !moves))
+    }
+
+    /// Usual number of samples of a mark, at the trial's level.
+    pub fn usual_samples(&self) -> Option<f64> {
+        let mut sizes: Vec<f64> = self.likely().map(|s| s.part.points.len() as f64).collect();
+        median(&mut sizes)
+    }
+
+    /// Width of the largest likely spot.
+    fn diameter_samples(&self) -> f64 {
+        let most = self.likely().map(|s| s.part.points.len()).max().unwrap_or(0);
+        let all = self.spots.iter().flatten().filter(|s| s.moves).map(|s| s.part.points.len()).max().unwrap_or(0);
+        (most.max(all) as f64 * 4.0 / std::f64::consts::PI).sqrt()
+    }
+}

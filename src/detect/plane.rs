@@ -1,0 +1,89 @@
+//! The component of a whole picture, at the scale at which a mark is some ten samples wide.
+//!
+//! Level ℓ holds the means of 2^ℓ × 2^ℓ chroma samples: of a large mark the texture averages out, and looking costs
+//! less. A mark without a hue stands out only against what lies around it, so its component is taken as a top hat
+//! (Serra, Image Analysis and Mathematical Morphology, 1982, ch. XII):
+//!
+//! ```text
+//! dark:  (Y • B) − Y      (closing, less the picture)
+//! light: Y − (Y ∘ B)      (the picture, less its opening),     B a square of 2·10 + 1 samples
+//! ```
+//! A spot smaller than B keeps its contrast; a dark chamber or a bright wall, however large, is nothing.
+
+use opencv::core::{BORDER_CONSTANT, Mat, MatTraitConstManual, Point, Size};
+use opencv::imgproc;
+
+use super::component::HueAxis;
+use super::samples::Samples;
+use crate::error::{Error, Result};
+use crate::video::Picture;
+
+/// Half the side of the top hat's square: more than the width of a mark at its level.
+const HALF_HAT: i32 = 10;
+
+/// The component, sample by sample.
+#[derive(Debug, Clone)]
+pub struct Plane {
+    pub width: usize,
+    pub height: usize,
+    /// 2^level chroma samples a sample.
+    pub level: u32,
+    /// 64ths of an 8-bit code.
+    pub values: Vec<i16>,
+}
+
+impl Plane {
+    /// Of a picture.
+    pub fn of(picture: &Picture<'_>, axis: HueAxis, level: u32) -> Result<Self> {
+        let (width, height) = picture.layout.chroma_size();
+        let rows = |y: usize, row: &mut Vec<i16>| axis.row(picture, y, 0..width, row);
+        Self::from_rows(width, height, level, &rows).against_surroundings(axis)
+    }
+
+    /// Of a picture that was kept.
+    pub fn of_samples(samples: &Samples, axis: HueAxis, level: u32) -> Result<Self> {
+        let rows = |y: usize, row: &mut Vec<i16>| samples.row(axis, y, row);
+        Self::from_rows(samples.width, samples.height, level, &rows).against_surroundings(axis)
+    }
+
+    fn from_rows(width: usize, height: usize, level: u32, fill: &dyn Fn(usize, &mut Vec<i16>)) -> Self {
+        let (columns, rows) = ((width >> level).max(1), (height >> level).max(1));
+        let mut values = Vec::with_capacity(columns * rows);
+        if level == 0 {
+            (0..height).for_each(|y| fill(y, &mut values));
+            return Self { width, height, level, values };
+        }
+        let side = 1usize << level;
+        let mut row = Vec::with_capacity(width);
+        for y in 0..rows {
+            let mut sums = vec![0i32; columns];
+            for k in y * side..((y + 1) * side).min(height) {
+                row.clear();
+                fill(k, &mut row);
+                for (sum, run) in sums.iter_mut().zip(row.chunks(side)) {
+                    *sum += run.iter().map(|v| i32::from(*v)).sum::<i32>();
+                }
+            }
+            values.extend(sums.iter().map(|sum| (sum >> (2 * level)) as i16));
+        }
+        Self { width: columns, height: rows, level, values }
+    }
+
+    fn against_surroundings(mut self, axis: HueAxis) -> Result<Self> {
+        if axis.is_luma() {
+            self.values = self.top_hat().map_err(Error::opencv("comparing with the surroundings"))?;
+        }
+        Ok(self)
+    }
+
+    fn top_hat(&self) -> opencv::Result<Vec<i16>> {
+        let picture = Mat::new_rows_cols_with_data(self.height as i32, self.width as i32, &self.values)?;
+        let mut hat = Mat::default();
+        let side = 2 * HALF_HAT + 1;
+        let kernel = imgproc::get_structuring_element(imgproc::MORPH_RECT, Size::new(side, side), Point::new(-1, -1))?;
+        let border = imgproc::morphology_default_border_value()?;
+        let (kind, anchor) = (imgproc::MORPH_TOPHAT, Point::new(-1, -1));
+        imgproc::morphology_ex(&picture, &mut hat, kind, &kernel, anchor, 1, BORDER_CONSTANT, border)?;
+        Ok(hat.data_typed::<i16>()?.to_vec())
+    }
+}

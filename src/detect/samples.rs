@@ -1,0 +1,241 @@
+//! Pictures of a recording, kept at chroma resolution, and what moves between them.
+
+use super::component::{HueAxis, luma_at};
+use crate::statistics::median;
+use crate::video::{Matrix, Picture};
+
+/// One picture: luma and both colour differences at every chroma sample, 8-bit codes.
+#[derive(Debug, Clone)]
+pub struct Samples {
+    pub width: usize,
+    pub height: usize,
+    pub luma: Vec<u8>,
+    pub cb: Vec<u8>,
+    pub cr: Vec<u8>,
+}
+
+impl Samples {
+    /// Of a picture.
+    pub fn of(picture: &Picture<'_>) -> Self {
+        let (width, height) = picture.layout.chroma_size();
+        let down = picture.layout.low_bits + picture.layout.bits - 8;
+        let mut samples = Self { width, height, luma: Vec::new(), cb: Vec::new(), cr: Vec::new() };
+        for y in 0..height {
+            samples.luma.extend((0..width).map(|x| luma_at(picture, x, y)));
+            samples.cb.extend((0..width).map(|x| (picture.cb.code(picture.wide(), x, y) >> down) as u8));
+            samples.cr.extend((0..width).map(|x| (picture.cr.code(picture.wide(), x, y) >> down) as u8));
+        }
+        samples
+    }
+
+    /// The components of row `y`, added to `row`.
+    pub fn row(&self, axis: HueAxis, y: usize, row: &mut Vec<i16>) {
+        let range = y * self.width..(y + 1) * self.width;
+        if axis.is_luma() {
+            row.extend(self.luma[range].iter().map(|v| axis.of_luma(*v)));
+        } else {
+            row.extend(self.cb[range.clone()].iter().zip(&self.cr[range]).map(|(b, r)| axis.of(*b, *r)));
+        }
+    }
+
+    /// C_b and C_r about neutral.
+    pub fn chroma(&self, at: usize) -> [f64; 2] {
+        [f64::from(self.cb[at]) - 128.0, f64::from(self.cr[at]) - 128.0]
+    }
+
+    fn channels(&self) -> [&[u8]; 3] {
+        [&self.luma, &self.cb, &self.cr]
+    }
+}
+
+/// Codes of luma, and of a colour difference, by which a sample must differ from what usually is there.
+const LEAST_CHANGE: [u8; 3] = [14, 7, 7];
+/// Pictures below which nothing is known about what moves.
+const LEAST_PICTURES: usize = 3;
+
+/// Some pictures of one recording.
+#[derive(Debug, Clone, Default)]
+pub struct Album {
+    /// The pictures.
+    pub pictures: Vec<Samples>,
+    /// For every picture, where it differs from what usually is there.
+    pub moved: Vec<Vec<bool>>,
+    /// How colours are coded.
+    pub matrix: Matrix,
+    /// log₂ of luma columns and rows in a chroma sample.
+    pub shifts: [u32; 2],
+    /// Codes go from 0 to 255 rather than from 16 to 235.
+    pub full_range: bool,
+    /// Which samples are looked at; all where absent.
+    pub allowed: Option<Vec<bool>>,
+}
+
+impl Album {
+    /// Adds a picture; one of another size than the first is passed over.
+    pub fn see(&mut self, picture: &Picture<'_>) {
+        let samples = Samples::of(picture);
+        if self.pictures.first().is_none_or(|p| (p.width, p.height) == (samples.width, samples.height)) {
+            self.matrix = picture.layout.matrix;
+            self.full_range = picture.layout.full_range;
+            self.shifts = [picture.layout.chroma_shift_x, picture.layout.chroma_shift_y];
+            self.pictures.push(samples);
+        }
+    }
+
+    /// Looks only at these samples.
+    pub fn allow(&mut self, samples: Option<Vec<bool>>) {
+        self.allowed = samples;
+    }
+
+    /// A sample is looked at.
+    pub(super) fn allows(&self, at: usize) -> bool {
+        self.allowed.as_ref().is_none_or(|a| a[at])
+    }
+
+    /// Finds what moves, once all pictures are there.
+    pub fn compare(&mut self) {
+        self.moved.clear();
+        if self.pictures.len() < LEAST_PICTURES {
+            return;
+        }
+        let usual = self.usual();
+        for picture in &self.pictures {
+            let mut moved = vec![false; usual[0].len()];
+            for ((codes, usual), least) in picture.channels().iter().zip(&usual).zip(LEAST_CHANGE) {
+                for ((moved, code), usual) in moved.iter_mut().zip(*codes).zip(usual) {
+                    *moved |= code.abs_diff(*usual) > least;
+                }
+            }
+            self.moved.push(moved);
+        }
+    }
+
+    /// The median picture: luma, C_b, C_r.
+    pub fn usual(&self) -> [Vec<u8>; 3] {
+        let middle = self.pictures.len() / 2;
+        [0, 1, 2].map(|channel| {
+            let planes: Vec<&[u8]> = self.pictures.iter().map(|p| p.channels()[channel]).collect();
+            let mut codes = vec![0u8; planes.len()];
+            (0..planes.first().map_or(0, |p| p.len()))
+                .map(|at| {
+                    codes.iter_mut().zip(&planes).for_each(|(code, plane)| *code = plane[at]);
+                    codes.sort_unstable();
+                    codes[middle]
+                })
+                .collect()
+        })
+    }
+
+    /// Area of a chroma sample.
+    pub fn sample_px2(&self) -> f64 {
+        f64::from(1u32 << (self.shifts[0] + self.shifts[1]))
+    }
+}
+
+/// A hue that things in the pictures have.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct HuePeak {
+    /// From C_b towards C_r.
+    pub angle_rad: f64,
+    /// Chroma of all samples that have it.
+    pub weight: f64,
+}
+
+const BINS: usize = 72;
+/// Chroma below which a sample has no hue, codes.
+const LEAST_CHROMA: f64 = 8.0;
+/// What counts a sample that does not move, against one that does.
+const STILL_SHARE: f64 = 0.02;
+/// Half width of a hue, rad: shading, texture and the codec spread it.
+const HALF_PEAK_RAD: f64 = 0.22;
+
+impl Album {
+    /// The hues within `half_width_rad` of `centre_rad`, strongest first: of what moves above all.
+    pub fn hues(&self, centre_rad: f64, half_width_rad: f64) -> Vec<HuePeak> {
+        let bin_rad = std::f64::consts::TAU / BINS as f64;
+        let mut weights = [0.0f64; BINS];
+        let mut samples: Vec<(f64, f64)> = Vec::new();
+        for (n, picture) in self.pictures.iter().enumerate() {
+            for at in 0..picture.cb.len() {
+                let [b, r] = picture.chroma(at);
+                let chroma = b.hypot(r);
+                if chroma < LEAST_CHROMA || !self.allows(at) {
+                    continue;
+                }
+                let off = turn(r.atan2(b) - centre_rad);
+                if off.abs() > half_width_rad {
+                    continue;
+                }
+                let weight = chroma * if self.moved.get(n).is_none_or(|m| m[at]) { 1.0 } else { STILL_SHARE };
+                let bin = ((off / bin_rad).round() as i64).rem_euclid(BINS as i64) as usize;
+                weights[bin] += weight;
+                samples.push((off, weight));
+            }
+        }
+        let smooth: Vec<f64> =
+            (0..BINS).map(|i| weights[(i + BINS - 1) % BINS] + 2.0 * weights[i] + weights[(i + 1) % BINS]).collect();
+        let mut peaks: Vec<HuePeak> = (0..BINS)
+            .filter(|i| {
+                let [before, after] = [(i + BINS - 1) % BINS, (i + 1) % BINS];
+                smooth[*i] > 0.0 && smooth[*i] >= smooth[before] && smooth[*i] > smooth[after]
+            })
+            .map(|i| {
+                let middle = turn(i as f64 * bin_rad);
+                let near = samples.iter().filter(|(off, _)| turn(off - middle).abs() < HALF_PEAK_RAD);
+                let (sum, weight) =
+                    near.fold((0.0, 0.0), |(s, w), (off, weight)| (s + weight * turn(off - middle), w + weight));
+                HuePeak { angle_rad: turn(centre_rad + middle + sum / weight.max(1e-9)), weight }
+            })
+            .collect();
+        peaks.sort_by(|a, b| b.weight.total_cmp(&a.weight));
+        peaks
+    }
+
+    /// The usual colour of some samples, (picture, sample): red, green, blue, 0 to 255.
+    pub fn colour_of(&self, samples: &[(usize, usize)]) -> Option<[u8; 3]> {
+        let code = |channel: usize| {
+            let mut codes: Vec<f64> =
+                samples.iter().map(|(n, at)| f64::from(self.pictures[*n].channels()[channel][*at])).collect();
+            median(&mut codes)
+        };
+        let (black, luma_span, chroma_span) = if self.full_range { (0.0, 255.0, 255.0) } else { (16.0, 219.0, 224.0) };
+        let ycbcr =
+            [(code(0)? - black) / luma_span, (code(1)? - 128.0) / chroma_span, (code(2)? - 128.0) / chroma_span];
+        Some(self.matrix.rgb(ycbcr).map(|c| (255.0 * c).round().clamp(0.0, 255.0) as u8))
+    }
+}
+
+/// An angle in −π..π.
+pub fn turn(angle_rad: f64) -> f64 {
+    let tau = std::f64::consts::TAU;
+    angle_rad - tau * (angle_rad / tau).round()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A grey picture of 40×40 samples with a square of a colour difference at (x, y).
+    fn picture(x: usize, cb: u8, cr: u8) -> Samples {
+        let mut samples =
+            Samples { width: 40, height: 40, luma: vec![100; 1600], cb: vec![128; 1600], cr: vec![128; 1600] };
+        for j in 10..16 {
+            for i in x..x + 6 {
+                (samples.cb[40 * j + i], samples.cr[40 * j + i]) = (cb, cr);
+            }
+            // what stands still and has a hue as well
+            (samples.cb[40 * j + 39], samples.cr[40 * j + 39]) = (100, 170);
+        }
+        samples
+    }
+
+    #[test]
+    fn the_hue_of_what_moves_comes_before_that_of_what_stands() {
+        let mut album = Album { pictures: (0..5).map(|i| picture(6 * i, 168, 108)).collect(), ..Album::default() };
+        album.compare();
+        let peaks = album.hues(0.0, std::f64::consts::PI);
+        let moving = (-20.0f64).atan2(40.0);
+        assert!(turn(peaks[0].angle_rad - moving).abs() < 0.02, "{peaks:?}");
+        assert!(album.moved[0][40 * 12 + 2] && !album.moved[0][40 * 12 + 39]);
+    }
+}

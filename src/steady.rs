@@ -1,0 +1,383 @@
+//! How the camera moves against what stands still: the background itself, or fixed reference marks.
+//!
+//! Small patches of one picture are found again in every other (Lucas and Kanade, IJCAI 1981; in the inverse form of
+//! Baker and Matthews, IJCV 56 (2004) 221), a difference in brightness aside. The shifts of all patches give one
+//! shift and one turn of the camera; patches that disagree lie on what swings, and are left out:
+//!
+//! ```text
+//! Δx = t_x − φ (y − y_c),   Δy = t_y + φ (x − x_c)
+//! ```
+
+use crate::statistics::median;
+use crate::video::Picture;
+
+/// Half the side of a patch.
+const HALF: i64 = 15;
+/// Farthest that a patch is sought, px.
+const REACH_PX: i64 = 20;
+/// Columns and rows of cells, each with one patch.
+const CELLS: [usize; 2] = [8, 6];
+/// Mean square of the weaker gradient, codes², below which a patch is too plain to be found again.
+const LEAST_GRADIENT: f64 = 2.0;
+/// Patches that are sought over the whole reach, to begin with.
+const SCOUTS: usize = 9;
+/// Fewest patches of the background that must agree.
+const FEWEST_AGREEING: usize = 6;
+/// Residual within which a patch agrees, px, at least.
+const AGREEMENT_PX: f64 = 0.25;
+
+/// Where the camera looks in one picture, against the reference picture.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub struct CameraShift {
+    /// What lay at p lies at p + shift, at the centre of the picture.
+    pub shift_px: [f64; 2],
+    /// Turn about the centre.
+    pub turn_rad: f64,
+    /// Centre of the picture.
+    pub centre_px: [f64; 2],
+    /// Standard deviation of the shift, from how far the patches disagree.
+    pub sd_px: f64,
+    /// Patches that agree.
+    pub patches: usize,
+}
+
+impl CameraShift {
+    fn at(&self, p: [f64; 2]) -> [f64; 2] {
+        let [x, y] = [p[0] - self.centre_px[0], p[1] - self.centre_px[1]];
+        [self.shift_px[0] - self.turn_rad * y, self.shift_px[1] + self.turn_rad * x]
+    }
+
+    /// Where a point of this picture lies in the reference picture.
+    pub fn undo(&self, p: [f64; 2]) -> [f64; 2] {
+        let shift = self.at(p);
+        [p[0] - shift[0], p[1] - shift[1]]
+    }
+
+    /// Length of the shift.
+    pub fn size_px(&self) -> f64 {
+        self.shift_px[0].hypot(self.shift_px[1])
+    }
+}
+
+/// A piece of the reference picture.
+#[derive(Debug, Clone)]
+struct Patch {
+    x: i64,
+    y: i64,
+    /// Luma less its mean, and its gradients, row by row.
+    values: Vec<f32>,
+    gradients: Vec<[f32; 2]>,
+    /// Inverse of Σ ∇ ∇ᵀ: xx, xy, yy.
+    inverse: [f64; 3],
+    /// Mean square of the weaker gradient.
+    strength: f64,
+}
+
+/// What stands still.
+#[derive(Debug, Clone)]
+pub struct Background {
+    patches: Vec<Patch>,
+    centre_px: [f64; 2],
+    /// The user named the patches: they are believed.
+    named: bool,
+}
+
+impl Background {
+    /// Of a picture: patches spread over it, or around the points that are given (stored pixels).
+    pub fn of(picture: &Picture<'_>, points_px: &[[f64; 2]]) -> Self {
+        let luma = Luma::of(picture);
+        let centre_px = [0.5 * luma.width as f64, 0.5 * luma.height as f64];
+        let patches = if points_px.is_empty() {
+            corners(&luma)
+        } else {
+            points_px.iter().filter_map(|p| Patch::at(&luma, p[0].round() as i64, p[1].round() as i64)).collect()
+        };
+        Self { patches, centre_px, named: !points_px.is_empty() }
+    }
+
+    /// Where the camera looks in a picture; `None` where too little of the background is found again.
+    pub fn locate(&self, picture: &Picture<'_>) -> Option<CameraShift> {
+        let luma = Luma::of(picture);
+        let start = self.scout(&luma)?;
+        let found: Vec<([f64; 2], [f64; 2])> =
+            self.patches.iter().filter_map(|p| Some(([p.x as f64, p.y as f64], p.find(&luma, start)?))).collect();
+        self.agree(found)
+    }
+
+    /// A first shift in whole pixels: what most of the strongest patches say.
+    fn scout(&self, luma: &Luma<'_>) -> Option<[f64; 2]> {
+        let mut shifts: [Vec<f64>; 2] = [Vec::new(), Vec::new()];
+        for patch in self.patches.iter().take(SCOUTS) {
+            if let Some(shift) = patch.search(luma) {
+                (0..2).for_each(|axis| shifts[axis].push(shift[axis]));
+            }
+        }
+        let [x, y] = shifts.map(|mut s| median(&mut s));
+        Some([x?, y?])
+    }
+
+    /// Shift and turn on which most patches agree, by least squares over those that do.
+    fn agree(&self, found: Vec<([f64; 2], [f64; 2])>) -> Option<CameraShift> {
+        let [mx, my] = [0, 1].map(|axis| median(&mut found.iter().map(|f| f.1[axis]).collect::<Vec<_>>()));
+        let mut camera =
+            CameraShift { shift_px: [mx?, my?], centre_px: self.centre_px, patches: found.len(), ..Default::default() };
+        let fewest = if self.named { 1 } else { FEWEST_AGREEING };
+        for round in 0..6 {
+            let rest = |f: &([f64; 2], [f64; 2])| {
+                let at = camera.at(f.0);
+                (f.1[0] - at[0]).hypot(f.1[1] - at[1])
+            };
+            let usual = median(&mut found.iter().map(rest).collect::<Vec<_>>()).unwrap_or(0.0);
+            // a turn is not known yet in the first round
+            let limit = (3.0 * usual).max(if round == 0 { 2.0 } else { AGREEMENT_PX });
+            let kept: Vec<_> = found.iter().filter(|f| rest(f) <= limit).collect();
+            if kept.len() < fewest {
+                return None;
+            }
+            let squares: f64 = kept.iter().map(|f| rest(f).powi(2)).sum();
+            camera = self.least_squares(&kept)?;
+            camera.sd_px = (0.5 * squares).sqrt() / kept.len() as f64;
+        }
+        Some(camera)
+    }
+
+    fn least_squares(&self, kept: &[&([f64; 2], [f64; 2])]) -> Option<CameraShift> {
+        let turns = kept.len() >= 4;
+        let mut normal = nalgebra::Matrix3::<f64>::zeros();
+        let mut right = nalgebra::Vector3::<f64>::zeros();
+        for (place, shift) in kept {
+            let (x, y) = (place[0] - self.centre_px[0], place[1] - self.centre_px[1]);
+            for (row, value) in [([1.0, 0.0, -y], shift[0]), ([0.0, 1.0, x], shift[1])] {
+                let row = nalgebra::Vector3::from(row);
+                normal += row * row.transpose();
+                right += row * value;
+            }
+        }
+        if !turns {
+            // so few cannot tell a turn from a shift
+            normal[(2, 2)] += 1e12;
+        }
+        let solution = normal.cholesky()?.solve(&right);
+        Some(CameraShift {
+            shift_px: [solution[0], solution[1]],
+            turn_rad: solution[2],
+            centre_px: self.centre_px,
+            sd_px: 0.0,
+            patches: kept.len(),
+        })
+    }
+}
+
+/// The best patch of every cell, the clearest first.
+fn corners(luma: &Luma<'_>) -> Vec<Patch> {
+    let mut patches = Vec::new();
+    let margin = HALF + REACH_PX / 2;
+    for row in 0..CELLS[1] {
+        for column in 0..CELLS[0] {
+            let range = |cell: usize, cells: usize, size: usize| {
+                let at = |c: usize| (c * size / cells) as i64;
+                (at(cell).max(margin)..at(cell + 1).min(size as i64 - margin)).step_by(9)
+            };
+            let mut best: Option<Patch> = None;
+            for y in range(row, CELLS[1], luma.height) {
+                for x in range(column, CELLS[0], luma.width) {
+                    let Some(patch) = Patch::at(luma, x, y) else { continue };
+                    if best.as_ref().is_none_or(|b| patch.strength > b.strength) {
+                        best = Some(patch);
+                    }
+                }
+            }
+            patches.extend(best.filter(|p| p.strength > LEAST_GRADIENT));
+        }
+    }
+    patches.sort_by(|a, b| b.strength.total_cmp(&a.strength));
+    patches
+}
+
+impl Patch {
+    fn at(luma: &Luma<'_>, x: i64, y: i64) -> Option<Self> {
+        let inside = |v: i64, size: usize| v > HALF + 1 && v + HALF + 2 < size as i64;
+        if !inside(x, luma.width) || !inside(y, luma.height) {
+            return None;
+        }
+        let side = (2 * HALF + 1) as usize;
+        let mut values = Vec::with_capacity(side * side);
+        let mut gradients = Vec::with_capacity(side * side);
+        let mut sums = [0.0f64; 3];
+        for j in y - HALF..=y + HALF {
+            for i in x - HALF..=x + HALF {
+                values.push(luma.code(i, j));
+                let gradient = [
+                    0.5 * (luma.code(i + 1, j) - luma.code(i - 1, j)),
+                    0.5 * (luma.code(i, j + 1) - luma.code(i, j - 1)),
+                ];
+                let [gx, gy] = gradient.map(f64::from);
+                sums.iter_mut().zip([gx * gx, gx * gy, gy * gy]).for_each(|(sum, term)| *sum += term);
+                gradients.push(gradient);
+            }
+        }
+        let mean = values.iter().sum::<f32>() / values.len() as f32;
+        values.iter_mut().for_each(|v| *v -= mean);
+        let [xx, xy, yy] = sums;
+        let determinant = xx * yy - xy * xy;
+        let weaker = 0.5 * (xx + yy) - (0.25 * (xx - yy).powi(2) + xy * xy).sqrt();
+        (determinant > 1e-9).then(|| Self {
+            x,
+            y,
+            inverse: [yy / determinant, -xy / determinant, xx / determinant],
+            strength: weaker / values.len() as f64,
+            values,
+            gradients,
+        })
+    }
+
+    /// The shift in whole pixels with the least difference, every third pixel compared.
+    fn search(&self, luma: &Luma<'_>) -> Option<[f64; 2]> {
+        let mut best: Option<(f32, [i64; 2])> = None;
+        let side = 2 * HALF + 1;
+        let mut consider = |dx: i64, dy: i64| {
+            if !luma.holds(self.x + dx, self.y + dy) {
+                return;
+            }
+            let (mut sum, mut squares, mut count) = (0.0f32, 0.0f32, 0.0f32);
+            for j in (0..side).step_by(3) {
+                for i in (0..side).step_by(3) {
+                    let value = luma.code(self.x + dx + i - HALF, self.y + dy + j - HALF);
+                    let difference = value - self.values[(j * side + i) as usize];
+                    (sum, squares, count) = (sum + difference, squares + difference * difference, count + 1.0);
+                }
+            }
+            let variance = squares / count - (sum / count).powi(2);
+            if best.is_none_or(|(least, _)| variance < least) {
+                best = Some((variance, [dx, dy]));
+            }
+        };
+        for dy in (-REACH_PX..=REACH_PX).step_by(2) {
+            for dx in (-REACH_PX..=REACH_PX).step_by(2) {
+                consider(dx, dy);
+            }
+        }
+        best.map(|(_, shift)| shift.map(|s| s as f64))
+    }
+
+    /// The shift to a fraction of a pixel, from a first one.
+    fn find(&self, luma: &Luma<'_>, start: [f64; 2]) -> Option<[f64; 2]> {
+        let mut shift = start;
+        let mut values = Vec::with_capacity(self.values.len());
+        for _ in 0..20 {
+            luma.read(self.x as f64 + shift[0], self.y as f64 + shift[1], &mut values)?;
+            let mean = values.iter().sum::<f32>() / values.len() as f32;
+            let mut push = [0.0f64; 2];
+            for ((value, own), gradient) in values.iter().zip(&self.values).zip(&self.gradients) {
+                let difference = f64::from(value - mean - own);
+                push[0] += f64::from(gradient[0]) * difference;
+                push[1] += f64::from(gradient[1]) * difference;
+            }
+            let [xx, xy, yy] = self.inverse;
+            let step = [xx * push[0] + xy * push[1], xy * push[0] + yy * push[1]];
+            (0..2).for_each(|axis| shift[axis] -= step[axis].clamp(-2.0, 2.0));
+            if (shift[0] - start[0]).hypot(shift[1] - start[1]) > 6.0 {
+                return None;
+            }
+            if step[0].hypot(step[1]) < 3e-3 {
+                return Some(shift);
+            }
+        }
+        None
+    }
+}
+
+/// The luma of a picture as 8-bit codes.
+struct Luma<'a> {
+    picture: &'a Picture<'a>,
+    width: usize,
+    height: usize,
+    scale: f32,
+}
+
+impl<'a> Luma<'a> {
+    fn of(picture: &'a Picture<'a>) -> Self {
+        let layout = picture.layout;
+        let scale = 1.0 / f32::from(1u16 << (layout.bits - 8)) / f32::from(1u16 << layout.low_bits);
+        Self { picture, width: layout.width_px, height: layout.height_px, scale }
+    }
+
+    #[inline]
+    fn code(&self, x: i64, y: i64) -> f32 {
+        f32::from(self.picture.luma.code(self.picture.wide(), x as usize, y as usize)) * self.scale
+    }
+
+    /// A patch about this pixel lies inside.
+    fn holds(&self, x: i64, y: i64) -> bool {
+        x > HALF && y > HALF && x + HALF + 2 < self.width as i64 && y + HALF + 2 < self.height as i64
+    }
+
+    /// The patch about a point between pixels.
+    fn read(&self, x: f64, y: f64, values: &mut Vec<f32>) -> Option<()> {
+        let (i, j) = (x.floor() as i64, y.floor() as i64);
+        if !self.holds(i, j) {
+            return None;
+        }
+        let (s, t) = ((x - i as f64) as f32, (y - j as f64) as f32);
+        values.clear();
+        for b in j - HALF..=j + HALF {
+            for a in i - HALF..=i + HALF {
+                let upper = self.code(a, b) + s * (self.code(a + 1, b) - self.code(a, b));
+                let lower = self.code(a, b + 1) + s * (self.code(a + 1, b + 1) - self.code(a, b + 1));
+                values.push(upper + t * (lower - upper));
+            }
+        }
+        Some(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::video::{Layout, Matrix, OwnedPicture};
+
+    fn textured(shift: [f64; 2]) -> OwnedPicture {
+        let layout = Layout {
+            width_px: 320,
+            height_px: 240,
+            bits: 8,
+            low_bits: 0,
+            chroma_shift_x: 1,
+            chroma_shift_y: 1,
+            chroma_site_px: [0.5, 0.5],
+            full_range: true,
+            matrix: Matrix::Bt601,
+        };
+        let mut picture = OwnedPicture::black(layout);
+        for y in 0..240 {
+            for x in 0..320 {
+                let (u, v) = (x as f64 - shift[0], y as f64 - shift[1]);
+                let mut value = 120.0 + 30.0 * (0.21 * u + 0.05 * v).sin() + 30.0 * (0.17 * v - 0.04 * u).cos();
+                value += 20.0 * (0.013 * u * v).sin();
+                // what swings, and must not count
+                if (140..200).contains(&x) {
+                    value = 120.0 + 60.0 * (0.3 * (u - 3.0 * shift[0])).sin();
+                }
+                picture.set(0, y * 320 + x, value.round() as u16);
+            }
+        }
+        picture
+    }
+
+    #[test]
+    fn a_shift_of_the_camera_is_found_to_hundredths_beside_what_swings() {
+        let (reference, shaken) = (textured([0.0, 0.0]), textured([6.3, -4.6]));
+        let background = Background::of(&reference.view(), &[]);
+        let camera = background.locate(&shaken.view()).unwrap();
+        assert!((camera.shift_px[0] - 6.3).abs() < 0.05 && (camera.shift_px[1] + 4.6).abs() < 0.05, "{camera:?}");
+        let still = background.locate(&reference.view()).unwrap();
+        assert!(still.size_px() < 0.01, "{still:?}");
+    }
+
+    #[test]
+    fn a_plain_wall_is_no_reference() {
+        let layout = textured([0.0; 2]).layout;
+        let black = OwnedPicture::black(layout);
+        assert!(Background::of(&black.view(), &[]).locate(&black.view()).is_none());
+    }
+}
