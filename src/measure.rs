@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use crate::angles::{AngleSource, Angles, angles_from_tracks};
 use crate::area::Area;
 use crate::calibrate::Calibration;
-use crate::detect::{Album, Blob, Detector, Hue};
+use crate::detect::{Album, Blob, Detector, Hue, Siting, SitingSurvey};
 use crate::error::{Error, Result};
 use crate::experiment::{MarkColour, Rig};
 use crate::progress::Progress;
@@ -130,6 +130,7 @@ pub struct Session<'a> {
     area: Area,
     album: Album,
     hues: Vec<Hue>,
+    siting: Option<Siting>,
     slots: Vec<MarkSlot>,
     background: Option<Background>,
     camera: Camera,
@@ -157,6 +158,7 @@ impl<'a> Session<'a> {
         album.compare();
         album.calibrate(&mut hues, options.threshold)?;
         let (background, camera) = look.finish(options.steadying);
+        let siting = siting_of(&recording, &hues)?;
         let (path, stamps_s) = (path.to_owned(), Vec::new());
         Ok(Self {
             path,
@@ -167,6 +169,7 @@ impl<'a> Session<'a> {
             area,
             album,
             hues,
+            siting,
             slots,
             background,
             camera,
@@ -190,7 +193,7 @@ impl<'a> Session<'a> {
     /// As [`measure`].
     pub fn run(&mut self, progress: &dyn Progress) -> Result<Measurement> {
         let rig = &self.options.rig;
-        let detector = Detector::new(self.hues.clone());
+        let detector = Detector::new(self.hues.clone()).with_siting(self.siting);
         let mut tracker = Tracker::new(self.slots.clone(), rig.pivot_px);
         progress.begin("tracking", self.stream.stated_frames);
         let view = View {
@@ -251,6 +254,19 @@ impl<'a> Session<'a> {
         let (stream, hues, camera) = (self.stream.clone(), self.hues.clone(), self.camera);
         Ok(Measurement { stream, decoded, timing, hues, tracks, angles, file_t_s, time_scale, camera })
     }
+}
+
+/// Where the chroma samples lie, from marks in pictures spread over the recording.
+fn siting_of(recording: &Recording, hues: &[Hue]) -> Result<Option<Siting>> {
+    let detector = Detector::new(hues.to_vec());
+    let mut survey = SitingSurvey::default();
+    let mut seen = Ok(());
+    recording.sample(SAMPLE_PICTURES, &mut |frame| {
+        if seen.is_ok() {
+            seen = survey.see(&frame.picture, &detector);
+        }
+    })?;
+    seen.map(|()| survey.conclude())
 }
 
 /// Watches for a camera that moves, in pictures spread over the recording.

@@ -23,6 +23,8 @@ const LEAST_GRADIENT: f64 = 2.0;
 const SCOUTS: usize = 9;
 /// Fewest patches of the background that must agree.
 const FEWEST_AGREEING: usize = 6;
+/// Correlation of a patch with what it is found as, at least: three quarters of the variance in common.
+const LEAST_CORRELATION: f32 = 0.85;
 /// Residual within which a patch agrees, px, at least.
 const AGREEMENT_PX: f64 = 0.25;
 
@@ -131,7 +133,8 @@ impl Background {
             // a turn is not known yet in the first round
             let limit = (3.0 * usual).max(if round == 0 { 2.0 } else { AGREEMENT_PX });
             let kept: Vec<_> = found.iter().filter(|f| rest(f) <= limit).collect();
-            if kept.len() < fewest {
+            let few = !self.named && (2 * kept.len() < found.len() || !self.is_spread(&kept));
+            if kept.len() < fewest || few {
                 return None;
             }
             let squares: f64 = kept.iter().map(|f| rest(f).powi(2)).sum();
@@ -139,6 +142,15 @@ impl Background {
             camera.sd_px = (0.5 * squares).sqrt() / kept.len() as f64;
         }
         Some(camera)
+    }
+
+    /// The patches reach over half of the picture's width and height. A rigid strip that swings shifts and turns like a
+    /// camera, but it is no background.
+    fn is_spread(&self, kept: &[&([f64; 2], [f64; 2])]) -> bool {
+        (0..2).all(|axis| {
+            let at = kept.iter().map(|k| k.0[axis]);
+            at.clone().fold(f64::MIN, f64::max) - at.fold(f64::MAX, f64::min) >= self.centre_px[axis]
+        })
     }
 
     fn least_squares(&self, kept: &[&([f64; 2], [f64; 2])]) -> Option<CameraShift> {
@@ -260,6 +272,16 @@ impl Patch {
         best.map(|(_, shift)| shift.map(|s| s as f64))
     }
 
+    /// The values found correlate with the patch's own; a patch that holds only noise finds something everywhere.
+    fn resembles(&self, values: &[f32], mean: f32) -> bool {
+        let (mut both, mut own, mut other) = (0.0f32, 0.0f32, 0.0f32);
+        for (a, b) in self.values.iter().zip(values) {
+            let b = b - mean;
+            (both, own, other) = (both + a * b, own + a * a, other + b * b);
+        }
+        both > LEAST_CORRELATION * (own * other).sqrt()
+    }
+
     /// The shift to a fraction of a pixel, from a first one.
     fn find(&self, luma: &Luma<'_>, start: [f64; 2]) -> Option<[f64; 2]> {
         let mut shift = start;
@@ -280,7 +302,7 @@ impl Patch {
                 return None;
             }
             if step[0].hypot(step[1]) < 3e-3 {
-                return Some(shift);
+                return self.resembles(&values, mean).then_some(shift);
             }
         }
         None

@@ -1,6 +1,6 @@
 //! Frame → blobs: the scan for the hue, the binary mask, its connected regions.
 
-use super::centroid::{self, Centroid};
+use super::centroid::{self, Centroid, Channels};
 use super::component::{BLOCK, HueAxis};
 use super::mask::{Mask, Part};
 use super::plane::Plane;
@@ -66,7 +66,7 @@ const MOST_BLOBS: usize = 40;
 const MARGIN: usize = 6;
 
 /// Finds and measures the blobs of one hue.
-pub(super) fn find(picture: &Picture<'_>, target: &Target, blobs: &mut Vec<Blob>) -> Result<()> {
+pub(super) fn find(picture: &Picture<'_>, target: &Target, channels: Channels, blobs: &mut Vec<Blob>) -> Result<()> {
     let mut parts: Vec<(Part, Option<&Plane>)> = Vec::new();
     let plane;
     if target.is_sought_everywhere() {
@@ -90,7 +90,7 @@ pub(super) fn find(picture: &Picture<'_>, target: &Target, blobs: &mut Vec<Blob>
         };
         let samples = part.points.len() as u32;
         let binary_px = silhouette.centre_px;
-        if let Some(centroid) = centroid::measure(picture, target.axis, &silhouette) {
+        if let Some(centroid) = centroid::measure(picture, target.axis, &silhouette, channels) {
             blobs.push(Blob { hue: target.hue, centroid, binary_px, samples });
         }
     }

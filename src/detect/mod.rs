@@ -10,13 +10,15 @@ mod mask;
 mod morphology;
 mod plane;
 mod samples;
+mod siting;
 mod threshold;
 
 pub use blobs::Blob;
 pub use calibration::{Spot, Trial};
-pub use centroid::Centroid;
+pub use centroid::{Centroid, Channels};
 pub use mask::Part;
 pub use samples::{Album, HuePeak};
+pub use siting::{Siting, SitingSurvey};
 pub use threshold::LEAST_COMPONENT;
 
 use blobs::Target;
@@ -24,7 +26,7 @@ use component::{HueAxis, from_255};
 
 use crate::error::Result;
 use crate::experiment::MarkColour;
-use crate::video::{Matrix, Picture};
+use crate::video::{Layout, Matrix, Picture};
 
 /// What marks look like, and how they are found.
 #[derive(Debug, Clone, PartialEq)]
@@ -77,6 +79,7 @@ impl Hue {
 pub struct Detector {
     hues: Vec<Hue>,
     least_area_px2: f64,
+    siting: Option<Siting>,
 }
 
 /// Smallest mark that is looked for.
@@ -85,7 +88,12 @@ pub const LEAST_AREA_PX2: f64 = 12.0;
 impl Detector {
     /// A detector for `hues`.
     pub fn new(hues: Vec<Hue>) -> Self {
-        Self { hues, least_area_px2: LEAST_AREA_PX2 }
+        Self { hues, least_area_px2: LEAST_AREA_PX2, siting: None }
+    }
+
+    /// With chroma samples where the recording shows them to lie.
+    pub fn with_siting(self, siting: Option<Siting>) -> Self {
+        Self { siting, ..self }
     }
 
     /// The hues it looks for.
@@ -98,9 +106,25 @@ impl Detector {
     /// # Errors
     /// [`crate::Error::OpenCv`].
     pub fn detect(&self, picture: &Picture<'_>) -> Result<Vec<Blob>> {
+        let Some(siting) = &self.siting else { return self.detect_by(picture, Channels::All) };
+        let layout = Layout { chroma_site_px: siting.used_px, ..picture.layout };
+        let mut blobs = self.detect_by(&Picture { layout, ..*picture }, Channels::All)?;
+        for centroid in blobs.iter_mut().map(|b| &mut b.centroid) {
+            for axis in 0..2 {
+                centroid.variance_px2[axis] += (centroid.chroma_share * siting.sd_px[axis]).powi(2);
+            }
+        }
+        Ok(blobs)
+    }
+
+    /// All blobs, measured by some channels alone, the chroma samples where the file states them.
+    ///
+    /// # Errors
+    /// As [`Detector::detect`].
+    pub fn detect_by(&self, picture: &Picture<'_>, channels: Channels) -> Result<Vec<Blob>> {
         let mut blobs = Vec::new();
         for (index, hue) in self.hues.iter().enumerate() {
-            blobs::find(picture, &self.target(index, hue, picture), &mut blobs)?;
+            blobs::find(picture, &self.target(index, hue, picture), channels, &mut blobs)?;
         }
         Ok(blobs)
     }

@@ -46,12 +46,8 @@ const TUKEY: f32 = 4.685;
 pub fn fit(start: Disc, pixels: &[Pixel]) -> Option<Fit> {
     let sweep_px = start.sweep_length_px();
     // the fourth is λ² where the sweep is λ s: α goes with the square of a short sweep, so that its slope by λ vanishes
-    let mut parameters = Vector4::new(
-        f64::from(start.centre_px[0]),
-        f64::from(start.centre_px[1]),
-        f64::from(start.radius_px),
-        1.0,
-    );
+    let mut parameters =
+        Vector4::new(f64::from(start.centre_px[0]), f64::from(start.centre_px[1]), f64::from(start.radius_px), 1.0);
     let prior = (0.5 * f64::from(sweep_px) / SWEEP_SD_PX).powi(2).max(0.25);
     let disc_of = |p: &Vector4<f64>| Disc {
         centre_px: [p[0] as f32, p[1] as f32],

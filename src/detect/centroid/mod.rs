@@ -80,12 +80,7 @@ const PIXELS_SHARING: f64 = 4.0;
 const BLUR_PX: [f32; 2] = [1.3, 0.9];
 
 /// Measures the mark under `silhouette`. `None` where the mark has no contrast or fills the picture.
-pub fn measure(
-    picture: &Picture<'_>,
-    axis: HueAxis,
-    silhouette: &Silhouette,
-    channels: Channels,
-) -> Option<Centroid> {
+pub fn measure(picture: &Picture<'_>, axis: HueAxis, silhouette: &Silhouette, channels: Channels) -> Option<Centroid> {
     let mut outline = Outline::of(picture, axis, silhouette);
     let patch = Patch::read(picture, &outline);
     let surroundings = Surroundings::survey(&patch, &outline, channels)?;
@@ -135,12 +130,7 @@ fn band(patch: &Patch, outline: &Outline, surroundings: &Surroundings, shares: &
 }
 
 /// The surroundings of a disc, with what every sector's band holds beside it and the background.
-fn resurvey(
-    patch: &Patch,
-    outline: &Outline,
-    disc: &Disc,
-    channels: Channels,
-) -> Option<(Surroundings, Vec<Share>)> {
+fn resurvey(patch: &Patch, outline: &Outline, disc: &Disc, channels: Channels) -> Option<(Surroundings, Vec<Share>)> {
     let mut surroundings = Surroundings::survey(patch, outline, channels)?;
     let shares = surroundings.shares(outline)?;
     let shape = disc.evaluator(disc.positions());

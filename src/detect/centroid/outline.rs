@@ -170,8 +170,10 @@ impl Outline {
             let near = [count - 2, count - 1, 0, 1, 2].map(|k| areas_px2[(sector + k) % count]);
             let area = near.iter().sum::<f32>().max(0.0) / 5.0;
             let old = self.radii_px[sector];
-            self.radii_px[sector] =
-                (2.0 * area * count as f32 / TAU).sqrt().clamp(old - self.bands_px[sector], old + self.bands_px[sector]).max(1.0);
+            self.radii_px[sector] = (2.0 * area * count as f32 / TAU)
+                .sqrt()
+                .clamp(old - self.bands_px[sector], old + self.bands_px[sector])
+                .max(1.0);
         }
     }
 
@@ -180,8 +182,7 @@ impl Outline {
         let (right, bottom) = (picture.layout.width_px as f32 - 1.0, picture.layout.height_px as f32 - 1.0);
         patch.samples.iter().any(|s| {
             let (x, y) = (self.centre_px[0] as f32 + s.dx_px, self.centre_px[1] as f32 + s.dy_px);
-            (x <= 0.0 || y <= 0.0 || x >= right || y >= bottom)
-                && matches!(self.zone(s), Zone::Core | Zone::Band)
+            (x <= 0.0 || y <= 0.0 || x >= right || y >= bottom) && matches!(self.zone(s), Zone::Core | Zone::Band)
         })
     }
 }

@@ -50,8 +50,8 @@ impl Share {
         let above = Vector3::from(levels) - Vector3::from(background);
         let share = self.factors.dot(&above);
         let rest = above - share * self.contrast;
-        let foreign = !(-BEYOND_MIXTURE..=1.0 + BEYOND_MIXTURE).contains(&share)
-            || rest.dot(&(self.weight * rest)) > FOREIGN;
+        let foreign =
+            !(-BEYOND_MIXTURE..=1.0 + BEYOND_MIXTURE).contains(&share) || rest.dot(&(self.weight * rest)) > FOREIGN;
         (!foreign).then_some(share)
     }
 

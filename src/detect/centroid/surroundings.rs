@@ -2,9 +2,9 @@
 
 use nalgebra::{Matrix3, Vector3};
 
+use super::Channels;
 use super::outline::{Outline, RING_PX, Zone};
 use super::patch::{CHANNELS, Levels, Patch, Sample};
-use super::Channels;
 use super::share::Share;
 use crate::statistics::median;
 

@@ -1,0 +1,161 @@
+//! Where the chroma samples really lie, from the recording.
+//!
+//! What a file states about its chroma siting is often not what its converter did: swscale averages pairs of pixels,
+//! which sites them in between, and writes "left". Luma has no siting. So marks are measured by luma alone and by the
+//! colour differences alone; the difference of the two is the error of the stated site. Sites lie at a luma sample or
+//! midway between two, so the result is rounded to the nearer one. Where the marks do not tell, the stated site is
+//! kept and the possible half pixel stands in the standard deviation.
+
+use super::centroid::Channels;
+use super::{Blob, Detector};
+use crate::error::Result;
+use crate::video::{Layout, Picture};
+
+/// Where chroma sample (0, 0) lies.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Siting {
+    /// As the file states it, or as its codec usually has it; luma pixels from the centre of luma sample (0, 0).
+    pub stated_px: [f64; 2],
+    /// As it is taken to be.
+    pub used_px: [f64; 2],
+    /// Standard deviation of the latter.
+    pub sd_px: [f64; 2],
+    /// What the marks showed along each axis, with its standard deviation; `None` where chroma has every sample.
+    pub seen_px: [Option<[f64; 2]>; 2],
+}
+
+/// Gathers differences between luma and colour.
+#[derive(Debug, Default)]
+pub struct SitingSurvey {
+    layout: Option<Layout>,
+    /// Luma's position less the colour's and its variance, along x and y.
+    differences: [Vec<[f64; 2]>; 2],
+}
+
+/// Sites are half a pixel apart: decided where this many standard deviations fit into the quarter between them.
+const DECISIVE_SD: f64 = 3.0;
+/// Error of a coded edge that all marks share, px: luma and colour agree to this where the site is right (measured on foreign
+/// renderings).
+const COMMON_ERROR_PX: f64 = 0.04;
+/// Standard deviation of a site that may be one of two, half a pixel apart.
+const UNDECIDED_SD_PX: f64 = 0.25;
+/// Fewest marks that tell a site.
+const LEAST_MARKS: usize = 4;
+
+impl SitingSurvey {
+    /// Learns from a picture.
+    ///
+    /// # Errors
+    /// As [`Detector::detect`].
+    pub fn see(&mut self, picture: &Picture<'_>, detector: &Detector) -> Result<()> {
+        let layout = picture.layout;
+        self.layout.get_or_insert(layout);
+        if layout.chroma_shift_x == 0 && layout.chroma_shift_y == 0 {
+            return Ok(());
+        }
+        let luma = detector.detect_by(picture, Channels::Luma)?;
+        let colour = detector.detect_by(picture, Channels::Chroma)?;
+        for a in &luma {
+            // the same mask gave both
+            let same = |b: &&Blob| (a.hue, a.binary_px) == (b.hue, b.binary_px);
+            let Some(b) = colour.iter().find(same) else { continue };
+            let (p, q) = (&a.centroid, &b.centroid);
+            self.differences[0].push([p.x_px - q.x_px, p.variance_px2[0] + q.variance_px2[0]]);
+            self.differences[1].push([p.y_px - q.y_px, p.variance_px2[1] + q.variance_px2[1]]);
+        }
+        Ok(())
+    }
+
+    /// What the pictures show; `None` where there were none.
+    pub fn conclude(self) -> Option<Siting> {
+        let layout = self.layout?;
+        let mut siting = Siting {
+            stated_px: layout.chroma_site_px,
+            used_px: layout.chroma_site_px,
+            sd_px: [0.0; 2],
+            seen_px: [None; 2],
+        };
+        for (axis, shift) in [layout.chroma_shift_x, layout.chroma_shift_y].into_iter().enumerate() {
+            if shift == 0 {
+                continue;
+            }
+            siting.sd_px[axis] = UNDECIDED_SD_PX;
+            let Some([difference, sd]) = robust_mean(&self.differences[axis]) else { continue };
+            let seen = siting.stated_px[axis] + difference;
+            siting.seen_px[axis] = Some([seen, sd]);
+            // of two samples a pair's middle, of four (4:1:1) the nearest half
+            let step = 0.5;
+            let site = (seen / step).round() * step;
+            let in_pair = (0.0..=f64::from((1u32 << shift) - 1)).contains(&site);
+            if in_pair && DECISIVE_SD * sd <= 0.5 * step - (seen - site).abs().min(0.5 * step - 0.1) {
+                (siting.used_px[axis], siting.sd_px[axis]) = (site, 0.0);
+            }
+        }
+        Some(siting)
+    }
+}
+
+/// Weighted mean with outlying values left out (Tukey's biweight), and its standard deviation from the values' own
+/// scatter.
+fn robust_mean(values: &[[f64; 2]]) -> Option<[f64; 2]> {
+    let known: Vec<[f64; 2]> = values.iter().copied().filter(|v| v[0].is_finite() && v[1] > 0.0).collect();
+    if known.len() < LEAST_MARKS {
+        return None;
+    }
+    let mut plain: Vec<f64> = known.iter().map(|v| v[0]).collect();
+    let mut mean = crate::statistics::median(&mut plain)?;
+    let mut sd = f64::INFINITY;
+    for _ in 0..8 {
+        let mut sizes: Vec<f64> = known.iter().map(|v| (v[0] - mean).abs()).collect();
+        let scale = (crate::statistics::median(&mut sizes)? / 0.6745).max(1e-3);
+        let weight = |v: &[f64; 2]| {
+            let z = (v[0] - mean) / (4.685 * scale);
+            if z.abs() < 1.0 { (1.0 - z * z).powi(2) / (v[1] + COMMON_ERROR_PX.powi(2)) } else { 0.0 }
+        };
+        let total: f64 = known.iter().map(weight).sum();
+        if !(total > 0.0) {
+            return None;
+        }
+        let next = known.iter().map(|v| weight(v) * v[0]).sum::<f64>() / total;
+        let spread = known.iter().map(|v| weight(v) * (v[0] - next).powi(2)).sum::<f64>() / total;
+        let effective = total.powi(2) / known.iter().map(|v| weight(v).powi(2)).sum::<f64>();
+        (mean, sd) = (next, (spread / (effective - 1.0).max(1.0)).sqrt().hypot(COMMON_ERROR_PX));
+    }
+    Some([mean, sd])
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn survey(differences: [&[f64]; 2], stated_px: [f64; 2]) -> Siting {
+        let layout = Layout {
+            width_px: 64,
+            height_px: 64,
+            bits: 8,
+            low_bits: 0,
+            chroma_shift_x: 1,
+            chroma_shift_y: 1,
+            chroma_site_px: stated_px,
+            full_range: false,
+            matrix: crate::video::Matrix::Bt709,
+        };
+        let with_variance = |d: &[f64]| d.iter().map(|d| [*d, 0.05f64.powi(2)]).collect();
+        SitingSurvey { layout: Some(layout), differences: differences.map(with_variance) }.conclude().unwrap()
+    }
+
+    #[test]
+    fn a_site_that_the_file_states_wrongly_is_found() {
+        let x = [0.47, 0.55, 0.52, 0.44, 0.58, 0.49];
+        let y = [0.03, -0.04, 0.01, 0.0, 0.05, -0.02];
+        let siting = survey([&x, &y], [0.0, 0.5]);
+        assert_eq!((siting.used_px, siting.sd_px), ([0.5, 0.5], [0.0, 0.0]));
+    }
+
+    #[test]
+    fn where_the_marks_do_not_tell_the_stated_site_stands_with_its_doubt() {
+        let scattered = [0.9, -0.6, 0.3, -0.2, 0.7, -0.9];
+        let siting = survey([&scattered, &[]], [0.0, 0.5]);
+        assert_eq!((siting.used_px, siting.sd_px), ([0.0, 0.5], [0.25, 0.25]));
+    }
+}
