@@ -18,6 +18,7 @@
 //! ```
 
 mod disc;
+mod extrusion;
 mod fit;
 mod outline;
 mod patch;
@@ -131,7 +132,27 @@ fn band(patch: &Patch, outline: &Outline, surroundings: &Surroundings, shares: &
 
 /// The surroundings of a disc, with what every sector's band holds beside it and the background.
 fn resurvey(patch: &Patch, outline: &Outline, disc: &Disc, channels: Channels) -> Option<(Surroundings, Vec<Share>)> {
-    let mut surroundings = Surroundings::survey(patch, outline, channels)?;
+    let plain = Surroundings::survey(patch, outline, channels)?;
+    let rests = rests_of(patch, outline, disc, &plain)?;
+    let (mut surroundings, mut rests) = (plain, rests);
+    if let Some(extruded) = surroundings.extruded(patch, outline, disc) {
+        let others = rests_of(patch, outline, disc, &extruded)?;
+        if extruded.misfit(&others) < surroundings.misfit(&rests) {
+            (surroundings, rests) = (extruded, others);
+        }
+    }
+    surroundings.learn_scatter(patch, &rests);
+    let shares = surroundings.shares(outline)?;
+    Some((surroundings, shares))
+}
+
+/// What every pixel of the band holds beside the disc and the background.
+fn rests_of(
+    patch: &Patch,
+    outline: &Outline,
+    disc: &Disc,
+    surroundings: &Surroundings,
+) -> Option<Vec<Option<nalgebra::Vector3<f32>>>> {
     let shares = surroundings.shares(outline)?;
     let shape = disc.evaluator(disc.positions());
     let rest = |sample: &patch::Sample| {
@@ -141,10 +162,7 @@ fn resurvey(patch: &Patch, outline: &Outline, disc: &Disc, channels: Channels) -
             shares[sector].rest(sample.levels, surroundings.background_at(sector, sample), share)
         })
     };
-    let rests: Vec<Option<nalgebra::Vector3<f32>>> = patch.samples.iter().map(rest).collect();
-    surroundings.learn_scatter(patch, &rests);
-    let shares = surroundings.shares(outline)?;
-    Some((surroundings, shares))
+    Some(patch.samples.iter().map(rest).collect())
 }
 
 /// Area of mark in every sector.

@@ -34,6 +34,8 @@ pub struct Patch {
     height: usize,
     /// Core, band and ring; the corners beyond are left out.
     pub samples: Vec<Sample>,
+    /// Gradient of every channel at every sample.
+    pub gradients: Vec<[[f32; 2]; CHANNELS]>,
 }
 
 impl Patch {
@@ -46,7 +48,7 @@ impl Patch {
         let [cx, cy] = outline.centre_px;
         let (left, top) = (from(cx, layout.width_px), from(cy, layout.height_px));
         let (width, height) = (to(cx, layout.width_px) - left, to(cy, layout.height_px) - top);
-        let mut patch = Self { left, top, width, height, samples: Vec::new() };
+        let mut patch = Self { left, top, width, height, samples: Vec::new(), gradients: Vec::new() };
         if width > 0 && height > 0 {
             let planes = [patch.luma(picture), patch.chroma(picture, &picture.cb), patch.chroma(picture, &picture.cr)];
             patch.gather(outline, reach, &planes);
@@ -61,6 +63,7 @@ impl Patch {
 
     fn gather(&mut self, outline: &Outline, reach: f32, planes: &[Vec<f32>; CHANNELS]) {
         self.samples.reserve(self.width * self.height);
+        self.gradients.reserve(self.width * self.height);
         // whole rows first, in loops that the compiler can turn into vector instructions
         let dx: Vec<f32> = (0..self.width).map(|i| ((self.left + i) as f64 - outline.centre_px[0]) as f32).collect();
         let (mut squares, mut sectors) = (vec![0.0; self.width], vec![0u16; self.width]);
@@ -74,6 +77,16 @@ impl Patch {
                 let at = j * self.width + i;
                 let levels = [planes[0][at], planes[1][at], planes[2][at]];
                 let (distance_px, sector) = (squares[i].sqrt(), sectors[i]);
+                let (left, right) = (i.max(1) - 1, (i + 1).min(self.width - 1));
+                let (above, below) = (j.max(1) - 1, (j + 1).min(self.height - 1));
+                let row = j * self.width;
+                self.gradients.push([0, 1, 2].map(|k: usize| {
+                    let plane = &planes[k];
+                    [
+                        plane[row + right] - plane[row + left],
+                        plane[below * self.width + i] - plane[above * self.width + i],
+                    ]
+                }));
                 self.samples.push(Sample { dx_px: dx[i], dy_px: dy, distance_px, sector, levels });
             }
         }

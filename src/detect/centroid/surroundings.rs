@@ -3,6 +3,8 @@
 use nalgebra::{Matrix3, Vector3};
 
 use super::Channels;
+use super::disc::Disc;
+use super::extrusion::Extrusion;
 use super::outline::{Outline, RING_PX, Zone};
 use super::patch::{CHANNELS, Levels, Patch, Sample};
 use super::share::Share;
@@ -25,6 +27,7 @@ struct Sector {
 }
 
 /// What the survey finds.
+#[derive(Clone)]
 pub struct Surroundings {
     sectors: Vec<Sector>,
     /// The mark's own codes.
@@ -37,8 +40,12 @@ pub struct Surroundings {
     scatter: Vec<Matrix3<f32>>,
     /// Which channels count.
     channels: Channels,
+    /// Where the background is better explained so.
+    extrusion: Option<(Extrusion, Disc)>,
 }
 
+/// Bound of a single pixel's misfit, squared standard deviations: a burnt-in line does not decide.
+const MOST_MISFIT: f32 = 400.0;
 /// Variance of a channel that does not count, squared codes.
 const UNUSED: f32 = 1e6;
 
@@ -69,6 +76,7 @@ impl Surroundings {
             slope: Default::default(),
             scatter,
             channels,
+            extrusion: None,
         };
         surroundings.read_ring(ring, outline)?;
         surroundings.slope = [0, 1, 2].map(|k| background_slope(&surroundings.sectors, k, surroundings.noise[k]));
@@ -118,6 +126,10 @@ impl Surroundings {
     /// The background of a sector continued from the ring to a pixel.
     #[inline]
     pub fn background_at(&self, sector: usize, sample: &Sample) -> Levels {
+        let extruded = self.extrusion.as_ref().and_then(|(e, _)| e.at(sample.dx_px, sample.dy_px));
+        if let Some(levels) = extruded {
+            return levels;
+        }
         self.continued(&self.sectors[sector], sample.dx_px, sample.dy_px)
     }
 
@@ -132,7 +144,9 @@ impl Surroundings {
         let share = |((sector, radius), scatter): ((&Sector, &f32), &Matrix3<f32>)| {
             // the background where the mark ends, not where the ring is read
             let inward = radius / sector.ring_px[0].hypot(sector.ring_px[1]).max(1e-3);
-            let background = self.continued(sector, inward * sector.ring_px[0], inward * sector.ring_px[1]);
+            let [x, y] = sector.ring_px.map(|p| inward * p);
+            let extruded = self.extrusion.as_ref().and_then(|(e, disc)| e.under(disc, x, y));
+            let background = extruded.unwrap_or_else(|| self.continued(sector, x, y));
             let variance = |k: usize| self.noise[k].powi(2) + (EDGE_ERROR[k] * (self.mark[k] - background[k])).powi(2);
             let [luma, chroma] = match self.channels {
                 Channels::All => [0.0, 0.0],
@@ -145,6 +159,19 @@ impl Surroundings {
         };
         let shares: Vec<Share> = self.sectors.iter().zip(&outline.radii_px).zip(&self.scatter).map(share).collect();
         shares.iter().any(|s| s.variance.is_finite()).then_some(shares)
+    }
+
+    /// The same, with a background that continues along one direction; `None` where it has none.
+    pub fn extruded(&self, patch: &Patch, outline: &Outline, disc: &Disc) -> Option<Self> {
+        let extrusion = Extrusion::of(patch, outline, disc)?;
+        Some(Self { extrusion: Some((extrusion, *disc)), ..self.clone() })
+    }
+
+    /// Mean square of what the band holds beside background and mark, in the channels' noise, single pixels bounded.
+    pub fn misfit(&self, rests: &[Option<Vector3<f32>>]) -> f32 {
+        let size = |rest: &Vector3<f32>| (0..CHANNELS).map(|k| (rest[k] / self.noise[k]).powi(2)).sum::<f32>();
+        let sizes = rests.iter().flatten().map(|r| size(r).min(MOST_MISFIT));
+        sizes.clone().sum::<f32>() / sizes.count().max(1) as f32
     }
 
     /// Learns what scatters in every sector from what the pixels of its band hold beside background and mark. Five
