@@ -4,14 +4,18 @@ use nalgebra::Complex;
 use serde::Serialize;
 
 use super::consistency::Consistency;
-use super::envelope::{Envelope, FrequencyLaw};
+use super::envelope::{Envelope, FEWEST_FOR_LAWS, FrequencyLaw, Step};
 use super::estimate::{Estimate, probability};
 use super::estimators::{Estimator, Estimators, Whole};
 use super::floor::amplitude_dependence;
+use super::windows::Windows;
 use crate::model::chain::Chain;
 
 /// By how much the theory of κ may be off: it is the first term in A², for a shape that does not change with amplitude.
 const THEORY_TOLERANCE: f64 = 0.15;
+
+/// A pendulum that swings more slowly is more than 100 m long.
+const SLOWEST_SWING_HZ: f64 = 0.05;
 
 /// ξ, or why the data do not tell it.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -19,25 +23,39 @@ const THEORY_TOLERANCE: f64 = 0.15;
 pub enum Damping {
     /// Its interval stays clear of zero.
     Identified(Estimate),
-    /// Its interval reaches zero.
+    /// Its interval reaches zero, or holds all that ξ can be.
     NotIdentifiable {
-        /// 95 % interval.
-        estimate: Estimate,
+        /// 95 % interval, where it excludes anything.
+        estimate: Option<Estimate>,
         /// With the number that makes it so.
         reason: String,
     },
 }
 
 impl Damping {
-    fn of(estimate: Estimate, duration_s: f64) -> Self {
-        if estimate.low > 0.0 {
+    /// The whole record's ξ, without regard to amplitude, tells a decay whose ξ at small amplitude is open from none at all.
+    fn of(estimate: Estimate, whole: &Estimate, duration_s: f64) -> Self {
+        if estimate.within(0.0, 1.0) && estimate.low > 0.0 {
             return Self::Identified(estimate);
         }
-        let reason = format!(
-            "the decay over {duration_s:.0} s is within the noise: ξ ≤ {:.2e} is all that can be said",
-            estimate.high.max(0.0)
-        );
-        Self::NotIdentifiable { estimate, reason }
+        let bounded = estimate.within(-1.0, 1.0);
+        let reason = if bounded && estimate.high <= 0.0 {
+            let percent = 100.0 * (-std::f64::consts::TAU * estimate.value).exp_m1();
+            format!("the amplitude grows, by {percent:.1} % a cycle: driven, fed by another mode, or two beating")
+        } else if whole.within(-1.0, 1.0) && whole.low > 0.0 {
+            format!(
+                "the swing decays, as with ξ = {:.4} over the record, but so much depends on amplitude that ξ at small amplitude is open; use --from for a later, smaller swing",
+                whole.value
+            )
+        } else if bounded {
+            format!(
+                "the decay over {duration_s:.3} s is within its uncertainty: ξ ≤ {:.2e} is all that can be said",
+                estimate.high
+            )
+        } else {
+            format!("{duration_s:.3} s of so uneven a motion leave every ξ from 0 to 1 possible")
+        };
+        Self::NotIdentifiable { estimate: Some(estimate).filter(|_| bounded), reason }
     }
 
     /// The identified value.
@@ -48,10 +66,60 @@ impl Damping {
         }
     }
 
-    /// The interval, identified or not.
-    pub fn interval(&self) -> &Estimate {
+    /// The interval, identified or not, where it excludes anything.
+    pub fn interval(&self) -> Option<&Estimate> {
         match self {
-            Self::Identified(estimate) | Self::NotIdentifiable { estimate, .. } => estimate,
+            Self::Identified(estimate) => Some(estimate),
+            Self::NotIdentifiable { estimate, .. } => estimate.as_ref(),
+        }
+    }
+}
+
+/// How ξ goes with the amplitude.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Trend {
+    /// Drag.
+    GrowsWithAmplitude,
+    /// Dry friction.
+    FallsWithAmplitude,
+    /// Both.
+    LeastBetween,
+    /// No linear damper, and neither of the three.
+    Uneven,
+}
+
+impl Trend {
+    /// Of the steps from window to window: means over fifths of them by amplitude, three standard deviations apart.
+    fn of(envelope: &Envelope) -> Self {
+        let mut steps: Vec<_> = envelope.steps.iter().collect();
+        steps.sort_by(|a, b| b.amplitude_rad.total_cmp(&a.amplitude_rad));
+        let fifth = steps.len().div_ceil(5).max(1);
+        let mean = |few: &[&Step]| {
+            let (weight, sum) = few.iter().map(|s| &s.damping_ratio).fold((0.0, 0.0), |(w, sum), xi| {
+                let certainty = xi.sd.powi(-2);
+                (w + certainty, sum + certainty * xi.value)
+            });
+            [sum / weight, f64::recip(weight).sqrt()]
+        };
+        let means: Vec<[f64; 2]> = steps.chunks(fifth).map(mean).collect();
+        let above = |a: &[f64; 2], b: &[f64; 2]| a[0] - b[0] > 3.0 * a[1].hypot(b[1]);
+        let [large, between @ .., small] = &means[..] else { return Self::Uneven };
+        match between.iter().min_by(|a, b| a[0].total_cmp(&b[0])) {
+            Some(least) if above(large, least) && above(small, least) => Self::LeastBetween,
+            _ if above(large, small) => Self::GrowsWithAmplitude,
+            _ if above(small, large) => Self::FallsWithAmplitude,
+            _ => Self::Uneven,
+        }
+    }
+
+    /// For a sentence about ξ.
+    pub fn words(self) -> &'static str {
+        match self {
+            Self::GrowsWithAmplitude => "grows with amplitude, as drag does",
+            Self::FallsWithAmplitude => "grows as the swing becomes small, as dry friction does",
+            Self::LeastBetween => "least at a middle amplitude: dry friction below it, drag above",
+            Self::Uneven => "not the same over the record",
         }
     }
 }
@@ -70,11 +138,17 @@ pub struct LinkMotion {
 /// One mode.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Mode {
+    /// 1 for the strongest.
+    pub number: usize,
+    /// Root of the mean square over the record, all links together.
+    pub rms_rad: f64,
     /// Undamped natural frequency to take.
     pub frequency_hz: Estimate,
     /// ξ to take.
     pub damping: Damping,
-    /// Where the two come from.
+    /// How ξ goes with amplitude, where it is no constant.
+    pub damping_trend: Option<Trend>,
+    /// Where frequency and ξ come from.
     pub basis: String,
     /// Top to bottom.
     pub shape: Vec<LinkMotion>,
@@ -96,27 +170,45 @@ pub struct Mode {
 
 impl Mode {
     pub(super) fn of(whole: &Whole, mode: usize, chain: Option<&Chain>, gravity_m_s2: f64) -> Self {
-        let envelope = whole.windows.as_ref().map_err(Clone::clone).and_then(|w| Envelope::of(w, mode));
+        let envelope = richest_envelope(whole, mode);
         let estimators = Estimators::of(whole, mode, &envelope);
         let envelope = envelope.ok();
         let shape = shape(whole, mode);
         let amplitudes_rad: Vec<f64> = (0..whole.fit.poles.len()).map(|m| whole.fit.amplitude_rad(m)).collect();
         let choice = estimators.choose(envelope.as_ref(), &amplitudes_rad, mode).beside_harmonic(whole.fit, mode);
-        let mut this = Self {
+        let duration_s = whole.signal.duration_s();
+        let raw = estimators.raw;
+        let changes =
+            |e: &&Envelope| e.decay.is_some_and(|d| d.p_viscous < 0.01) || e.damping.is_some_and(|d| d.p_value < 0.01);
+        Self {
+            number: mode + 1,
+            rms_rad: whole.fit.strength(mode, duration_s).sqrt(),
+            damping_trend: envelope.as_ref().filter(changes).map(Trend::of),
             expected_kappa_per_rad2: expected_kappa(&shape, whole.fit.poles[mode].frequency_hz(), chain, gravity_m_s2),
             frequency_hz: choice.frequency_hz,
-            damping: Damping::of(choice.damping_ratio, whole.signal.duration_s()),
+            damping: Damping::of(choice.damping_ratio, &raw[1], duration_s),
             basis: choice.basis,
             shape,
             residual_excess: estimators.residual_excess,
-            frequency_consistency: estimators.compare(estimators.raw[0], |e| e.frequency_hz),
-            damping_consistency: estimators.compare(estimators.raw[1], |e| e.damping_ratio),
+            frequency_consistency: estimators.compare(raw[0], |e| e.frequency_hz),
+            damping_consistency: estimators.compare(raw[1], |e| e.damping_ratio),
             estimators: estimators.each,
             envelope,
             notes: Vec::new(),
-        };
-        this.notes = this.findings(mode);
-        this
+        }
+    }
+
+    /// With its place among the modes, the strongest first, and what the reader should know of it.
+    pub(super) fn numbered(mut self, number: usize) -> Self {
+        self.number = number;
+        self.notes = self.findings(number);
+        self
+    }
+
+    /// Whether all links move to the same side at the same time, as in the slowest mode of a hanging chain and in no other: its flexibility matrix
+    /// has no negative element (Perron and Frobenius).
+    pub fn moves_together(&self) -> bool {
+        self.shape.iter().all(|l| l.phase_to_first_rad.value.cos() > 0.0)
     }
 
     /// The frequency at small amplitude; where the data do not tell how it depends on amplitude, with this κ.
@@ -124,7 +216,7 @@ impl Mode {
         match self.envelope.as_ref().and_then(|e| e.frequency) {
             Some(law) => law.f0_hz,
             None => {
-                let amplitude_rad = self.shape.iter().map(|l| l.amplitude_rad).fold(0.0, f64::max);
+                let amplitude_rad = self.amplitude_rad();
                 let highest = self.frequency_hz.high / (1.0 - kappa_per_rad2 * amplitude_rad * amplitude_rad).max(0.5);
                 self.frequency_hz.covering(self.frequency_hz.low, highest)
             }
@@ -132,9 +224,9 @@ impl Mode {
     }
 
     /// What disagreement and dependence on amplitude mean, in words.
-    fn findings(&self, mode: usize) -> Vec<String> {
-        let all = [self.against_theory(), self.of_frequency(), self.of_damping()];
-        all.into_iter().flatten().map(|finding| format!("mode {}: {finding}", mode + 1)).collect()
+    fn findings(&self, number: usize) -> Vec<String> {
+        let all = [self.unit_doubt(), self.against_theory(), self.of_frequency(), self.of_damping()];
+        all.into_iter().flatten().map(|finding| format!("mode {number}: {finding}")).collect()
     }
 
     fn frequency_law(&self) -> Option<FrequencyLaw> {
@@ -145,14 +237,11 @@ impl Mode {
     fn against_theory(&self) -> Option<String> {
         let (law, expected) = (self.frequency_law()?, self.expected_kappa_per_rad2?);
         let k = law.kappa_per_rad2;
-        let measured = format!("κ = {:.4} ± {:.4} /rad²", k.value, 0.5 * (k.high - k.low));
-        let amplitude_rad = self.shape.iter().map(|l| l.amplitude_rad).fold(0.0, f64::max);
+        let measured = format!("κ = {:.4} ± {:.4} /rad²", k.value, k.half());
         let tolerance = THEORY_TOLERANCE * expected.abs();
         let agrees = k.low - tolerance <= expected && expected <= k.high + tolerance;
-        if amplitude_rad > 0.8 && expected > 0.03 && k.high < 0.3 * expected {
-            Some(format!(
-                "the frequency does not fall with amplitude ({measured}, a pendulum has {expected:.4}) although θ reaches {amplitude_rad:.1} rad: are the angles in degrees?"
-            ))
+        if self.constant_though_wide() {
+            None
         } else if !agrees {
             Some(format!(
                 "f = f₀(1 − κA²) has {measured}, gravity alone makes {expected:.4}: a nonlinear stiffness is at work, or the true angles are {:.2} × the stated ones",
@@ -163,6 +252,34 @@ impl Mode {
         } else {
             None
         }
+    }
+
+    /// Largest amplitude of any link at the start.
+    pub fn amplitude_rad(&self) -> f64 {
+        self.shape.iter().map(|l| l.amplitude_rad).fold(0.0, f64::max)
+    }
+
+    /// Whether the frequency stays the same although the swing is so wide that gravity makes it fall.
+    fn constant_though_wide(&self) -> bool {
+        let Some((law, expected)) = self.frequency_law().zip(self.expected_kappa_per_rad2) else { return false };
+        self.amplitude_rad() > 0.8 && expected > 0.03 && law.kappa_per_rad2.high < 0.3 * expected
+    }
+
+    /// A doubt of the table's units.
+    pub fn unit_doubt(&self) -> Option<String> {
+        let f_hz = self.frequency_hz.value;
+        if f_hz < SLOWEST_SWING_HZ {
+            return Some(format!(
+                "a pendulum of {f_hz:.2e} Hz would be {:.0} m long: is t_s in milliseconds? Then multiply it by 0.001",
+                9.8 / (std::f64::consts::TAU * f_hz).powi(2)
+            ));
+        }
+        self.constant_though_wide().then(|| {
+            format!(
+                "the frequency does not fall with amplitude, as a pendulum's does, although θ reaches {:.1} rad: are the angles in degrees?",
+                self.amplitude_rad()
+            )
+        })
     }
 
     fn of_frequency(&self) -> Option<String> {
@@ -185,12 +302,13 @@ impl Mode {
             return Some(format!("damping not identifiable: {reason}"));
         }
         let p_viscous = self.envelope.as_ref().and_then(|e| e.decay).map_or(1.0, |d| d.p_viscous);
+        let trend = self.damping_trend.map_or("not the same over the record", Trend::words);
         match self.damping_consistency.filter(|t| !t.agree) {
             Some(test) => {
                 let meaning = if p_viscous < 0.01 {
-                    "the damping depends on amplitude: friction or drag, not one ξ"
+                    format!("the damping depends on amplitude: friction or drag, not one ξ ({trend})")
                 } else {
-                    "the decay is no exponential; look at the envelope before using one ξ"
+                    "the decay is no exponential; look at the envelope before using one ξ".to_owned()
                 };
                 Some(format!(
                     "the damping ratios disagree (χ² = {:.0} of {}, {}): {meaning}",
@@ -200,11 +318,26 @@ impl Mode {
                 ))
             }
             None if p_viscous < 0.01 => Some(format!(
-                "the damping depends on amplitude ({}): friction or drag, not one ξ",
+                "the damping depends on amplitude ({}): friction or drag, not one ξ ({trend})",
                 probability(p_viscous)
             )),
             None => None,
         }
+    }
+}
+
+/// The mode's history in the windows of all modes, or in windows of its own cycles where those show it in more and the former in too few.
+fn richest_envelope(whole: &Whole, mode: usize) -> Result<Envelope, String> {
+    let slowest = mode == 0;
+    let shared = whole.windows.as_ref().map_err(Clone::clone).and_then(|w| Envelope::of(w, mode, slowest));
+    let seen = shared.as_ref().map_or(0, |e| e.windows);
+    if seen >= FEWEST_FOR_LAWS || whole.fit.poles.len() == 1 {
+        return shared;
+    }
+    match Windows::of_mode(whole.signal, whole.fit, mode).and_then(|own| Envelope::of(&own, 0, slowest)) {
+        Ok(own) if own.windows > seen => Ok(own),
+        Err(reason) if shared.is_err() => Err(reason),
+        _ => shared,
     }
 }
 

@@ -3,9 +3,10 @@
 use serde::Serialize;
 
 use super::estimate::{f_tail, probability};
+use super::estimators::residual_excess;
 use super::pencil::matrix_pencil;
 use super::signal::Signal;
-use super::sinusoids::{Pole, SinusoidFit};
+use super::sinusoids::{FEWEST_CYCLES, Pole, SinusoidFit};
 use super::spectrum::Spectrum;
 
 /// Damping ratios tried at a spectral peak.
@@ -24,54 +25,117 @@ pub struct ModeCount {
     pub statement: String,
 }
 
-/// Damped sinusoids of as many modes as the data show, lowest frequency first; `None` when nothing oscillates.
-pub fn choose_modes(signal: &Signal, spectrum: &Spectrum) -> Option<(SinusoidFit, ModeCount)> {
-    let strongest = spectrum.significant().next()?;
+/// The damped sinusoids that a recording shows.
+pub struct Chosen {
+    /// Lowest frequency first.
+    pub fit: SinusoidFit,
+    /// One mode or two.
+    pub count: ModeCount,
+}
+
+/// Terms of drift, half a cycle each, at most: what makes fewer than three cycles in a record is not told from a drift.
+const MOST_DRIFT_TERMS: usize = 6;
+/// Spectral lines tried as the strongest oscillation, where slow ones may be a drift.
+const LINES_TRIED: usize = 4;
+
+/// Damped sinusoids of as many modes as the data show, lowest frequency first, beside a drift of each link.
+///
+/// # Errors
+/// In words, when nothing oscillates.
+pub fn choose_modes(signal: &Signal, spectrum: &Spectrum) -> Result<Chosen, String> {
+    let one = strongest(signal, spectrum)?;
+    let drift_terms = one.links.first().map_or(0, |l| l.drift_rad.len());
     let highest_hz = spectrum.significant().map(|p| p.frequency_hz.value).fold(0.0, f64::max);
-    let mut starts: Vec<Vec<Pole>> =
-        DAMPING_STARTS.iter().map(|xi| vec![Pole::of(strongest.frequency_hz.value, *xi)]).collect();
-    starts.push(matrix_pencil(signal, 1, strongest.frequency_hz.value));
-    let one = best(signal, &starts, |_| true)?;
     let f1_hz = one.poles[0].frequency_hz();
     let guard_hz = (4.0 * spectrum.resolution_hz).max(0.12 * f1_hz);
     let apart = |p: &[Pole]| (p[0].frequency_hz() - p[1].frequency_hz()).abs() > 0.75 * guard_hz;
 
     let rest = Spectrum::of(&one.residuals(signal), 0.0);
-    let far = |f_hz: f64| (f_hz - f1_hz).abs() > guard_hz && f_hz > 2.0 * spectrum.resolution_hz;
+    let slowest_hz = (1.0 + 0.5 * drift_terms as f64).max(2.0) * spectrum.resolution_hz;
+    let far = |f_hz: f64| (f_hz - f1_hz).abs() > guard_hz && f_hz > slowest_hz;
     let second = rest.peaks.iter().find(|p| far(p.frequency_hz.value));
     let mut starts: Vec<Vec<Pole>> = Vec::new();
     if let Some(peak) = second {
         starts.extend(DAMPING_STARTS.iter().map(|xi| vec![one.poles[0], Pole::of(peak.frequency_hz.value, *xi)]));
     }
-    let pencil = matrix_pencil(signal, 2, highest_hz.max(second.map_or(0.0, |p| p.frequency_hz.value)));
+    let alone = one.without_drift(signal);
+    let pencil = matrix_pencil(&alone, 2, highest_hz.max(second.map_or(0.0, |p| p.frequency_hz.value)));
     if pencil.len() == 2 && apart(&pencil) {
         starts.push(pencil);
     }
     let damped = |p: &Pole| p.damping_ratio() < 0.4 && p.damping_ratio() > -0.02;
-    let two = best(signal, &starts, |fit| apart(&fit.poles) && fit.poles.iter().all(damped));
-    let Some(two) = two else {
-        let statement = "one mode; no second one is seen".to_owned();
-        return Some((one, ModeCount { modes: 1, bic_gain: None, p_value: None, statement }));
-    };
-    Some(decide(signal, spectrum, one, two))
+    let sound = |fit: &SinusoidFit| apart(&fit.poles) && fit.poles.iter().all(damped);
+    match best(signal, &starts, drift_terms, sound) {
+        Some(two) => Ok(decide(signal, spectrum, one, two)),
+        None => {
+            let statement = "one mode; no second one is seen".to_owned();
+            Ok(Chosen { fit: one, count: ModeCount { modes: 1, bic_gain: None, p_value: None, statement } })
+        }
+    }
 }
 
-fn best(signal: &Signal, starts: &[Vec<Pole>], sound: impl Fn(&SinusoidFit) -> bool) -> Option<SinusoidFit> {
-    let fits = starts.iter().filter_map(|start| SinusoidFit::from_start(signal, signal.span_s[0], start));
+/// The oscillation that moves most, beside as much drift as the data ask for.
+fn strongest(signal: &Signal, spectrum: &Spectrum) -> Result<SinusoidFit, String> {
+    let Some(first) = spectrum.significant().next() else {
+        return Err(format!(
+            "the highest peak is {:.1} times the median power, as noise alone gives",
+            spectrum.peaks.first().map_or(0.0, |p| p.over_floor)
+        ));
+    };
+    // a line of few cycles may be a drift that a faster, weaker line outlives
+    let slow = |hz: f64| hz < (MOST_DRIFT_TERMS as f64) * spectrum.resolution_hz;
+    let tried = if slow(first.frequency_hz.value) { LINES_TRIED } else { 1 };
+    let duration_s = signal.duration_s();
+    let fits = spectrum.significant().take(tried).filter_map(|p| one_mode(signal, p.frequency_hz.value));
+    fits.max_by(|a, b| a.strength(0, duration_s).total_cmp(&b.strength(0, duration_s))).ok_or_else(|| {
+        format!(
+            "the strongest line, {:.4} Hz, is no damped swing of at least {FEWEST_CYCLES:.0} cycles in {duration_s:.3} s: a drift, or a motion without a steady frequency",
+            first.frequency_hz.value
+        )
+    })
+}
+
+fn one_mode(signal: &Signal, near_hz: f64) -> Option<SinusoidFit> {
+    let mut starts: Vec<Vec<Pole>> = DAMPING_STARTS.iter().map(|xi| vec![Pole::of(near_hz, *xi)]).collect();
+    starts.push(matrix_pencil(signal, 1, near_hz));
+    // half a cycle a term: the fastest drift stays below half the oscillation's frequency
+    let cycles = near_hz * signal.duration_s();
+    let most = MOST_DRIFT_TERMS.min((cycles - 1.0).max(0.0) as usize);
+    let fit = best(signal, &starts, most, |_| true).or_else(|| best(signal, &starts, 0, |_| true))?;
+    let wanted = fit.wanted_drift(signal);
+    if wanted == fit.links.first().map_or(0, |l| l.drift_rad.len()) {
+        return Some(fit);
+    }
+    SinusoidFit::with_drift(signal, fit.origin_s, &fit.poles, wanted).or(Some(fit))
+}
+
+fn best(
+    signal: &Signal,
+    starts: &[Vec<Pole>],
+    drift_terms: usize,
+    sound: impl Fn(&SinusoidFit) -> bool,
+) -> Option<SinusoidFit> {
+    let fit = |start: &Vec<Pole>| SinusoidFit::with_drift(signal, signal.span_s[0], start, drift_terms);
+    let fits = starts.iter().filter_map(fit);
     fits.filter(sound).min_by(|a, b| a.deviance.total_cmp(&b.deviance))
 }
 
 /// F-test over all independent frequencies, and the information criterion.
-fn decide(signal: &Signal, spectrum: &Spectrum, one: SinusoidFit, two: SinusoidFit) -> (SinusoidFit, ModeCount) {
+///
+/// Both hold for white residuals. What the residual has beyond white noise near the weaker line, drift and the first one's own misfit, is no evidence for
+/// a mode: the F ratio is taken against the residual's power there.
+fn decide(signal: &Signal, spectrum: &Spectrum, one: SinusoidFit, two: SinusoidFit) -> Chosen {
     let n = signal.values() as f64;
     let more = (two.parameters() - one.parameters()) as f64;
     let bic_gain = one.deviance - two.deviance - more * n.ln();
     // the links' weighted sums of squares: exp of the mean deviance
     let ratio = ((one.deviance - two.deviance) / n).exp();
-    let f = (ratio - 1.0) * two.degrees_of_freedom / more;
+    let duration_s = signal.duration_s();
+    let [strong, weak] = if two.strength(0, duration_s) >= two.strength(1, duration_s) { [0, 1] } else { [1, 0] };
+    let excess = residual_excess(&two.residuals(signal), two.poles[weak].omega_rad_s);
+    let f = (ratio - 1.0) * two.degrees_of_freedom / more / excess;
     let frequencies = spectrum.amplitude_rad.len() as f64 * spectrum.step_hz / spectrum.resolution_hz;
     let p_value = (f_tail(f, more, two.degrees_of_freedom) * frequencies).min(1.0);
-    let [strong, weak] = if two.amplitude_rad(0) >= two.amplitude_rad(1) { [0, 1] } else { [1, 0] };
     let times = two.poles[weak].frequency_hz() / two.poles[strong].frequency_hz();
     let (large, small) = (two.amplitude_rad(strong), two.amplitude_rad(weak));
     // sin θ gives a third harmonic of A³/192, a chain a few times that
@@ -93,12 +157,16 @@ fn decide(signal: &Signal, spectrum: &Spectrum, one: SinusoidFit, two: SinusoidF
         )
     };
     let count = ModeCount { modes, bic_gain: Some(bic_gain), p_value: Some(p_value), statement };
-    (if modes == 2 { sorted(two, signal) } else { one }, count)
+    Chosen { fit: if modes == 2 { sorted(two, signal) } else { one }, count }
 }
 
 /// Lowest frequency first.
 fn sorted(fit: SinusoidFit, signal: &Signal) -> SinusoidFit {
     let mut poles = fit.poles.clone();
     poles.sort_by(|a, b| a.omega_rad_s.total_cmp(&b.omega_rad_s));
-    if poles == fit.poles { fit } else { SinusoidFit::from_start(signal, fit.origin_s, &poles).unwrap_or(fit) }
+    let drift_terms = fit.links.first().map_or(0, |l| l.drift_rad.len());
+    if poles == fit.poles {
+        return fit;
+    }
+    SinusoidFit::with_drift(signal, fit.origin_s, &poles, drift_terms).unwrap_or(fit)
 }
