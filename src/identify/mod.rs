@@ -69,6 +69,14 @@ pub struct Record {
     pub irregular_share: f64,
     /// Noise of each angle, from what fits over a few cycles leave over.
     pub noise_rad: Vec<f64>,
+    /// Whether the times are 0, 1, 2, … or go on so from another number.
+    pub counts: bool,
+}
+
+impl Record {
+    fn doubt(&self) -> Option<String> {
+        self.counts.then(|| "t_s counts by ones: is it a frame number? Then divide it by the frame rate".to_owned())
+    }
 }
 
 /// Everything the data say without a model.
@@ -137,6 +145,8 @@ impl Identification {
             step_s: series.step_s(),
             irregular_share: series.irregular_share(),
             noise_rad: Vec::new(),
+            counts: series.t_s.windows(2).all(|pair| pair[1] - pair[0] == 1.0)
+                && series.t_s.first().is_some_and(|t| t.fract() == 0.0),
         };
         let spectrum = Spectrum::of(&signal.levelled(), record.irregular_share);
         Self {
@@ -187,6 +197,17 @@ impl Identification {
         let mut modes: Vec<Mode> =
             (0..fit.poles.len()).map(|m| Mode::of(&whole, m, same_links, gravity_m_s2)).collect();
         modes.sort_by(|a, b| b.rms_rad.total_cmp(&a.rms_rad));
+        let (modes, open): (Vec<Mode>, Vec<Mode>) = modes.into_iter().partition(Mode::is_resolved);
+        let alone = if modes.is_empty() { summary::NOTHING } else { "" };
+        self.notes.extend(open.iter().map(|mode| {
+            format!(
+                "{alone}a motion near {:.3} Hz has no one frequency: what it depends on, amplitude or another mode, is not separated from it",
+                mode.frequency_hz.value
+            )
+        }));
+        if modes.is_empty() {
+            return;
+        }
         self.modes = modes.into_iter().enumerate().map(|(k, mode)| mode.numbered(k + 1)).collect();
         self.mode_count = Some(count);
         let swing = self.modes.iter().position(Mode::moves_together).unwrap_or(0);
@@ -209,7 +230,7 @@ impl Identification {
 }
 
 fn record_notes(record: &Record, spectrum: &Spectrum) -> Vec<String> {
-    let mut notes = Vec::new();
+    let mut notes: Vec<String> = record.doubt().into_iter().collect();
     if record.irregular_share > 0.02 {
         notes.push(format!(
             "{:.0} % of the time steps are irregular: least-squares methods use the exact times, the spectrum is interpolated to an even step and its peaks refined on the exact times",

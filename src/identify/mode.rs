@@ -16,6 +16,8 @@ const THEORY_TOLERANCE: f64 = 0.15;
 
 /// A pendulum that swings more slowly is more than 100 m long.
 const SLOWEST_SWING_HZ: f64 = 0.05;
+/// A pendulum that swings faster is less than 1 mm long.
+const FASTEST_SWING_HZ: f64 = 15.8;
 
 /// ξ, or why the data do not tell it.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -205,6 +207,11 @@ impl Mode {
         self
     }
 
+    /// Whether its frequency is known to less than half of itself.
+    pub(super) fn is_resolved(&self) -> bool {
+        self.frequency_hz.within(0.5 * self.frequency_hz.value, 1.5 * self.frequency_hz.value)
+    }
+
     /// Whether all links move to the same side at the same time, as in the slowest mode of a hanging chain and in no other: its flexibility matrix
     /// has no negative element (Perron and Frobenius).
     pub fn moves_together(&self) -> bool {
@@ -225,7 +232,7 @@ impl Mode {
 
     /// What disagreement and dependence on amplitude mean, in words.
     fn findings(&self, number: usize) -> Vec<String> {
-        let all = [self.unit_doubt(), self.against_theory(), self.of_frequency(), self.of_damping()];
+        let all = [self.doubt(), self.against_theory(), self.of_frequency(), self.of_damping()];
         all.into_iter().flatten().map(|finding| format!("mode {number}: {finding}")).collect()
     }
 
@@ -265,19 +272,32 @@ impl Mode {
         self.amplitude_rad() > 0.8 && expected > 0.03 && law.kappa_per_rad2.high < 0.3 * expected
     }
 
-    /// A doubt of the table's units.
-    pub fn unit_doubt(&self) -> Option<String> {
+    /// A doubt of what the table's columns hold, where the motion would be strange for a hung body.
+    pub fn doubt(&self) -> Option<String> {
         let f_hz = self.frequency_hz.value;
+        let pendulum_m = 9.8 / (std::f64::consts::TAU * f_hz).powi(2);
+        let amplitude_rad = self.amplitude_rad();
         if f_hz < SLOWEST_SWING_HZ {
             return Some(format!(
-                "a pendulum of {f_hz:.2e} Hz would be {:.0} m long: is t_s in milliseconds? Then multiply it by 0.001",
-                9.8 / (std::f64::consts::TAU * f_hz).powi(2)
+                "a pendulum of {f_hz:.2e} Hz would be {pendulum_m:.0} m long: is t_s in milliseconds, or a frame number?"
             ));
         }
-        self.constant_though_wide().then(|| {
+        if f_hz > FASTEST_SWING_HZ && amplitude_rad > 0.1 {
+            return Some(format!(
+                "a pendulum of {f_hz:.0} Hz would be {:.2} mm long: is t_s in minutes?",
+                1e3 * pendulum_m
+            ));
+        }
+        if self.constant_though_wide() {
+            return Some(format!(
+                "the frequency does not fall with amplitude, as a pendulum's does, although θ reaches {amplitude_rad:.1} rad: are the angles in degrees?"
+            ));
+        }
+        let lower = self.shape.get(1).filter(|_| self.moves_together())?;
+        (lower.ratio_to_first.high < 0.95).then(|| {
             format!(
-                "the frequency does not fall with amplitude, as a pendulum's does, although θ reaches {:.1} rad: are the angles in degrees?",
-                self.amplitude_rad()
+                "where all links move together a hung one moves more than the one above it, but θ2 = {:.2} θ1: are the columns exchanged, or is θ2 measured from link 1?",
+                lower.ratio_to_first.value
             )
         })
     }

@@ -8,6 +8,7 @@ use super::pencil::matrix_pencil;
 use super::signal::Signal;
 use super::sinusoids::{FEWEST_CYCLES, Pole, SinusoidFit};
 use super::spectrum::Spectrum;
+use super::windows::Windows;
 
 /// Damping ratios tried at a spectral peak.
 const DAMPING_STARTS: [f64; 3] = [0.001, 0.008, 0.05];
@@ -35,6 +36,10 @@ pub struct Chosen {
 
 /// Terms of drift, half a cycle each, at most: what makes fewer than three cycles in a record is not told from a drift.
 const MOST_DRIFT_TERMS: usize = 6;
+/// A mode that noise makes in more than one of a thousand records is none.
+const LEAST_P: f64 = 1e-3;
+/// Windows in a row from the record's start in which a swing must be clear.
+const FEWEST_WINDOWS: usize = 3;
 /// Spectral lines tried as the strongest oscillation, where slow ones may be a drift.
 const LINES_TRIED: usize = 4;
 
@@ -64,7 +69,8 @@ pub fn choose_modes(signal: &Signal, spectrum: &Spectrum) -> Result<Chosen, Stri
         starts.push(pencil);
     }
     let damped = |p: &Pole| p.damping_ratio() < 0.4 && p.damping_ratio() > -0.02;
-    let sound = |fit: &SinusoidFit| apart(&fit.poles) && fit.poles.iter().all(damped);
+    let faster_than_drift = |p: &Pole| p.frequency_hz() > slowest_hz;
+    let sound = |fit: &SinusoidFit| apart(&fit.poles) && fit.poles.iter().all(|p| damped(p) && faster_than_drift(p));
     match best(signal, &starts, drift_terms, sound) {
         Some(two) => Ok(decide(signal, spectrum, one, two)),
         None => {
@@ -87,9 +93,16 @@ fn strongest(signal: &Signal, spectrum: &Spectrum) -> Result<SinusoidFit, String
     let tried = if slow(first.frequency_hz.value) { LINES_TRIED } else { 1 };
     let duration_s = signal.duration_s();
     let fits = spectrum.significant().take(tried).filter_map(|p| one_mode(signal, p.frequency_hz.value));
+    let fits = fits.filter(|fit| {
+        let before = fit.deviance_without_modes(signal);
+        let parameters = 2.0 + 2.0 * signal.links.len() as f64;
+        let clear = Improvement { signal, spectrum, before, parameters, mode: 0 }.p_value(fit) < LEAST_P;
+        // a wide swing, whose frequency moves with its amplitude, is none over the record but one over a few cycles
+        clear || Windows::of(&fit.without_drift(signal), fit).is_ok_and(|w| w.moments[0].len() >= FEWEST_WINDOWS)
+    });
     fits.max_by(|a, b| a.strength(0, duration_s).total_cmp(&b.strength(0, duration_s))).ok_or_else(|| {
         format!(
-            "the strongest line, {:.4} Hz, is no damped swing of at least {FEWEST_CYCLES:.0} cycles in {duration_s:.3} s: a drift, or a motion without a steady frequency",
+            "the strongest line, {:.4} Hz, is no damped swing of at least {FEWEST_CYCLES:.0} cycles in {duration_s:.3} s that stands clear of the motion around it: a drift, or a motion without a steady frequency",
             first.frequency_hz.value
         )
     })
@@ -120,27 +133,47 @@ fn best(
     fits.filter(sound).min_by(|a, b| a.deviance.total_cmp(&b.deviance))
 }
 
-/// F-test over all independent frequencies, and the information criterion.
-///
-/// Both hold for white residuals. What the residual has beyond white noise near the weaker line, drift and the first one's own misfit, is no evidence for
-/// a mode: the F ratio is taken against the residual's power there.
+/// A mode's share in a fit.
+struct Improvement<'a> {
+    signal: &'a Signal,
+    spectrum: &'a Spectrum,
+    /// Deviance without the mode.
+    before: f64,
+    /// What the mode has more.
+    parameters: f64,
+    mode: usize,
+}
+
+impl Improvement<'_> {
+    /// Probability that noise alone improves the fit as much, at any of the record's independent frequencies: the F-test.
+    ///
+    /// It holds for white residuals. What the residual has beyond white noise near the line, a drift or the misfit of a large swing, is no evidence for a
+    /// mode: the ratio is taken against the residual's power there.
+    fn p_value(&self, fit: &SinusoidFit) -> f64 {
+        let n = self.signal.values() as f64;
+        // the links' weighted sums of squares: exp of the mean deviance
+        let ratio = ((self.before - fit.deviance) / n).exp();
+        let excess = residual_excess(&fit.residuals(self.signal), fit.poles[self.mode].omega_rad_s);
+        let f = (ratio - 1.0) * fit.degrees_of_freedom / self.parameters / excess;
+        let frequencies =
+            self.spectrum.amplitude_rad.len() as f64 * self.spectrum.step_hz / self.spectrum.resolution_hz;
+        (f_tail(f, self.parameters, fit.degrees_of_freedom) * frequencies).min(1.0)
+    }
+}
+
+/// F-test and information criterion.
 fn decide(signal: &Signal, spectrum: &Spectrum, one: SinusoidFit, two: SinusoidFit) -> Chosen {
-    let n = signal.values() as f64;
     let more = (two.parameters() - one.parameters()) as f64;
-    let bic_gain = one.deviance - two.deviance - more * n.ln();
-    // the links' weighted sums of squares: exp of the mean deviance
-    let ratio = ((one.deviance - two.deviance) / n).exp();
+    let bic_gain = one.deviance - two.deviance - more * (signal.values() as f64).ln();
     let duration_s = signal.duration_s();
     let [strong, weak] = if two.strength(0, duration_s) >= two.strength(1, duration_s) { [0, 1] } else { [1, 0] };
-    let excess = residual_excess(&two.residuals(signal), two.poles[weak].omega_rad_s);
-    let f = (ratio - 1.0) * two.degrees_of_freedom / more / excess;
-    let frequencies = spectrum.amplitude_rad.len() as f64 * spectrum.step_hz / spectrum.resolution_hz;
-    let p_value = (f_tail(f, more, two.degrees_of_freedom) * frequencies).min(1.0);
+    let improvement = Improvement { signal, spectrum, before: one.deviance, parameters: more, mode: weak };
+    let p_value = improvement.p_value(&two);
     let times = two.poles[weak].frequency_hz() / two.poles[strong].frequency_hz();
     let (large, small) = (two.amplitude_rad(strong), two.amplitude_rad(weak));
     // sin θ gives a third harmonic of A³/192, a chain a few times that
     let harmonic = (times - times.round()).abs() < 0.03 && times.round() >= 2.0 && small < 0.05 * large.powi(3);
-    let modes = if p_value < 1e-3 && bic_gain > 10.0 && !harmonic { 2 } else { 1 };
+    let modes = if p_value < LEAST_P && bic_gain > 10.0 && !harmonic { 2 } else { 1 };
     let statement = if harmonic {
         format!(
             "one mode; the line at {:.4} Hz is its harmonic number {:.0} ({small:.1e} rad)",

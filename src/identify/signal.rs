@@ -1,6 +1,7 @@
 //! The measured samples of each link, without the missing ones.
 
 use crate::series::AngleSeries;
+use crate::statistics::median_step_s;
 
 /// Longest distance between neighbours, in median steps, that is interpolated across.
 pub const BRIDGE_STEPS: f64 = 3.05;
@@ -97,7 +98,7 @@ pub struct Signal {
     pub links: Vec<LinkSamples>,
     /// First and last time stamp.
     pub span_s: [f64; 2],
-    /// Median step between time stamps.
+    /// Median step between the values of the link that has them farthest apart.
     pub step_s: f64,
 }
 
@@ -109,7 +110,10 @@ impl Signal {
             LinkSamples { t_s, theta_rad }
         };
         let ends = [series.t_s.first(), series.t_s.last()].map(|t| t.copied().unwrap_or(0.0));
-        Self { links: series.theta_rad.iter().map(link).collect(), span_s: ends, step_s: series.step_s() }
+        let links: Vec<LinkSamples> = series.theta_rad.iter().map(link).collect();
+        // rows without a value resolve nothing
+        let steps = links.iter().filter_map(|l| median_step_s(&l.t_s));
+        Self { step_s: steps.fold(series.step_s(), f64::max), links, span_s: ends }
     }
 
     /// With the jumps of angles that were wrapped to one turn taken out; which links had any.

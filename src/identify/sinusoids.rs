@@ -260,6 +260,17 @@ impl SinusoidFit {
         (0..=most).min_by(|a, b| criterion(*a).total_cmp(&criterion(*b))).unwrap_or(0)
     }
 
+    /// The deviance that offsets and drifts alone would have.
+    pub fn deviance_without_modes(&self, signal: &Signal) -> f64 {
+        let terms = self.links.first().map_or(0, |l| l.drift_rad.len());
+        let problem = Projection::new(signal, self.origin_s, &[], terms);
+        let deviance = problem.links.iter().map(|link| {
+            let n = link.tau_s.len() as f64;
+            n * (link.residual.norm_squared() / n).max(f64::MIN_POSITIVE).ln()
+        });
+        deviance.sum()
+    }
+
     /// Mean square of a mode over the record, all links together: how strong it is.
     pub fn strength(&self, mode: usize, duration_s: f64) -> f64 {
         let squares: f64 = self.links.iter().map(|l| l.amplitudes_rad[mode].norm_sqr()).sum();

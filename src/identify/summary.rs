@@ -18,10 +18,13 @@ pub(super) fn summary(found: &Identification) -> String {
         };
     }
     let modes: Vec<String> = found.modes.iter().map(of_mode).collect();
-    let doubts = found.modes.iter().filter_map(Mode::unit_doubt).take(1).map(|doubt| format!(" — {doubt}"));
+    let missing = found.spectrum.missing_share;
+    let gaps = (missing > 0.5).then(|| format!("{:.0} % of the record is missing", 100.0 * missing));
+    let doubt = gaps.or_else(|| found.record.doubt()).or_else(|| found.modes.iter().find_map(Mode::doubt));
+    let doubts = doubt.map(|doubt| format!(" — {doubt}"));
     let floor = found.floor.iter().filter(|f| f.below).map(|f| format!(" — {}", f.statement));
     let part = found.tumbling.iter().map(|t| format!(" — {}", t.statement));
-    modes.join("; ") + &part.chain(doubts).chain(floor).collect::<String>()
+    modes.join("; ") + &part.chain(doubts.into_iter()).chain(floor).collect::<String>()
 }
 
 fn of_mode(mode: &Mode) -> String {
@@ -48,6 +51,9 @@ fn of_mode(mode: &Mode) -> String {
 /// `value ± half` with two digits of the half width.
 fn rounded(estimate: &Estimate, factor: f64) -> String {
     let (value, half) = (factor * estimate.value, factor * estimate.half());
+    if value.abs() < 1e-4 {
+        return format!("{value:.2e} ± {half:.0e}");
+    }
     let digits = if half > 0.0 { (1.0 - half.log10().floor()).clamp(0.0, 9.0) as usize } else { 6 };
     format!("{value:.digits$} ± {half:.digits$}")
 }

@@ -79,8 +79,8 @@ impl DiagnoseArgs {
     /// # Errors
     /// One line: what, where, what to do.
     pub fn run(&self) -> Result<()> {
-        let experiment = Experiment::read(&self.config)?;
         self.figure.as_deref().map(check_figure).transpose()?;
+        let experiment = Experiment::read(&self.config)?;
         if self.detectable {
             return self.plan(&experiment);
         }
