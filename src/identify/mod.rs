@@ -8,12 +8,13 @@
 //! | [`sinusoids`], [`pencil`], [`modes`] | damped sinusoids beside a drift by least squares, started from a matrix pencil; one mode or two |
 //! | [`tumbling`] | a motion that is no swing about rest: no modes |
 //! | [`windows`], [`envelope`], [`decay_law`] | frequency and damping as functions of amplitude |
-//! | [`estimators`], [`Mode`] | all of them side by side, and which to take |
+//! | [`estimators`], [`damping`], [`Mode`] | all of them side by side, and which to take |
 //! | [`equivalents`] | K_eq, C_eq (Eq. 29, 30) |
 //! | [`mod@floor`] | the frequency below which nothing hung can swing |
 //! | [`consistency`] | whether the estimators agree |
 
 pub mod consistency;
+pub mod damping;
 pub mod decay_law;
 pub mod decrement;
 pub mod envelope;
@@ -25,6 +26,7 @@ pub mod half_power;
 mod mode;
 pub mod modes;
 pub mod pencil;
+mod projection;
 pub mod signal;
 pub mod sinusoids;
 pub mod spectrum;
@@ -35,9 +37,10 @@ pub mod windows;
 
 use serde::Serialize;
 
+pub use damping::{Damping, Trend};
 pub use estimate::Estimate;
 pub use estimators::{Estimator, Method};
-pub use mode::{Damping, LinkMotion, Mode, Trend};
+pub use mode::{LinkMotion, Mode};
 
 use crate::error::Result;
 use crate::experiment::{Experiment, Rig};

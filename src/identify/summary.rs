@@ -1,8 +1,9 @@
 //! The answer in one line.
 
 use super::Identification;
+use super::damping::Damping;
 use super::estimate::Estimate;
-use super::mode::{Damping, Mode};
+use super::mode::Mode;
 
 /// How the note begins that says why there is no mode.
 pub(super) const NOTHING: &str = "no oscillation is identifiable: ";

@@ -2,9 +2,10 @@
 
 use std::fmt::{self, Display, Formatter};
 
+use super::damping::Damping;
 use super::estimate::{Estimate, probability};
 use super::estimators::Method;
-use super::mode::{Damping, Mode};
+use super::mode::Mode;
 use super::{Identification, Record};
 
 impl Display for Identification {
