@@ -281,6 +281,8 @@ fn an_interrupted_command_leaves_no_temporary_file() {
         }
         assert!(names().iter().any(|n| n.starts_with(".freeswing-")), "{:?}", names());
         assert!(Command::new("kill").args([signal, &child.id().to_string()]).status().unwrap().success());
+        // `wait` would close it, and the command would see an empty table
+        let _held_open = child.stdin.take();
         let status = child.wait().unwrap();
         let mut error = String::new();
         child.stderr.take().unwrap().read_to_string(&mut error).unwrap();
