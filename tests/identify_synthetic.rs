@@ -38,7 +38,7 @@ struct Table {
     /// Angles are rounded to this, as by a tracker of whole pixels; zero for none.
     quantum_rad: f64,
     /// Added to each link.
-    slow: fn(f64) -> f64,
+    slow: Law,
 }
 
 impl Table {
@@ -106,7 +106,10 @@ fn assert_is(mode: &Mode, frequency_hz: f64, what: &str) {
     assert!(off < 3e-3 * frequency_hz, "{what}: {:?} against {frequency_hz}", mode.frequency_hz);
 }
 
-const SLOW: [(&str, fn(f64) -> f64); 7] = [
+/// Of time, in seconds.
+type Law = fn(f64) -> f64;
+
+const SLOW: [(&str, Law); 7] = [
     ("nothing", |_| 0.0),
     ("an offset of 11°", |_| 0.2),
     ("a trend of 0.3° to and fro", |t| 0.0052 * (t / 12.0 - 1.0)),
@@ -247,7 +250,7 @@ fn a_growing_amplitude_has_no_damping_ratio() {
 #[test]
 fn damping_that_depends_on_amplitude_is_said_in_the_first_line() {
     // dA/dt = −b A² and dA/dt = −b₀: drag and dry friction
-    let laws: [(fn(f64) -> f64, &str); 2] = [
+    let laws: [(Law, &str); 2] = [
         (|t| 0.4 / (1.0 + 0.4 * 0.1 * t), "grows with amplitude, as drag does"),
         (|t| 0.4 - 0.006 * t, "grows as the swing becomes small, as dry friction does"),
     ];

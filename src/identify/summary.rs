@@ -25,7 +25,7 @@ pub(super) fn summary(found: &Identification) -> String {
     let doubts = doubt.map(|doubt| format!(" — {doubt}"));
     let floor = found.floor.iter().filter(|f| f.below).map(|f| format!(" — {}", f.statement));
     let part = found.tumbling.iter().map(|t| format!(" — {}", t.statement));
-    modes.join("; ") + &part.chain(doubts.into_iter()).chain(floor).collect::<String>()
+    modes.join("; ") + &part.chain(doubts).chain(floor).collect::<String>()
 }
 
 fn of_mode(mode: &Mode) -> String {

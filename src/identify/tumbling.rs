@@ -35,7 +35,7 @@ impl Tumbling {
     /// The motion that lasts longest, if there is one.
     pub fn of(signal: &Signal) -> Option<Self> {
         let chain = signal.links.len() > 1;
-        let links = signal.links.iter().map(|link| Smoothed::of(link));
+        let links = signal.links.iter().map(Smoothed::of);
         let (link, last) = links
             .enumerate()
             .filter_map(|(link, smoothed)| Some((link + 1, smoothed.last_beyond(chain)?)))
