@@ -29,9 +29,6 @@ use super::windows::{Moment, Windows};
 /// From here on the frequency within a window is trusted to join it to the next.
 const CLEAR_OF_UNWRAPPING: f64 = 15.0;
 
-/// Windows that tell a dependence on amplitude from noise: four coefficients and two more.
-pub const FEWEST_FOR_LAWS: usize = 6;
-
 /// A step from one window to the next.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Step {
@@ -132,6 +129,20 @@ impl Envelope {
 }
 
 impl Envelope {
+    /// With intervals that allow for other modes of these amplitudes, where the windows do not follow them.
+    pub(super) fn beside_unfollowed(mut self, others_rad: impl Iterator<Item = f64>) -> Self {
+        let fourth: f64 = others_rad.map(|a| a.powi(4)).sum();
+        let squares = fourth.sqrt();
+        let [kappa, lambda] = [Bounds::OTHER.kappa[1], Bounds::OTHER.lambda[1]].map(|sd| sd * squares);
+        if let Some(law) = &mut self.frequency {
+            law.f0_hz = law.f0_hz.blurred(kappa * law.f0_hz.value);
+        }
+        if let Some(law) = &mut self.damping {
+            law.xi0 = law.xi0.blurred(lambda * law.xi0.value.abs());
+        }
+        self
+    }
+
     /// ξ₀, where a linear damper explains the decay.
     pub fn linear_damping(&self) -> Option<Estimate> {
         self.damping.filter(|law| law.p_value >= 0.01).map(|law| law.xi0)

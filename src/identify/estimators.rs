@@ -116,8 +116,9 @@ impl Estimators {
     /// The laws at small amplitude; the damped sinusoids where the amplitude does not matter or its effect cannot be followed.
     pub fn choose(&self, envelope: Option<&Envelope>, amplitudes_rad: &[f64], mode: usize) -> Choice {
         let mut lawful_rad = amplitudes_rad.to_vec();
-        if let Some(envelope) = envelope {
-            lawful_rad[mode] = lawful_rad[mode].min(envelope.rms_amplitude_rad);
+        // of a mode alone, what the laws leave out acts with the windows' amplitudes; another mode's share in it is not followed
+        if let (Some(envelope), [only]) = (envelope, &mut lawful_rad[..]) {
+            *only = only.min(envelope.rms_amplitude_rad);
         }
         let sinusoids = self.each.iter().find(|e| e.method == Method::Sinusoids);
         let frequency_hz = sinusoids.and_then(|e| e.frequency_hz).unwrap_or(self.raw[0]);

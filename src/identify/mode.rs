@@ -5,7 +5,7 @@ use serde::Serialize;
 
 use super::consistency::Consistency;
 use super::damping::{Damping, Trend};
-use super::envelope::{Envelope, FEWEST_FOR_LAWS, FrequencyLaw};
+use super::envelope::{Envelope, FrequencyLaw};
 use super::estimate::{Estimate, probability};
 use super::estimators::{Estimator, Estimators, Whole};
 use super::floor::amplitude_dependence;
@@ -66,7 +66,7 @@ pub struct Mode {
 
 impl Mode {
     pub(super) fn of(whole: &Whole, mode: usize, chain: Option<&Chain>, gravity_m_s2: f64) -> Self {
-        let envelope = richest_envelope(whole, mode);
+        let envelope = envelope_of(whole, mode);
         let estimators = Estimators::of(whole, mode, &envelope);
         let envelope = envelope.ok();
         let shape = shape(whole, mode);
@@ -240,19 +240,16 @@ impl Mode {
     }
 }
 
-/// The mode's history in the windows of all modes, or in windows of its own cycles where those show it in more and the former in too few.
-fn richest_envelope(whole: &Whole, mode: usize) -> Result<Envelope, String> {
+/// The mode's history in the windows of all modes; where those cannot show it, in windows of its own cycles.
+fn envelope_of(whole: &Whole, mode: usize) -> Result<Envelope, String> {
     let slowest = mode == 0;
     let shared = whole.windows.as_ref().map_err(Clone::clone).and_then(|w| Envelope::of(w, mode, slowest));
-    let seen = shared.as_ref().map_or(0, |e| e.windows);
-    if seen >= FEWEST_FOR_LAWS || whole.fit.poles.len() == 1 {
+    if shared.is_ok() || whole.fit.poles.len() == 1 {
         return shared;
     }
-    match Windows::of_mode(whole.signal, whole.fit, mode).and_then(|own| Envelope::of(&own, 0, slowest)) {
-        Ok(own) if own.windows > seen => Ok(own),
-        Err(reason) if shared.is_err() => Err(reason),
-        _ => shared,
-    }
+    let own = Windows::of_mode(whole.signal, whole.fit, mode)?;
+    let others = (0..whole.fit.poles.len()).filter(|m| *m != mode).map(|m| whole.fit.amplitude_rad(m));
+    Ok(Envelope::of(&own, 0, slowest)?.beside_unfollowed(others))
 }
 
 fn shape(whole: &Whole, mode: usize) -> Vec<LinkMotion> {

@@ -2,8 +2,8 @@
 //!
 //! Amplitude and phase at a window's middle do not depend on the frequency and damping fitted within it, nor on the other windows.
 //!
-//! The windows are cut for all modes together, by the slowest one's cycles. Where that leaves too few in which a faster mode is seen, or where the slowest
-//! has too few cycles, [`Windows::of_mode`] cuts them by the mode's own, the others taken away.
+//! The windows are cut for all modes together, by the slowest one's cycles. Where that leaves fewer than three in which a faster mode is seen, or where the
+//! slowest has too few cycles, [`Windows::of_mode`] cuts them by the mode's own, the others taken away.
 
 use nalgebra::Complex;
 
