@@ -1,12 +1,65 @@
 //! Files written whole or not at all: a temporary beside the target, renamed when finished.
+//!
+//! A program that is stopped runs no destructor, so every temporary is also in one list, which [`remove_temporaries`] clears.
 
-use std::fs::Permissions;
-use std::io::Write;
+use std::fs::{File, Permissions};
+use std::io::{ErrorKind, Write};
 use std::path::{Path, PathBuf};
+use std::sync::{Mutex, MutexGuard, PoisonError};
 
-use tempfile::NamedTempFile;
+use tempfile::{NamedTempFile, TempPath};
 
 use crate::error::{Error, Result};
+
+/// The temporary files there are.
+static TEMPORARIES: Mutex<Vec<PathBuf>> = Mutex::new(Vec::new());
+
+fn temporaries() -> MutexGuard<'static, Vec<PathBuf>> {
+    TEMPORARIES.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+/// Deletes every temporary file, for a program that is about to be ended from outside. No further one can be made while the guard lives.
+#[must_use = "the program ends while it is held"]
+pub fn remove_temporaries() -> impl Sized {
+    let mut all = temporaries();
+    for path in all.drain(..) {
+        // what is not there any more needs no removal
+        let _ = std::fs::remove_file(path);
+    }
+    all
+}
+
+/// A temporary file that is deleted unless it is persisted, also when the program is stopped.
+#[derive(Debug)]
+pub struct Temporary(NamedTempFile);
+
+impl Temporary {
+    /// The file in place of `path`.
+    ///
+    /// # Errors
+    /// [`Error::Unwritable`]; the temporary is gone then.
+    pub fn persist(self, path: &Path) -> Result<()> {
+        let own = self.0.path().to_owned();
+        let kept = self.0.persist(path).map(drop).map_err(|e| Error::unwritable(path, e.error));
+        forget(&own);
+        kept
+    }
+
+    /// For a writer of its own.
+    pub fn as_file(&self) -> &File {
+        self.0.as_file()
+    }
+
+    /// Its path alone, for a writer that opens the file itself. The list keeps the path: it is unique to this program.
+    pub fn into_path(self) -> TempPath {
+        self.0.into_temp_path()
+    }
+}
+
+/// Takes a file that is gone from the list.
+fn forget(path: &Path) {
+    temporaries().retain(|other| other != path);
+}
 
 /// An output that appears only when it is finished.
 #[derive(Debug)]
@@ -18,7 +71,7 @@ pub struct OutputFile {
 #[derive(Debug)]
 enum Sink {
     /// Beside the target, renamed over it.
-    Temporary(NamedTempFile),
+    Temporary(Temporary),
     /// A pipe or device, which cannot be renamed over.
     Device,
     /// `-`.
@@ -64,9 +117,9 @@ impl OutputFile {
     /// [`Error::Unwritable`]; nothing appears then.
     pub fn write(&mut self, contents: &[u8]) -> Result<()> {
         let written = match &mut self.sink {
-            Sink::StandardOutput => std::io::stdout().write_all(contents),
+            Sink::StandardOutput => to_standard_output(contents),
             Sink::Device => std::fs::write(&self.path, contents),
-            Sink::Temporary(file) => file.write_all(contents),
+            Sink::Temporary(file) => file.0.write_all(contents),
         };
         written.map_err(|e| Error::unwritable(&self.path, e))
     }
@@ -78,10 +131,20 @@ impl OutputFile {
     pub fn appear(self) -> Result<()> {
         match self.sink {
             Sink::StandardOutput | Sink::Device => Ok(()),
-            Sink::Temporary(file) => {
-                file.persist(&self.path).map(drop).map_err(|e| Error::unwritable(&self.path, e.error))
-            }
+            Sink::Temporary(file) => file.persist(&self.path),
         }
+    }
+}
+
+/// Standard output; a reader that has seen enough, such as `head`, is no failure.
+///
+/// # Errors
+/// Any other failure to write.
+pub fn to_standard_output(contents: &[u8]) -> std::io::Result<()> {
+    let mut standard_output = std::io::stdout().lock();
+    match standard_output.write_all(contents).and_then(|()| standard_output.flush()) {
+        Err(error) if error.kind() != ErrorKind::BrokenPipe => Err(error),
+        _ => Ok(()),
     }
 }
 
@@ -89,7 +152,7 @@ impl OutputFile {
 ///
 /// # Errors
 /// [`Error::Unwritable`].
-pub fn temporary_beside(path: &Path) -> Result<NamedTempFile> {
+pub fn temporary_beside(path: &Path) -> Result<Temporary> {
     let folder = match path.parent() {
         Some(parent) if !parent.as_os_str().is_empty() => parent,
         _ => Path::new("."),
@@ -103,5 +166,9 @@ pub fn temporary_beside(path: &Path) -> Result<NamedTempFile> {
         // the umask applies, as to any file a program makes
         builder.permissions(Permissions::from_mode(0o666));
     }
-    builder.tempfile_in(folder).map_err(|e| Error::unwritable(path, e))
+    // made under the lock, so that no file can appear that the list does not hold
+    let mut all = temporaries();
+    let file = builder.tempfile_in(folder).map_err(|e| Error::unwritable(path, e))?;
+    all.push(file.path().to_owned());
+    Ok(Temporary(file))
 }

@@ -65,9 +65,10 @@ impl AngleSeries {
             return Err(Error::EmptyFile { path: path.to_owned() });
         }
         let table = Table { path };
-        let text = std::str::from_utf8(bytes)
-            .map_err(|_| table.refuse(None, "is not UTF-8 text; save the table as plain CSV"))?
-            .trim_start_matches('\u{feff}');
+        let text = match std::str::from_utf8(bytes) {
+            Ok(text) if !text.contains('\0') => text.trim_start_matches('\u{feff}'),
+            _ => return Err(table.refuse(None, &not_a_table(bytes, path))),
+        };
         let mut reader = csv::ReaderBuilder::new().trim(csv::Trim::All).flexible(true).from_reader(text.as_bytes());
         let header = reader.headers().map_err(|e| table.refuse(None, &e.to_string()))?.clone();
         let columns = Columns::of(&header, &table)?;
@@ -302,6 +303,30 @@ impl Columns {
     }
 }
 
+/// What to say about bytes that are no text, by the marks that files of a kind begin with.
+fn not_a_table(bytes: &[u8], path: &Path) -> String {
+    let at = |offset: usize, mark: &[u8]| bytes.get(offset..offset + mark.len()).is_some_and(|b| b == mark);
+    let video = at(4, b"ftyp") // MP4, MOV
+        || at(4, b"moov")
+        || at(4, b"mdat")
+        || at(0, &[0x1a, 0x45, 0xdf, 0xa3]) // MKV, WebM
+        || (at(0, b"RIFF") && at(8, b"AVI "));
+    let picture = at(0, b"\x89PNG") || at(0, &[0xff, 0xd8, 0xff]) || at(0, b"II*\0") || at(0, b"MM\0*") || at(0, b"BM");
+    if video {
+        return format!("is a video; run `track {} --out angles.csv` first and give angles.csv", path.display());
+    }
+    if picture {
+        return "is a picture; give the table that `track` writes of a recording".to_owned();
+    }
+    if at(0, b"PK\x03\x04") || at(0, &[0xd0, 0xcf, 0x11, 0xe0]) {
+        return "is a workbook or an archive; export the table as CSV".to_owned();
+    }
+    if at(0, &[0x1f, 0x8b]) || at(0, &[0x28, 0xb5, 0x2f, 0xfd]) {
+        return "is compressed; unpack it first".to_owned();
+    }
+    "is not UTF-8 text; save the table as plain CSV".to_owned()
+}
+
 /// What to say about a column that is not there.
 fn missing(name: &str, names: &[&str]) -> String {
     let list = names.join(", ");
@@ -485,6 +510,23 @@ mod tests {
         assert_eq!(refusal("t_s,t_s,theta1_rad\n"), "a.csv:1: two columns are called `t_s`; rename one");
         let utf16 = AngleSeries::parse(&[0xff, 0xfe, 0x74, 0x00], Path::new("a.csv")).unwrap_err().to_string();
         assert_eq!(utf16, "a.csv: is not UTF-8 text; save the table as plain CSV");
+    }
+
+    #[test]
+    fn files_of_another_kind_are_named() {
+        let kinds: [(&[u8], &str); 7] = [
+            (b"\0\0\0\x20ftypisom\0\0", "is a video; run `track a.csv --out angles.csv` first and give angles.csv"),
+            (b"\x1a\x45\xdf\xa3\x01\0", "is a video; run `track"),
+            (b"RIFF\0\0\0\0AVI LIST\0", "is a video; run `track"),
+            (b"\x89PNG\r\n\x1a\n\0", "is a picture; give the table that `track` writes"),
+            (b"PK\x03\x04\0", "is a workbook or an archive; export the table as CSV"),
+            (b"\x1f\x8b\x08\0", "is compressed; unpack it first"),
+            (b"t_s,theta1_rad\n0,\0", "is not UTF-8 text"),
+        ];
+        for (bytes, says) in kinds {
+            let message = AngleSeries::parse(bytes, Path::new("a.csv")).unwrap_err().to_string();
+            assert!(message.starts_with(&format!("a.csv: {says}")), "{message}");
+        }
     }
 
     #[test]

@@ -390,7 +390,9 @@ fn damping_lost_in_noise_is_not_identifiable_and_a_short_record_resolves_no_half
     let mode = Truth { frequency_hz: 1.0, damping_ratio: 1e-5, amplitude_rad: [0.02, 0.02], phase_rad: 0.3 };
     let case = Case::of(vec![mode], 0.004, 20.0, &mut Xoshiro256PlusPlus::seed_from_u64(3));
     let found = identify(&case.series, None).unwrap();
-    let Damping::NotIdentifiable { estimate, reason } = &found.modes[0].damping else { panic!("{found}") };
+    let Damping::NotIdentifiable { estimate: Some(estimate), reason } = &found.modes[0].damping else {
+        panic!("{found}")
+    };
     assert!(estimate.holds(1e-5) && reason.contains("ξ ≤"), "{reason}");
     let half = found.modes[0].estimators.iter().find(|e| e.method == Method::HalfPower).unwrap();
     assert!(half.damping_ratio.is_none() && half.note.as_ref().unwrap().starts_with("not resolved"), "{half:?}");

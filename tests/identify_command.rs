@@ -1,7 +1,9 @@
 //! `freeswing identify` as a user types it: what it prints, what it writes, what it refuses.
 
 use std::fmt::Write as _;
-use std::process::{Command, Output};
+use std::io::Read as _;
+use std::process::{Command, Output, Stdio};
+use std::time::Duration;
 
 use assert_cmd::cargo::CommandCargoExt;
 use rand::rngs::Xoshiro256PlusPlus;
@@ -93,7 +95,7 @@ fn the_table_may_come_from_standard_input() {
     let bench = Bench::with("");
     let mut command = assert_cmd::Command::cargo_bin("freeswing").unwrap();
     let output = command.args(["identify", "-"]).write_stdin(good()).output().unwrap();
-    assert!(String::from_utf8(output.stdout).unwrap().starts_with("standard input: 750 rows"));
+    assert!(String::from_utf8(output.stdout).unwrap().contains("\nstandard input: 750 rows"));
     bench.refuses(&["a.csv"], "a.csv: the file is empty (0 bytes); record or copy it again");
 }
 
@@ -188,4 +190,103 @@ fn the_help_shows_examples() {
     let output = Bench::with("").run(&["--help"]);
     let text = String::from_utf8(output.stdout).unwrap();
     assert!(text.contains("freeswing identify angles.csv --config experiment.toml --json identified.json"));
+}
+
+#[test]
+fn the_first_line_is_the_answer_and_the_strongest_mode_stands_first() {
+    let bench = Bench::with(&good());
+    let text = String::from_utf8(bench.run(&["a.csv"]).stdout).unwrap();
+    assert!(text.lines().next().unwrap().starts_with("f₁ = 1.352"), "{text}");
+    let output = bench.run(&["a.csv", "--json", "out.json"]);
+    assert!(output.status.success() && output.stderr.is_empty());
+    let json = std::fs::read_to_string(bench.folder.path().join("out.json")).unwrap();
+    let json: serde_json::Value = serde_json::from_str(&json).unwrap();
+    assert!(json["summary"].as_str().unwrap().starts_with("f₁ = 1.352"));
+    assert_eq!((json["modes"][0]["number"].as_u64(), json["swing_mode"].as_u64()), (Some(1), Some(1)));
+    assert!(json["tumbling"].is_null());
+}
+
+#[test]
+fn an_answer_without_a_mode_is_no_silent_success() {
+    let turning = table(25.0, |t| [3.0 * t, 2.0 * t].map(|a| format!("{a:.6}")));
+    let bench = Bench::with(&turning);
+    let output = bench.run(&["a.csv", "--json", "-"]);
+    let warning = String::from_utf8(output.stderr).unwrap();
+    assert_eq!((output.status.code(), warning.lines().count()), (Some(0), 1), "{warning}");
+    assert!(warning.starts_with("warning: a.csv: not identifiable: θ"), "{warning}");
+    assert!(warning.contains("turns over until t = ") && warning.contains("record on until"), "{warning}");
+    let json: serde_json::Value = serde_json::from_slice(&output.stdout).unwrap();
+    assert_eq!(json["modes"].as_array().unwrap().len(), 0);
+    let output = bench.run(&["a.csv", "--quiet"]);
+    assert!(output.stderr.is_empty() && output.stdout.is_empty());
+}
+
+#[test]
+fn a_recording_is_sent_to_track_and_a_table_to_identify() {
+    let bench = Bench::with("");
+    let write = |name: &str, bytes: &[u8]| std::fs::write(bench.folder.path().join(name), bytes).unwrap();
+    write("swing.mp4", b"\0\0\0\x20ftypisom\0\0\x02\0");
+    bench.refuses(&["swing.mp4"], "swing.mp4: is a video; run `track swing.mp4 --out angles.csv` first");
+    write("angles.csv", good().as_bytes());
+    let mut track = Command::cargo_bin("track").unwrap();
+    let output = track.current_dir(bench.folder.path()).args(["angles.csv", "--out", "out.csv"]).output().unwrap();
+    let error = String::from_utf8(output.stderr).unwrap();
+    assert_eq!((output.status.code(), error.lines().count()), (Some(2), 1), "{error}");
+    assert!(error.contains("angles.csv: not a video that can be opened: it is a table of text"), "{error}");
+}
+
+#[test]
+fn a_figure_is_svg_by_name() {
+    let bench = Bench::with(&good());
+    let mut diagnose = Command::cargo_bin("freeswing").unwrap();
+    diagnose.current_dir(bench.folder.path()).args(["diagnose", "a.csv", "--config", "e.toml", "--figure", "x.png"]);
+    let output = diagnose.output().unwrap();
+    let error = String::from_utf8(output.stderr).unwrap();
+    assert_eq!((output.status.code(), error.lines().count()), (Some(2), 1), "{error}");
+    assert!(error.contains("--figure: x.png: figures are SVG; name it x.svg"), "{error}");
+}
+
+#[test]
+fn a_reader_that_has_seen_enough_is_no_failure() {
+    let bench = Bench::with(&good());
+    for arguments in [vec!["a.csv"], vec!["a.csv", "--json", "-"]] {
+        let mut command = Command::cargo_bin("freeswing").unwrap();
+        command.current_dir(bench.folder.path()).arg("identify").args(arguments);
+        let mut child = command.stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap();
+        drop(child.stdout.take());
+        let output = child.wait_with_output().unwrap();
+        assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+        assert!(output.stderr.is_empty());
+    }
+}
+
+#[cfg(unix)]
+#[test]
+fn an_interrupted_command_leaves_no_temporary_file() {
+    for signal in ["-INT", "-TERM"] {
+        let bench = Bench::with("");
+        let names = || -> Vec<_> {
+            let entries = std::fs::read_dir(bench.folder.path()).unwrap();
+            entries.map(|e| e.unwrap().file_name().into_string().unwrap()).collect()
+        };
+        let mut command = Command::cargo_bin("freeswing").unwrap();
+        command.current_dir(bench.folder.path()).args(["identify", "-", "--json", "out.json"]);
+        // standard input stays open: the command waits for its table with the temporary file made
+        let mut child = command.stdin(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap();
+        for _ in 0..3000 {
+            if names().iter().any(|n| n.starts_with(".freeswing-")) {
+                break;
+            }
+            std::thread::sleep(Duration::from_millis(10));
+        }
+        assert!(names().iter().any(|n| n.starts_with(".freeswing-")), "{:?}", names());
+        assert!(Command::new("kill").args([signal, &child.id().to_string()]).status().unwrap().success());
+        // `wait` would close it, and the command would see an empty table
+        let _held_open = child.stdin.take();
+        let status = child.wait().unwrap();
+        let mut error = String::new();
+        child.stderr.take().unwrap().read_to_string(&mut error).unwrap();
+        assert_eq!((status.code(), error.as_str()), (Some(2), "error: interrupted; nothing was written\n"));
+        assert_eq!(names(), ["a.csv"]);
+    }
 }

@@ -1,44 +1,70 @@
 //! The progress bar on standard error, only on a terminal, and Ctrl-C.
 
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::sync::{Mutex, Once};
+use std::time::Duration;
 
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 
+use crate::error::Error;
+use crate::output;
 use crate::progress::Progress;
 
 static CANCELLED: AtomicBool = AtomicBool::new(false);
+/// Bars whose work stops by itself when it is asked to.
+static LISTENERS: AtomicUsize = AtomicUsize::new(0);
 static HANDLER: Once = Once::new();
+
+/// How often the time of a stage is drawn anew.
+const TICK: Duration = Duration::from_millis(200);
+
+/// From here on Ctrl-C, and the signals that end a program, ask work that listens to stop; any other work, or a second signal, ends with the temporary
+/// files removed.
+pub fn hear_interrupts() {
+    HANDLER.call_once(|| {
+        let _ = ctrlc::set_handler(|| {
+            let again = CANCELLED.swap(true, Ordering::SeqCst);
+            if again || LISTENERS.load(Ordering::SeqCst) == 0 {
+                let _no_more = output::remove_temporaries();
+                eprintln!("error: {}", Error::Interrupted);
+                std::process::exit(2);
+            }
+        });
+    });
+}
 
 /// Shows progress; hears Ctrl-C.
 pub struct Bar {
     bar: Mutex<ProgressBar>,
     quiet: bool,
-    /// What is counted, with a space before it.
-    unit: &'static str,
+    /// Whether it counts frames, all alike, not fits, some of which take a hundred times as long as others.
+    frames: bool,
 }
 
 impl Bar {
-    /// A bar that stays silent with `quiet`. From here on Ctrl-C asks the work to stop instead of killing it, so
-    /// that no temporary file is left behind; a second one kills.
+    /// A bar of frames that stays silent with `quiet`. While it lives, Ctrl-C asks the work to stop instead of ending it.
     pub fn new(quiet: bool) -> Self {
-        HANDLER.call_once(|| {
-            let _ = ctrlc::set_handler(|| {
-                if CANCELLED.swap(true, Ordering::SeqCst) {
-                    std::process::exit(2);
-                }
-            });
-        });
-        Self::counting(" frames", quiet)
+        LISTENERS.fetch_add(1, Ordering::SeqCst);
+        Self::counting(true, quiet)
     }
 
-    /// The same for work that counts fits and holds no file open: Ctrl-C ends it at once.
+    /// The same for work that counts fits: Ctrl-C ends it at once.
     pub fn of_fits(quiet: bool) -> Self {
-        Self::counting("", quiet)
+        Self::counting(false, quiet)
     }
 
-    fn counting(unit: &'static str, quiet: bool) -> Self {
-        Self { bar: Mutex::new(ProgressBar::hidden()), quiet, unit }
+    fn counting(frames: bool, quiet: bool) -> Self {
+        Self { bar: Mutex::new(ProgressBar::hidden()), quiet, frames }
+    }
+
+    /// What is shown of a stage. The time that is left can be told only where the steps are alike; elsewhere the time that has passed says as much.
+    fn template(&self, total: Option<u64>) -> &'static str {
+        match (self.frames, total) {
+            (true, Some(_)) => "{prefix:>11} {wide_bar} {pos}/{len} frames, {per_sec}, {eta} left",
+            (true, None) => "{prefix:>11} {spinner} {pos} frames, {per_sec}",
+            (false, Some(_)) => "{prefix:>11} {wide_bar} {pos}/{len}, {elapsed}",
+            (false, None) => "{prefix:>11} {spinner} {elapsed}",
+        }
     }
 
     fn with(&self, f: impl FnOnce(&mut ProgressBar)) {
@@ -51,6 +77,9 @@ impl Bar {
 impl Drop for Bar {
     fn drop(&mut self) {
         self.with(|bar| bar.finish_and_clear());
+        if self.frames {
+            LISTENERS.fetch_sub(1, Ordering::SeqCst);
+        }
     }
 }
 
@@ -59,17 +88,16 @@ impl Progress for Bar {
         // indicatif itself stays silent where standard error is no terminal
         let target = if self.quiet { ProgressDrawTarget::hidden() } else { ProgressDrawTarget::stderr() };
         let new = ProgressBar::with_draw_target(total, target);
-        let template = match total {
-            Some(_) => format!("{{prefix:>11}} {{wide_bar}} {{pos}}/{{len}}{}, {{per_sec}}, {{eta}} left", self.unit),
-            None => format!("{{prefix:>11}} {{spinner}} {{pos}}{}, {{per_sec}}", self.unit),
-        };
-        if let Ok(style) = ProgressStyle::with_template(&template) {
+        if let Ok(style) = ProgressStyle::with_template(self.template(total)) {
             new.set_style(style);
         }
         new.set_prefix(stage);
         self.with(|bar| {
             bar.finish_and_clear();
             *bar = new;
+            if !self.quiet {
+                bar.enable_steady_tick(TICK);
+            }
         });
     }
 
@@ -79,5 +107,18 @@ impl Progress for Bar {
 
     fn is_cancelled(&self) -> bool {
         CANCELLED.load(Ordering::SeqCst)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn only_steps_that_are_alike_promise_a_time_that_is_left() {
+        assert!(Bar::new(true).template(Some(10)).contains("{eta} left"));
+        let fits = Bar::of_fits(true);
+        assert!([Some(10), None].into_iter().all(|total| !fits.template(total).contains("eta")));
+        assert!(fits.template(Some(10)).contains("{elapsed}"));
     }
 }

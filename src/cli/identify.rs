@@ -17,9 +17,10 @@ Examples:
   freeswing identify angles.csv --from 35
   track swing.mp4 --out - | freeswing identify -
 
-The table needs t_s and theta1_rad, theta2_rad, …; other columns are ignored, an empty field is a missing value. With
---config come the frequency floor of the specimen and K_eq, C_eq. All intervals are 95 %. Exit code 0: done, also
-when something is not identifiable; 2: bad input, nothing written.")]
+The first line is the answer: frequency and damping ratio of each mode, the strongest first, or why there is none. What
+drifts or turns over is no mode. The table needs t_s and theta1_rad, theta2_rad, …; other columns are ignored, an empty
+field is a missing value. With --config come the frequency floor of the specimen and K_eq, C_eq. All intervals are 95 %.
+Exit code 0: done, also when something is not identifiable, which a warning says; 2: bad input, nothing written.")]
 pub struct IdentifyArgs {
     /// The table of angles; `-` for standard input.
     angles: PathBuf,
@@ -51,6 +52,10 @@ impl IdentifyArgs {
         let json = self.json.as_deref().map(OutputFile::create).transpose()?;
         let series = self.stretch(super::read_angles(&self.angles)?)?;
         let found = identify(&series, experiment.as_ref())?;
+        // where the first line of the report is not read, an answer without a mode must not pass for one
+        if found.modes.is_empty() && !self.quiet {
+            eprintln!("warning: {}: {}", series.path.display(), found.summary);
+        }
         let text = if self.quiet { String::new() } else { found.to_string() };
         super::deliver(&text, &found, json)
     }

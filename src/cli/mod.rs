@@ -12,7 +12,6 @@ mod svg;
 mod table;
 mod track;
 
-use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
@@ -55,6 +54,7 @@ pub struct TrackCli {
 impl Cli {
     /// Runs the command.
     pub fn run() -> ExitCode {
+        bar::hear_interrupts();
         exit(match Self::parse().command {
             Command::Track(args) => args.run(),
             Command::Fit(args) => args.run(),
@@ -71,6 +71,7 @@ impl Cli {
 impl TrackCli {
     /// Runs `track`.
     pub fn run() -> ExitCode {
+        bar::hear_interrupts();
         exit(Self::parse().args.run())
     }
 }
@@ -120,13 +121,8 @@ fn deliver(text: &str, report: &impl serde::Serialize, json: Option<OutputFile>)
     json.commit(contents.as_bytes())
 }
 
-/// Standard output; a reader that has seen enough, such as `head`, is no failure.
+/// Standard output.
 fn print(text: &str) -> crate::Result<()> {
-    let mut standard_output = std::io::stdout().lock();
-    match standard_output.write_all(text.as_bytes()).and_then(|()| standard_output.flush()) {
-        Err(e) if e.kind() != std::io::ErrorKind::BrokenPipe => {
-            Err(crate::Error::unwritable("standard output".as_ref(), e))
-        }
-        _ => Ok(()),
-    }
+    crate::output::to_standard_output(text.as_bytes())
+        .map_err(|e| crate::Error::unwritable("standard output".as_ref(), e))
 }

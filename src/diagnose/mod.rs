@@ -170,6 +170,7 @@ pub fn diagnose<'a>(
             (locate::unknowns(fit, variance, Assumed::BESIDE), energy::added_torque_n_m(fit))
         })
     };
+    progress.begin("weighing", None);
     let mut answer = weigh(&found);
     // a strip's fits are too dear to be followed from the beginning
     if !found.ground.is_strip() && (answer.unknown > EVEN || found.leaves_more_than_noise()) {
@@ -182,6 +183,7 @@ pub fn diagnose<'a>(
         weigh(&found)
     });
     let Found { ground, causes, .. } = found;
+    progress.begin("proof", None);
     let (proofs, adequacy) = {
         let null = base_model(&answer.weighed);
         let named: Vec<&Refit<'a>> = std::iter::once(&answer).chain(&fewer).map(|a| &a.weighed[0].fit).collect();

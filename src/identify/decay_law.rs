@@ -98,7 +98,8 @@ impl DecayFit {
             values[*parameter] = solved.scaled[k] * scale[*parameter];
             sd[*parameter] = (covariance[(k, k)] * widening.variance).sqrt() * scale[*parameter];
         }
-        let sound = chi2.is_finite()
+        let sound = report.termination.was_successful()
+            && chi2.is_finite()
             && solved.active.iter().all(|parameter| sd[*parameter].is_finite() && sd[*parameter] > 0.0);
         sound.then_some(Self { values, sd, chi2, p_value, degrees_of_freedom: widening.degrees_of_freedom })
     }

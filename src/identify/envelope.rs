@@ -77,6 +77,8 @@ pub struct Envelope {
     pub damping_ratio: Estimate,
     /// Probability that the amplitudes scatter so far about an exponential by noise.
     pub p_exponential: f64,
+    /// Root of the mean square of the windows' amplitudes: what a term left out of the two laws below would act with.
+    pub rms_amplitude_rad: f64,
     /// Frequency against amplitude.
     pub frequency: Option<FrequencyLaw>,
     /// Damping against amplitude.
@@ -86,11 +88,11 @@ pub struct Envelope {
 }
 
 impl Envelope {
-    /// Of one mode.
+    /// Of one mode of the windows, which may be the slowest of the recording.
     ///
     /// # Errors
     /// In words, when the mode is clear of the noise in fewer than three windows.
-    pub fn of(windows: &Windows, mode: usize) -> Result<Self, String> {
+    pub fn of(windows: &Windows, mode: usize, slowest: bool) -> Result<Self, String> {
         let moments = &windows.moments[mode];
         if moments.len() < 3 {
             return Err(format!(
@@ -108,15 +110,17 @@ impl Envelope {
         let b1 = exponential.estimate(2);
         let omega = (phases[phases.len() - 1] - phases[0]) / (moments[moments.len() - 1].t_s - moments[0].t_s);
         let damping_ratio = b1.map(|s| s / s.hypot(omega), omega * omega / b1.value.hypot(omega).powi(3));
-        let regression = Regression::of(moments, &others, mode == 0);
+        let regression = Regression::of(moments, &others, slowest);
         let frequency = regression.frequency_law(&phases, damping_ratio.value);
         let natural_rad_s = omega.hypot(b1.value);
+        let squares: f64 = moments.iter().map(|m| m.amplitude_rad().powi(2)).sum();
         Ok(Self {
             windows: moments.len(),
             window_s: windows.window_s,
             steps: steps(moments, &phases),
             damping_ratio,
             p_exponential: exponential.p_value,
+            rms_amplitude_rad: (squares / moments.len() as f64).sqrt(),
             frequency,
             damping: regression.damping_law(natural_rad_s),
             decay: DecayLaw::of(moments, &exponential),
@@ -125,16 +129,30 @@ impl Envelope {
 }
 
 impl Envelope {
-    /// ξ₀; where no linear damper explains the decay, ξ as if there were one, stretched to what the steps show that tell it to a tenth.
-    pub fn small_amplitude_damping(&self) -> Estimate {
-        match self.damping.filter(|law| law.p_value >= 0.01) {
-            Some(law) => law.xi0,
-            None => {
-                let certain = |s: &&Step| s.damping_ratio.sd < 0.1 * s.damping_ratio.value;
-                let steps = self.steps.iter().filter(certain).map(|s| s.damping_ratio.value);
-                steps.fold(self.damping_ratio, |range, xi| range.covering(xi, xi))
-            }
+    /// With intervals that allow for other modes of these amplitudes, where the windows do not follow them.
+    pub(super) fn beside_unfollowed(mut self, others_rad: impl Iterator<Item = f64>) -> Self {
+        let fourth: f64 = others_rad.map(|a| a.powi(4)).sum();
+        let squares = fourth.sqrt();
+        let [kappa, lambda] = [Bounds::OTHER.kappa[1], Bounds::OTHER.lambda[1]].map(|sd| sd * squares);
+        if let Some(law) = &mut self.frequency {
+            law.f0_hz = law.f0_hz.blurred(kappa * law.f0_hz.value);
         }
+        if let Some(law) = &mut self.damping {
+            law.xi0 = law.xi0.blurred(lambda * law.xi0.value.abs());
+        }
+        self
+    }
+
+    /// ξ₀, where a linear damper explains the decay.
+    pub fn linear_damping(&self) -> Option<Estimate> {
+        self.damping.filter(|law| law.p_value >= 0.01).map(|law| law.xi0)
+    }
+
+    /// ξ as if there were a linear damper, stretched to what the steps show that tell it to a tenth.
+    pub fn damping_over_the_record(&self) -> Estimate {
+        let certain = |s: &&Step| s.damping_ratio.sd < 0.1 * s.damping_ratio.value;
+        let steps = self.steps.iter().filter(certain).map(|s| s.damping_ratio.value);
+        steps.fold(self.damping_ratio, |range, xi| range.covering(xi, xi))
     }
 }
 

@@ -56,6 +56,16 @@ impl Estimate {
         Self { value: self.value, sd: self.sd.max((high - low) / 4.0), low, high }
     }
 
+    /// Half of the interval's width.
+    pub fn half(&self) -> f64 {
+        0.5 * (self.high - self.low)
+    }
+
+    /// Whether all of the interval lies within these limits, its ends finite.
+    pub fn within(&self, low: f64, high: f64) -> bool {
+        low <= self.low && self.low <= self.value && self.value <= self.high && self.high <= high && self.sd.is_finite()
+    }
+
     /// Whether the interval holds a value.
     pub fn holds(&self, value: f64) -> bool {
         self.low <= value && value <= self.high

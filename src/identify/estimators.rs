@@ -5,7 +5,7 @@ use serde::Serialize;
 
 use super::consistency::Consistency;
 use super::decrement::Decrement;
-use super::envelope::{Bounds, Envelope};
+use super::envelope::{Bounds, Envelope, FrequencyLaw};
 use super::estimate::{Estimate, chi_squared_tail};
 use super::half_power::HalfPower;
 use super::signal::Signal;
@@ -40,6 +40,22 @@ pub struct Estimator {
     pub damping_ratio: Option<Estimate>,
     /// Why a number is absent, or what to know about it.
     pub note: Option<String>,
+}
+
+impl Estimator {
+    /// Without the numbers that say nothing: a frequency whose interval leaves what can be seen, from zero to the Nyquist frequency, a ξ whose interval
+    /// leaves −1 to 1.
+    fn resolved(mut self, nyquist_hz: f64) -> Self {
+        let frequency_hz = self.frequency_hz.filter(|f| f.within(0.0, 1.05 * nyquist_hz));
+        let damping_ratio = self.damping_ratio.filter(|xi| xi.within(-1.0, 1.0));
+        if (frequency_hz.is_none() && self.frequency_hz.is_some())
+            || (damping_ratio.is_none() && self.damping_ratio.is_some())
+        {
+            let what = if frequency_hz.is_none() { "f" } else { "ξ" };
+            self.note = Some(format!("not identifiable: its interval for {what} is wider than {what} can be"));
+        }
+        Self { frequency_hz, damping_ratio, ..self }
+    }
 }
 
 /// What all modes share.
@@ -79,13 +95,15 @@ impl Estimators {
         };
         let filled = alone.bridged();
         let raw = [fit.frequency_hz(mode), fit.damping_ratio(mode)];
-        let each = vec![
+        let each = [
             spectral(whole, &filled, mode, raw[1].value),
             half_power(whole, &filled, mode),
             decrement(whole, &alone, mode),
             sinusoids(raw, excess[mode], envelope.as_ref().ok()),
             windowed(envelope),
         ];
+        let nyquist_hz = 0.5 / whole.signal.step_s;
+        let each = each.map(|e| e.resolved(nyquist_hz)).into();
         Self { each, raw, residual_excess: excess[mode] }
     }
 
@@ -97,20 +115,33 @@ impl Estimators {
 
     /// The laws at small amplitude; the damped sinusoids where the amplitude does not matter or its effect cannot be followed.
     pub fn choose(&self, envelope: Option<&Envelope>, amplitudes_rad: &[f64], mode: usize) -> Choice {
+        let mut lawful_rad = amplitudes_rad.to_vec();
+        // of a mode alone, what the laws leave out acts with the windows' amplitudes; another mode's share in it is not followed
+        if let (Some(envelope), [only]) = (envelope, &mut lawful_rad[..]) {
+            *only = only.min(envelope.rms_amplitude_rad);
+        }
         let sinusoids = self.each.iter().find(|e| e.method == Method::Sinusoids);
         let frequency_hz = sinusoids.and_then(|e| e.frequency_hz).unwrap_or(self.raw[0]);
         let damping_ratio = sinusoids.and_then(|e| e.damping_ratio).unwrap_or(self.raw[1]);
         // what amplitude may have changed, by the bounds on κ and λ
         let [changed_hz, changed_xi] = unfollowed(amplitudes_rad, mode);
         let (changed_hz, changed_xi) = (changed_hz * frequency_hz.value, changed_xi * damping_ratio.value);
-        let squares: f64 = amplitudes_rad.iter().map(|a| a * a).sum();
+        let squares: f64 = lawful_rad.iter().map(|a| a * a).sum();
         let omitted = Bounds::of(mode == 0).fourth.map(|bound| bound * squares * squares);
         let felt = changed_hz > 0.3 * frequency_hz.sd;
-        let law = envelope.and_then(|e| e.frequency.map(|f| (e, f)));
+        // a law that reaches far beyond the steps it was laid through tells nothing at its end
+        let sound = |e: &Envelope, law: &FrequencyLaw| {
+            e.steps.iter().any(|s| (law.f0_hz.value / s.frequency_hz.value - 1.0).abs() < FARTHEST_LAW)
+                && law.f0_hz.half() < FARTHEST_LAW * law.f0_hz.value
+        };
+        let law = envelope.and_then(|e| e.frequency.filter(|f| sound(e, f)).map(|f| (e, f)));
         match law {
             Some((envelope, law)) if felt || self.residual_excess > 1.0 => Choice {
                 frequency_hz: relatively_blurred(law.f0_hz, omitted[0]),
-                damping_ratio: relatively_blurred(envelope.small_amplitude_damping(), omitted[1]),
+                // a range over the record extrapolates to no amplitude
+                damping_ratio: envelope
+                    .linear_damping()
+                    .map_or_else(|| envelope.damping_over_the_record(), |xi| relatively_blurred(xi, omitted[1])),
                 basis: "windows: f and ξ at small amplitude".to_owned(),
             },
             None if felt || self.residual_excess > 1.0 => Choice {
@@ -122,6 +153,9 @@ impl Estimators {
         }
     }
 }
+
+/// How far from the frequency of its nearest step, and how wide, relative to it, f₀ may be: a pendulum released at 145° has 0.5 f₀.
+const FARTHEST_LAW: f64 = 0.5;
 
 /// Nearness to three times the slowest frequency at which a mode and the harmonic of a large swing mix.
 const HARMONIC_BAND: f64 = 0.06;
@@ -150,7 +184,7 @@ impl Choice {
             frequency_hz: relatively_blurred(self.frequency_hz, HARMONIC_BAND * share.sqrt()),
             damping_ratio: damping_ratio.blurred(2.0 * share.sqrt() * damping_ratio.value.abs()),
             basis: format!(
-                "{}; widened: it lies on the third harmonic of mode 1, which only a forward model separates",
+                "{}; widened: it lies on the third harmonic of the slowest mode, which only a forward model separates",
                 self.basis
             ),
         }
@@ -265,7 +299,7 @@ fn windowed(envelope: &Result<Envelope, String>) -> Estimator {
 
 /// Power of the residual in the lines beside a mode (2/T to 9/T away on both sides) over that of white noise of the same variance; 1 unless the
 /// excess would come about by chance less than once in a thousand records. Least squares sees only that part of the residual.
-fn residual_excess(residual: &Signal, omega_rad_s: f64) -> f64 {
+pub(super) fn residual_excess(residual: &Signal, omega_rad_s: f64) -> f64 {
     let line = std::f64::consts::TAU / residual.duration_s();
     let (mut sum, mut lines) = (0.0, 0.0);
     for link in &residual.links {

@@ -5,14 +5,16 @@
 //! | [`spectrum`] | amplitude spectrum, interpolated peaks |
 //! | [`half_power`] | bandwidth at half power (paper Eq. 28) |
 //! | [`decrement`] | logarithmic decrement over all peaks (Eq. 27) |
-//! | [`sinusoids`], [`pencil`], [`modes`] | damped sinusoids by least squares, started from a matrix pencil; one mode or two |
+//! | [`sinusoids`], [`pencil`], [`modes`] | damped sinusoids beside a drift by least squares, started from a matrix pencil; one mode or two |
+//! | [`tumbling`] | a motion that is no swing about rest: no modes |
 //! | [`windows`], [`envelope`], [`decay_law`] | frequency and damping as functions of amplitude |
-//! | [`estimators`], [`Mode`] | all of them side by side, and which to take |
+//! | [`estimators`], [`damping`], [`Mode`] | all of them side by side, and which to take |
 //! | [`equivalents`] | K_eq, C_eq (Eq. 29, 30) |
 //! | [`mod@floor`] | the frequency below which nothing hung can swing |
 //! | [`consistency`] | whether the estimators agree |
 
 pub mod consistency;
+pub mod damping;
 pub mod decay_law;
 pub mod decrement;
 pub mod envelope;
@@ -24,17 +26,21 @@ pub mod half_power;
 mod mode;
 pub mod modes;
 pub mod pencil;
+mod projection;
 pub mod signal;
 pub mod sinusoids;
 pub mod spectrum;
+mod summary;
 mod table;
+pub mod tumbling;
 pub mod windows;
 
 use serde::Serialize;
 
+pub use damping::{Damping, Trend};
 pub use estimate::Estimate;
 pub use estimators::{Estimator, Method};
-pub use mode::{Damping, LinkMotion, Mode};
+pub use mode::{LinkMotion, Mode};
 
 use crate::error::Result;
 use crate::experiment::{Experiment, Rig};
@@ -43,10 +49,10 @@ use crate::series::AngleSeries;
 use equivalents::Equivalents;
 use estimators::Whole;
 use floor::Floor;
-use modes::ModeCount;
+use modes::{Chosen, ModeCount};
 use signal::Signal;
-use sinusoids::SinusoidFit;
 use spectrum::Spectrum;
+use tumbling::Tumbling;
 use windows::Windows;
 
 /// What was recorded.
@@ -66,6 +72,14 @@ pub struct Record {
     pub irregular_share: f64,
     /// Noise of each angle, from what fits over a few cycles leave over.
     pub noise_rad: Vec<f64>,
+    /// Whether the times are 0, 1, 2, … or go on so from another number.
+    pub counts: bool,
+}
+
+impl Record {
+    fn doubt(&self) -> Option<String> {
+        self.counts.then(|| "t_s counts by ones: is it a frame number? Then divide it by the frame rate".to_owned())
+    }
 }
 
 /// Everything the data say without a model.
@@ -73,14 +87,22 @@ pub struct Record {
 pub struct Identification {
     /// `freeswing.identify/1`.
     pub schema: &'static str,
+    /// The answer in one line: each mode's frequency and ξ, the strongest first, or why there is none.
+    pub summary: String,
     /// What was recorded.
     pub record: Record,
     /// Its spectrum.
     pub spectrum: Spectrum,
+    /// What keeps it from being a swing; then there are no modes.
+    pub tumbling: Option<Tumbling>,
+    /// How far each link's resting angle moves over the record, no part of any mode; zero where the data do not ask for a drift.
+    pub drift_rad: Vec<f64>,
     /// How many modes it shows; absent when nothing oscillates.
     pub mode_count: Option<ModeCount>,
-    /// Lowest frequency first; empty when nothing oscillates.
+    /// The strongest first; empty when nothing oscillates.
     pub modes: Vec<Mode>,
+    /// Number of the mode that `floor` and `equivalents` follow: the strongest in which all links move together, as a hanging body's slowest mode does.
+    pub swing_mode: Option<usize>,
     /// Needs the experiment file.
     pub floor: Option<Floor>,
     /// Needs the experiment file.
@@ -95,15 +117,17 @@ pub struct Identification {
 /// [`crate::Error::Simulation`] when the experiment's specimen cannot swing. What the data cannot tell is no error but says so in the result.
 pub fn identify(series: &AngleSeries, experiment: Option<&Experiment>) -> Result<Identification> {
     let body = experiment.map(|e| Ok(Body { experiment: e, chain: Chain::of(&e.specimen)? })).transpose()?;
-    let signal = Signal::of(series);
+    let (signal, wrapped) = Signal::of(series).unwrapped();
     let mut found = Identification::of_record(series, &signal);
-    match modes::choose_modes(&signal, &found.spectrum) {
-        Some((fit, count)) => found.add_modes(&signal, &fit, count, body.as_ref()),
-        None => found.notes.push(format!(
-            "no oscillation is identifiable: the highest peak is {:.1} times the median power, as noise alone gives",
-            found.spectrum.peaks.first().map_or(0.0, |p| p.over_floor)
-        )),
+    for link in wrapped {
+        found.notes.push(format!("θ{} jumps by full turns, as wrapped angles do: taken out", link + 1));
     }
+    found.tumbling = Tumbling::of(&signal);
+    match found.swing_of(signal) {
+        Ok((signal, chosen)) => found.add_modes(&signal, chosen, body.as_ref()),
+        Err(reason) => found.notes.push(format!("{}{reason}", summary::NOTHING)),
+    }
+    found.summary = summary::summary(&found);
     Ok(found)
 }
 
@@ -124,10 +148,16 @@ impl Identification {
             step_s: series.step_s(),
             irregular_share: series.irregular_share(),
             noise_rad: Vec::new(),
+            counts: series.t_s.windows(2).all(|pair| pair[1] - pair[0] == 1.0)
+                && series.t_s.first().is_some_and(|t| t.fract() == 0.0),
         };
-        let spectrum = Spectrum::of(signal, record.irregular_share);
+        let spectrum = Spectrum::of(&signal.levelled(), record.irregular_share);
         Self {
             schema: "freeswing.identify/1",
+            summary: String::new(),
+            tumbling: None,
+            drift_rad: Vec::new(),
+            swing_mode: None,
             notes: record_notes(&record, &spectrum),
             record,
             spectrum,
@@ -138,25 +168,60 @@ impl Identification {
         }
     }
 
-    fn add_modes(&mut self, signal: &Signal, fit: &SinusoidFit, count: ModeCount, body: Option<&Body>) {
-        let windows = Windows::of(signal, fit);
+    /// The part of the record that is a swing, with its modes; or why there is none.
+    fn swing_of(&mut self, signal: Signal) -> std::result::Result<(Signal, Chosen), String> {
+        let signal = match &self.tumbling {
+            None => signal,
+            Some(tumbling) => {
+                let from_s = tumbling.swings_from_s.ok_or_else(|| tumbling.statement.clone())?;
+                self.notes.push(tumbling.statement.clone());
+                let rest = signal.from(from_s);
+                self.spectrum = Spectrum::of(&rest.levelled(), self.record.irregular_share);
+                rest
+            }
+        };
+        let chosen = modes::choose_modes(&signal, &self.spectrum)?;
+        Ok((signal, chosen))
+    }
+
+    fn add_modes(&mut self, recorded: &Signal, chosen: Chosen, body: Option<&Body>) {
+        let Chosen { fit, count } = chosen;
+        self.drift_rad = fit.drift_ranges_rad(recorded);
+        let signal = &fit.without_drift(recorded);
+        let windows = Windows::of(signal, &fit);
         self.record.noise_rad = match &windows {
             Ok(windows) => windows.noise_rad.clone(),
             Err(_) => fit.links.iter().map(|l| l.noise_rad).collect(),
         };
         let noise_rad = &self.record.noise_rad;
-        let whole = Whole { signal, spectrum: &self.spectrum, fit, windows: &windows, noise_rad };
+        let whole = Whole { signal, spectrum: &self.spectrum, fit: &fit, windows: &windows, noise_rad };
         let gravity_m_s2 = body.map_or(Rig::default().gravity_m_s2, |b| b.experiment.rig.gravity_m_s2);
         let same_links = body.map(|b| &b.chain).filter(|chain| chain.count() == signal.links.len());
-        self.modes = (0..fit.poles.len()).map(|m| Mode::of(&whole, m, same_links, gravity_m_s2)).collect();
+        let mut modes: Vec<Mode> =
+            (0..fit.poles.len()).map(|m| Mode::of(&whole, m, same_links, gravity_m_s2)).collect();
+        modes.sort_by(|a, b| b.rms_rad.total_cmp(&a.rms_rad));
+        let (modes, open): (Vec<Mode>, Vec<Mode>) = modes.into_iter().partition(Mode::is_resolved);
+        let alone = if modes.is_empty() { summary::NOTHING } else { "" };
+        self.notes.extend(open.iter().map(|mode| {
+            format!(
+                "{alone}a motion near {:.3} Hz has no one frequency: what it depends on, amplitude or another mode, is not separated from it",
+                mode.frequency_hz.value
+            )
+        }));
+        if modes.is_empty() {
+            return;
+        }
+        self.modes = modes.into_iter().enumerate().map(|(k, mode)| mode.numbered(k + 1)).collect();
         self.mode_count = Some(count);
+        let swing = self.modes.iter().position(Mode::moves_together).unwrap_or(0);
+        self.swing_mode = Some(swing + 1);
         if body.is_some() && same_links.is_none() {
             let message = "the experiment file has another number of links than the table; its own links make the floor and the equivalents";
             self.notes.push(message.to_owned());
         }
-        if let (Some(body), Some(slowest)) = (body, self.modes.first()) {
-            let frequency_hz = slowest.small_amplitude_hz(slowest.expected_kappa_per_rad2.unwrap_or(1.0 / 16.0));
-            let damping_ratio = slowest.damping.estimate().copied();
+        if let (Some(body), Some(swing)) = (body, self.modes.get(swing)) {
+            let frequency_hz = swing.small_amplitude_hz(swing.expected_kappa_per_rad2.unwrap_or(1.0 / 16.0));
+            let damping_ratio = swing.damping.estimate().copied();
             let floor = Floor::of(&body.experiment.specimen, &body.chain, gravity_m_s2, frequency_hz);
             self.notes.extend(floor.below.then(|| floor.statement.clone()));
             self.floor = Some(floor);
@@ -168,7 +233,7 @@ impl Identification {
 }
 
 fn record_notes(record: &Record, spectrum: &Spectrum) -> Vec<String> {
-    let mut notes = Vec::new();
+    let mut notes: Vec<String> = record.doubt().into_iter().collect();
     if record.irregular_share > 0.02 {
         notes.push(format!(
             "{:.0} % of the time steps are irregular: least-squares methods use the exact times, the spectrum is interpolated to an even step and its peaks refined on the exact times",

@@ -4,57 +4,21 @@ use nalgebra::Complex;
 use serde::Serialize;
 
 use super::consistency::Consistency;
+use super::damping::{Damping, Trend};
 use super::envelope::{Envelope, FrequencyLaw};
 use super::estimate::{Estimate, probability};
 use super::estimators::{Estimator, Estimators, Whole};
 use super::floor::amplitude_dependence;
+use super::windows::Windows;
 use crate::model::chain::Chain;
 
 /// By how much the theory of κ may be off: it is the first term in A², for a shape that does not change with amplitude.
 const THEORY_TOLERANCE: f64 = 0.15;
 
-/// ξ, or why the data do not tell it.
-#[derive(Debug, Clone, PartialEq, Serialize)]
-#[serde(rename_all = "snake_case")]
-pub enum Damping {
-    /// Its interval stays clear of zero.
-    Identified(Estimate),
-    /// Its interval reaches zero.
-    NotIdentifiable {
-        /// 95 % interval.
-        estimate: Estimate,
-        /// With the number that makes it so.
-        reason: String,
-    },
-}
-
-impl Damping {
-    fn of(estimate: Estimate, duration_s: f64) -> Self {
-        if estimate.low > 0.0 {
-            return Self::Identified(estimate);
-        }
-        let reason = format!(
-            "the decay over {duration_s:.0} s is within the noise: ξ ≤ {:.2e} is all that can be said",
-            estimate.high.max(0.0)
-        );
-        Self::NotIdentifiable { estimate, reason }
-    }
-
-    /// The identified value.
-    pub fn estimate(&self) -> Option<&Estimate> {
-        match self {
-            Self::Identified(estimate) => Some(estimate),
-            Self::NotIdentifiable { .. } => None,
-        }
-    }
-
-    /// The interval, identified or not.
-    pub fn interval(&self) -> &Estimate {
-        match self {
-            Self::Identified(estimate) | Self::NotIdentifiable { estimate, .. } => estimate,
-        }
-    }
-}
+/// A pendulum that swings more slowly is more than 100 m long.
+const SLOWEST_SWING_HZ: f64 = 0.05;
+/// A pendulum that swings faster is less than 1 mm long.
+const FASTEST_SWING_HZ: f64 = 15.8;
 
 /// One link's part in a mode.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
@@ -70,11 +34,17 @@ pub struct LinkMotion {
 /// One mode.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Mode {
+    /// 1 for the strongest.
+    pub number: usize,
+    /// Root of the mean square over the record, all links together.
+    pub rms_rad: f64,
     /// Undamped natural frequency to take.
     pub frequency_hz: Estimate,
     /// ξ to take.
     pub damping: Damping,
-    /// Where the two come from.
+    /// How ξ goes with amplitude, where it is no constant.
+    pub damping_trend: Option<Trend>,
+    /// Where frequency and ξ come from.
     pub basis: String,
     /// Top to bottom.
     pub shape: Vec<LinkMotion>,
@@ -96,27 +66,50 @@ pub struct Mode {
 
 impl Mode {
     pub(super) fn of(whole: &Whole, mode: usize, chain: Option<&Chain>, gravity_m_s2: f64) -> Self {
-        let envelope = whole.windows.as_ref().map_err(Clone::clone).and_then(|w| Envelope::of(w, mode));
+        let envelope = envelope_of(whole, mode);
         let estimators = Estimators::of(whole, mode, &envelope);
         let envelope = envelope.ok();
         let shape = shape(whole, mode);
         let amplitudes_rad: Vec<f64> = (0..whole.fit.poles.len()).map(|m| whole.fit.amplitude_rad(m)).collect();
         let choice = estimators.choose(envelope.as_ref(), &amplitudes_rad, mode).beside_harmonic(whole.fit, mode);
-        let mut this = Self {
+        let duration_s = whole.signal.duration_s();
+        let raw = estimators.raw;
+        let changes =
+            |e: &&Envelope| e.decay.is_some_and(|d| d.p_viscous < 0.01) || e.damping.is_some_and(|d| d.p_value < 0.01);
+        Self {
+            number: mode + 1,
+            rms_rad: whole.fit.strength(mode, duration_s).sqrt(),
+            damping_trend: envelope.as_ref().filter(changes).map(Trend::of),
             expected_kappa_per_rad2: expected_kappa(&shape, whole.fit.poles[mode].frequency_hz(), chain, gravity_m_s2),
             frequency_hz: choice.frequency_hz,
-            damping: Damping::of(choice.damping_ratio, whole.signal.duration_s()),
+            damping: Damping::of(choice.damping_ratio, &raw[1], duration_s),
             basis: choice.basis,
             shape,
             residual_excess: estimators.residual_excess,
-            frequency_consistency: estimators.compare(estimators.raw[0], |e| e.frequency_hz),
-            damping_consistency: estimators.compare(estimators.raw[1], |e| e.damping_ratio),
+            frequency_consistency: estimators.compare(raw[0], |e| e.frequency_hz),
+            damping_consistency: estimators.compare(raw[1], |e| e.damping_ratio),
             estimators: estimators.each,
             envelope,
             notes: Vec::new(),
-        };
-        this.notes = this.findings(mode);
-        this
+        }
+    }
+
+    /// With its place among the modes, the strongest first, and what the reader should know of it.
+    pub(super) fn numbered(mut self, number: usize) -> Self {
+        self.number = number;
+        self.notes = self.findings(number);
+        self
+    }
+
+    /// Whether its frequency is known to less than half of itself.
+    pub(super) fn is_resolved(&self) -> bool {
+        self.frequency_hz.within(0.5 * self.frequency_hz.value, 1.5 * self.frequency_hz.value)
+    }
+
+    /// Whether all links move to the same side at the same time, as in the slowest mode of a hanging chain and in no other: its flexibility matrix
+    /// has no negative element (Perron and Frobenius).
+    pub fn moves_together(&self) -> bool {
+        self.shape.iter().all(|l| l.phase_to_first_rad.value.cos() > 0.0)
     }
 
     /// The frequency at small amplitude; where the data do not tell how it depends on amplitude, with this κ.
@@ -124,7 +117,7 @@ impl Mode {
         match self.envelope.as_ref().and_then(|e| e.frequency) {
             Some(law) => law.f0_hz,
             None => {
-                let amplitude_rad = self.shape.iter().map(|l| l.amplitude_rad).fold(0.0, f64::max);
+                let amplitude_rad = self.amplitude_rad();
                 let highest = self.frequency_hz.high / (1.0 - kappa_per_rad2 * amplitude_rad * amplitude_rad).max(0.5);
                 self.frequency_hz.covering(self.frequency_hz.low, highest)
             }
@@ -132,9 +125,9 @@ impl Mode {
     }
 
     /// What disagreement and dependence on amplitude mean, in words.
-    fn findings(&self, mode: usize) -> Vec<String> {
-        let all = [self.against_theory(), self.of_frequency(), self.of_damping()];
-        all.into_iter().flatten().map(|finding| format!("mode {}: {finding}", mode + 1)).collect()
+    fn findings(&self, number: usize) -> Vec<String> {
+        let all = [self.doubt(), self.against_theory(), self.of_frequency(), self.of_damping()];
+        all.into_iter().flatten().map(|finding| format!("mode {number}: {finding}")).collect()
     }
 
     fn frequency_law(&self) -> Option<FrequencyLaw> {
@@ -145,14 +138,11 @@ impl Mode {
     fn against_theory(&self) -> Option<String> {
         let (law, expected) = (self.frequency_law()?, self.expected_kappa_per_rad2?);
         let k = law.kappa_per_rad2;
-        let measured = format!("κ = {:.4} ± {:.4} /rad²", k.value, 0.5 * (k.high - k.low));
-        let amplitude_rad = self.shape.iter().map(|l| l.amplitude_rad).fold(0.0, f64::max);
+        let measured = format!("κ = {:.4} ± {:.4} /rad²", k.value, k.half());
         let tolerance = THEORY_TOLERANCE * expected.abs();
         let agrees = k.low - tolerance <= expected && expected <= k.high + tolerance;
-        if amplitude_rad > 0.8 && expected > 0.03 && k.high < 0.3 * expected {
-            Some(format!(
-                "the frequency does not fall with amplitude ({measured}, a pendulum has {expected:.4}) although θ reaches {amplitude_rad:.1} rad: are the angles in degrees?"
-            ))
+        if self.constant_though_wide() {
+            None
         } else if !agrees {
             Some(format!(
                 "f = f₀(1 − κA²) has {measured}, gravity alone makes {expected:.4}: a nonlinear stiffness is at work, or the true angles are {:.2} × the stated ones",
@@ -163,6 +153,47 @@ impl Mode {
         } else {
             None
         }
+    }
+
+    /// Largest amplitude of any link at the start.
+    pub fn amplitude_rad(&self) -> f64 {
+        self.shape.iter().map(|l| l.amplitude_rad).fold(0.0, f64::max)
+    }
+
+    /// Whether the frequency stays the same although the swing is so wide that gravity makes it fall.
+    fn constant_though_wide(&self) -> bool {
+        let Some((law, expected)) = self.frequency_law().zip(self.expected_kappa_per_rad2) else { return false };
+        self.amplitude_rad() > 0.8 && expected > 0.03 && law.kappa_per_rad2.high < 0.3 * expected
+    }
+
+    /// A doubt of what the table's columns hold, where the motion would be strange for a hung body.
+    pub fn doubt(&self) -> Option<String> {
+        let f_hz = self.frequency_hz.value;
+        let pendulum_m = 9.8 / (std::f64::consts::TAU * f_hz).powi(2);
+        let amplitude_rad = self.amplitude_rad();
+        if f_hz < SLOWEST_SWING_HZ {
+            return Some(format!(
+                "a pendulum of {f_hz:.2e} Hz would be {pendulum_m:.0} m long: is t_s in milliseconds, or a frame number?"
+            ));
+        }
+        if f_hz > FASTEST_SWING_HZ && amplitude_rad > 0.1 {
+            return Some(format!(
+                "a pendulum of {f_hz:.0} Hz would be {:.2} mm long: is t_s in minutes?",
+                1e3 * pendulum_m
+            ));
+        }
+        if self.constant_though_wide() {
+            return Some(format!(
+                "the frequency does not fall with amplitude, as a pendulum's does, although θ reaches {amplitude_rad:.1} rad: are the angles in degrees?"
+            ));
+        }
+        let lower = self.shape.get(1).filter(|_| self.moves_together())?;
+        (lower.ratio_to_first.high < 0.95).then(|| {
+            format!(
+                "where all links move together a hung one moves more than the one above it, but θ2 = {:.2} θ1: are the columns exchanged, or is θ2 measured from link 1?",
+                lower.ratio_to_first.value
+            )
+        })
     }
 
     fn of_frequency(&self) -> Option<String> {
@@ -185,12 +216,13 @@ impl Mode {
             return Some(format!("damping not identifiable: {reason}"));
         }
         let p_viscous = self.envelope.as_ref().and_then(|e| e.decay).map_or(1.0, |d| d.p_viscous);
+        let trend = self.damping_trend.map_or("not the same over the record", Trend::words);
         match self.damping_consistency.filter(|t| !t.agree) {
             Some(test) => {
                 let meaning = if p_viscous < 0.01 {
-                    "the damping depends on amplitude: friction or drag, not one ξ"
+                    format!("the damping depends on amplitude: friction or drag, not one ξ ({trend})")
                 } else {
-                    "the decay is no exponential; look at the envelope before using one ξ"
+                    "the decay is no exponential; look at the envelope before using one ξ".to_owned()
                 };
                 Some(format!(
                     "the damping ratios disagree (χ² = {:.0} of {}, {}): {meaning}",
@@ -200,12 +232,24 @@ impl Mode {
                 ))
             }
             None if p_viscous < 0.01 => Some(format!(
-                "the damping depends on amplitude ({}): friction or drag, not one ξ",
+                "the damping depends on amplitude ({}): friction or drag, not one ξ ({trend})",
                 probability(p_viscous)
             )),
             None => None,
         }
     }
+}
+
+/// The mode's history in the windows of all modes; where those cannot show it, in windows of its own cycles.
+fn envelope_of(whole: &Whole, mode: usize) -> Result<Envelope, String> {
+    let slowest = mode == 0;
+    let shared = whole.windows.as_ref().map_err(Clone::clone).and_then(|w| Envelope::of(w, mode, slowest));
+    if shared.is_ok() || whole.fit.poles.len() == 1 {
+        return shared;
+    }
+    let own = Windows::of_mode(whole.signal, whole.fit, mode)?;
+    let others = (0..whole.fit.poles.len()).filter(|m| *m != mode).map(|m| whole.fit.amplitude_rad(m));
+    Ok(Envelope::of(&own, 0, slowest)?.beside_unfollowed(others))
 }
 
 fn shape(whole: &Whole, mode: usize) -> Vec<LinkMotion> {

@@ -1,6 +1,7 @@
 //! The measured samples of each link, without the missing ones.
 
 use crate::series::AngleSeries;
+use crate::statistics::median_step_s;
 
 /// Longest distance between neighbours, in median steps, that is interpolated across.
 pub const BRIDGE_STEPS: f64 = 3.05;
@@ -18,6 +19,18 @@ impl LinkSamples {
     /// Mean angle.
     pub fn mean_rad(&self) -> f64 {
         self.theta_rad.iter().sum::<f64>() / self.theta_rad.len().max(1) as f64
+    }
+
+    /// From the lowest to the highest angle.
+    pub fn range_rad(&self) -> f64 {
+        let ends = self.theta_rad.iter().fold([f64::INFINITY, f64::NEG_INFINITY], |[l, h], a| [l.min(*a), h.max(*a)]);
+        (ends[1] - ends[0]).max(0.0)
+    }
+
+    /// Whether the angles were wrapped: they stay within one turn, and jump across three quarters of it from one sample to the next.
+    fn is_wrapped(&self) -> bool {
+        let jump = |pair: &[f64]| (pair[1] - pair[0]).abs() > 0.75 * std::f64::consts::TAU;
+        self.range_rad() <= 1.001 * std::f64::consts::TAU && self.theta_rad.windows(2).any(jump)
     }
 
     /// The time each sample stands for, half of that to its neighbours, in median steps: the weights that make a sum an integral. At the
@@ -85,7 +98,7 @@ pub struct Signal {
     pub links: Vec<LinkSamples>,
     /// First and last time stamp.
     pub span_s: [f64; 2],
-    /// Median step between time stamps.
+    /// Median step between the values of the link that has them farthest apart.
     pub step_s: f64,
 }
 
@@ -97,7 +110,27 @@ impl Signal {
             LinkSamples { t_s, theta_rad }
         };
         let ends = [series.t_s.first(), series.t_s.last()].map(|t| t.copied().unwrap_or(0.0));
-        Self { links: series.theta_rad.iter().map(link).collect(), span_s: ends, step_s: series.step_s() }
+        let links: Vec<LinkSamples> = series.theta_rad.iter().map(link).collect();
+        // rows without a value resolve nothing
+        let steps = links.iter().filter_map(|l| median_step_s(&l.t_s));
+        Self { step_s: steps.fold(series.step_s(), f64::max), links, span_s: ends }
+    }
+
+    /// With the jumps of angles that were wrapped to one turn taken out; which links had any.
+    #[must_use]
+    pub fn unwrapped(mut self) -> (Self, Vec<usize>) {
+        let wrapped: Vec<usize> = (0..self.links.len()).filter(|link| self.links[*link].is_wrapped()).collect();
+        for link in &wrapped {
+            let mut turns = 0.0;
+            let theta = &mut self.links[*link].theta_rad;
+            for k in 1..theta.len() {
+                // the one before is unwrapped already
+                let step = theta[k] + turns - theta[k - 1];
+                turns -= (step / std::f64::consts::TAU).round() * std::f64::consts::TAU;
+                theta[k] += turns;
+            }
+        }
+        (self, wrapped)
     }
 
     /// From the first time stamp to the last.
@@ -121,11 +154,42 @@ impl Signal {
         Self { links: self.links.iter().map(part).collect(), span_s: [from_s, until_s], step_s: self.step_s }
     }
 
+    /// The stretch from the first sample at or after a time to the end.
+    #[must_use]
+    pub fn from(&self, from_s: f64) -> Self {
+        let mut part = self.between(from_s, f64::INFINITY);
+        let first_s = part.links.iter().filter_map(|l| l.t_s.first().copied()).fold(f64::INFINITY, f64::min);
+        part.span_s = [if first_s.is_finite() { first_s } else { from_s }, self.span_s[1]];
+        part
+    }
+
     /// With gaps of a missing frame or two filled by interpolation: for sums over the samples, never for least squares.
     #[must_use]
     pub fn bridged(&self) -> Self {
         let links = self.links.iter().map(|l| l.bridged(self.step_s)).collect();
         Self { links, span_s: self.span_s, step_s: self.step_s }
+    }
+
+    /// With each link's straight line taken away, weighted by the Hann window, so that an oscillation of a few cycles does not tilt it.
+    #[must_use]
+    pub fn levelled(&self) -> Self {
+        let duration_s = self.duration_s().max(f64::MIN_POSITIVE);
+        let level = |link: &LinkSamples| {
+            let at = |t: &f64| (t - self.span_s[0]) / duration_s;
+            let mut moments = [0.0; 5];
+            for (t, a) in link.t_s.iter().zip(&link.theta_rad) {
+                let x = at(t);
+                let w = 0.5 - 0.5 * (std::f64::consts::TAU * x).cos();
+                for (sum, term) in moments.iter_mut().zip([1.0, x, x * x, *a, x * a]) {
+                    *sum += w * term;
+                }
+            }
+            let [w, x, xx, a, xa] = moments;
+            let slope = (w * xa - x * a) / (w * xx - x * x).max(f64::MIN_POSITIVE);
+            let offset = (a - slope * x) / w.max(f64::MIN_POSITIVE);
+            link.t_s.iter().zip(&link.theta_rad).map(|(t, a)| a - offset - slope * at(t)).collect()
+        };
+        self.with_values(self.links.iter().map(level).collect())
     }
 
     /// The same time stamps with other values, for example residuals.

@@ -1,21 +1,30 @@
 //! Damped sinusoids by nonlinear least squares on the true time stamps.
 //!
 //! ```text
-//! θᵢ(t) = oᵢ + Σₘ e^{−σₘτ} (aᵢₘ cos ωₘτ + bᵢₘ sin ωₘτ),   τ = t − t₀
+//! θᵢ(t) = oᵢ + Σₖ dᵢₖ cos(πkτ/T) + Σₘ e^{−σₘτ} (aᵢₘ cos ωₘτ + bᵢₘ sin ωₘτ),   τ = t − t₀
 //! f = √(ω² + σ²) / 2π,   ξ = σ / √(ω² + σ²)
 //! ```
 //!
-//! The poles (ωₘ, σₘ) are common to all links, offsets and amplitudes belong to each. The latter enter linearly and are eliminated: variable
+//! The poles (ωₘ, σₘ) are common to all links; offsets, drifts dᵢₖ and amplitudes belong to each. The latter enter linearly and are eliminated: variable
 //! projection with Kaufman's Jacobian (Golub and Pereyra, Inverse Problems 19 (2003) R1, Eq. 11), minimised by Levenberg–Marquardt.
 //! Missing samples are simply absent. Each link is weighted by the noise found in its own residual.
+//!
+//! The search may end anywhere: on a drift (ω → 0, ξ → 1), on two columns that cancel each other, on a pole that the record does not resolve. Its end
+//! is a damped oscillation only if [`Pole::is_seen_to_swing`], if no amplitude exceeds what was recorded, and if the linearisation behind the
+//! intervals reaches as far as they do; otherwise there is no result.
 
-use levenberg_marquardt::{LeastSquaresProblem, LevenbergMarquardt};
-use nalgebra::storage::Owned;
-use nalgebra::{Complex, DMatrix, DVector, Dyn};
+use levenberg_marquardt::LevenbergMarquardt;
+use nalgebra::{Complex, DMatrix};
 use serde::Serialize;
 
 use super::estimate::Estimate;
+use super::projection::{Projection, drift_phase};
 use super::signal::{LinkSamples, Signal};
+
+/// Fewest cycles by which an oscillation is told from a drift: within two, offset, trend and two half swings fit each other's data.
+pub const FEWEST_CYCLES: f64 = 2.0;
+/// A mode's amplitude at the start over the range of what was recorded, at most: an oscillation that starts at its zero reaches less than its amplitude.
+const LARGEST_AMPLITUDE: f64 = 2.0;
 
 /// One damped oscillation: its pole −σ ± iω.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
@@ -45,6 +54,23 @@ impl Pole {
     pub fn damping_ratio(&self) -> f64 {
         self.decay_per_s / self.omega_rad_s.hypot(self.decay_per_s)
     }
+
+    /// Cycles within a record, or before the amplitude has changed twentyfold, whichever is less.
+    pub fn cycles_seen(&self, duration_s: f64) -> f64 {
+        let lasting_s = 20f64.ln() / self.decay_per_s.abs().max(f64::MIN_POSITIVE);
+        self.omega_rad_s / std::f64::consts::TAU * duration_s.min(lasting_s)
+    }
+
+    /// Whether a record shows it to and fro often enough that it is no drift.
+    pub fn is_seen_to_swing(&self, duration_s: f64) -> bool {
+        self.cycles_seen(duration_s) >= FEWEST_CYCLES
+    }
+
+    /// Mean over a record of the square of an oscillation of unit amplitude at its start.
+    pub fn mean_square(&self, duration_s: f64) -> f64 {
+        let x = 2.0 * self.decay_per_s * duration_s;
+        0.5 * if x.abs() < 1e-6 { 1.0 } else { -(-x).exp_m1() / x }
+    }
 }
 
 /// What the fit says about one link.
@@ -52,6 +78,8 @@ impl Pole {
 pub struct LinkFit {
     /// oᵢ.
     pub offset_rad: f64,
+    /// dᵢ₁, dᵢ₂, …
+    pub drift_rad: Vec<f64>,
     /// a − ib of each mode at the origin: θ = Re(c e^{(−σ+iω)τ}).
     pub amplitudes_rad: Vec<Complex<f64>>,
     /// Standard deviation of the real and of the imaginary part of each, for given poles.
@@ -80,27 +108,49 @@ pub struct SinusoidFit {
 }
 
 impl SinusoidFit {
-    /// Fits from these poles; `None` when there are too few values, or the search ends where no oscillation is (ω ≤ 0, beyond
-    /// the Nyquist frequency, or not finite).
+    /// Fits from these poles, without drift; `None` when there are too few values, or the search ends where no oscillation is.
     pub fn from_start(signal: &Signal, origin_s: f64, start: &[Pole]) -> Option<Self> {
-        let linear = 1 + 2 * start.len();
+        Self::with_drift(signal, origin_s, start, 0)
+    }
+
+    /// Fits from these poles with so many terms of drift a link.
+    pub fn with_drift(signal: &Signal, origin_s: f64, start: &[Pole], drift_terms: usize) -> Option<Self> {
+        let linear = 1 + drift_terms + 2 * start.len();
         if start.is_empty() || signal.links.iter().any(|l| l.t_s.len() < linear + 2 * start.len()) {
             return None;
         }
-        let mut problem = Projection::new(signal, origin_s, start);
+        let mut problem = Projection::new(signal, origin_s, start, drift_terms);
+        let mut converged = false;
         for _ in 0..2 {
             let solver = LevenbergMarquardt::new().with_tol(1e-12).with_patience(40);
-            let (solved, _) = solver.minimize(problem);
+            let (solved, report) = solver.minimize(problem);
+            converged = report.termination.was_successful();
             problem = solved;
             problem.weigh()?;
         }
+        if !converged {
+            return None;
+        }
         let nyquist_rad_s = std::f64::consts::PI / signal.step_s;
         let poles = problem.poles();
-        let sane = |p: &Pole| p.omega_rad_s > 0.0 && p.omega_rad_s < 1.05 * nyquist_rad_s && p.decay_per_s.is_finite();
+        let sane = |p: &Pole| p.omega_rad_s < 1.05 * nyquist_rad_s && p.is_seen_to_swing(signal.duration_s());
         if !poles.iter().all(sane) {
             return None;
         }
-        problem.finish(origin_s, poles)
+        problem.finish(origin_s, poles).filter(|fit| fit.stays_within(signal) && fit.is_resolved())
+    }
+
+    /// Whether no amplitude is larger than the recording allows.
+    fn stays_within(&self, signal: &Signal) -> bool {
+        self.links
+            .iter()
+            .zip(&signal.links)
+            .all(|(fit, link)| fit.amplitudes_rad.iter().all(|a| a.norm() <= LARGEST_AMPLITUDE * link.range_rad()))
+    }
+
+    /// Whether every frequency is known well enough for the linearisation that gives its interval: to less than half of itself.
+    fn is_resolved(&self) -> bool {
+        (0..self.poles.len()).all(|m| self.frequency_hz(m).low > 0.5 * self.poles[m].frequency_hz())
     }
 
     /// Natural frequency of a mode.
@@ -144,6 +194,89 @@ impl SinusoidFit {
         signal.with_values(signal.links.iter().enumerate().map(each).collect())
     }
 
+    /// The fit of one mode of it, as if it were alone in the signal that [`SinusoidFit::isolate`] gives.
+    #[must_use]
+    pub fn only(&self, mode: usize) -> Self {
+        let link = |l: &LinkFit| LinkFit {
+            offset_rad: 0.0,
+            drift_rad: Vec::new(),
+            amplitudes_rad: vec![l.amplitudes_rad[mode]],
+            amplitude_sd_rad: vec![l.amplitude_sd_rad[mode]],
+            ..l.clone()
+        };
+        Self {
+            poles: vec![self.poles[mode]],
+            covariance: self.covariance.view((2 * mode, 2 * mode), (2, 2)).into_owned(),
+            links: self.links.iter().map(link).collect(),
+            ..self.clone()
+        }
+    }
+
+    /// A link's drift, its offset not included.
+    pub fn drift_at_rad(&self, signal: &Signal, link: usize, t_s: f64) -> f64 {
+        let turn = drift_phase(t_s - self.origin_s, signal.duration_s());
+        let terms = self.links[link].drift_rad.iter().enumerate();
+        terms.map(|(k, d)| d * (turn * (k + 1) as f64).cos()).sum()
+    }
+
+    /// How far each link's drift goes over the record.
+    pub fn drift_ranges_rad(&self, signal: &Signal) -> Vec<f64> {
+        let at = |link: usize, k: u32| {
+            self.drift_at_rad(signal, link, self.origin_s + f64::from(k) / 200.0 * signal.duration_s())
+        };
+        let range = |link: usize| {
+            let values = (0..=200).map(|k| at(link, k));
+            let [low, high] = values.fold([f64::INFINITY, f64::NEG_INFINITY], |[l, h], v| [l.min(v), h.max(v)]);
+            high - low
+        };
+        (0..self.links.len()).map(range).collect()
+    }
+
+    /// The signal with the drifts taken away.
+    pub fn without_drift(&self, signal: &Signal) -> Signal {
+        let each = |(link, samples): (usize, &LinkSamples)| {
+            let pairs = samples.t_s.iter().zip(&samples.theta_rad);
+            pairs.map(|(t, a)| a - self.drift_at_rad(signal, link, *t)).collect()
+        };
+        signal.with_values(signal.links.iter().enumerate().map(each).collect())
+    }
+
+    /// How many terms of drift, up to those fitted, the Bayesian information criterion wants at these poles: the columns of the drift stand last, so
+    /// that one orthogonalisation gives the residual of every number of them.
+    pub fn wanted_drift(&self, signal: &Signal) -> usize {
+        let most = self.links.first().map_or(0, |l| l.drift_rad.len());
+        let problem = Projection::new(signal, self.origin_s, &self.poles, most);
+        let values = signal.values() as f64;
+        let criterion = |terms: usize| {
+            let deviance = problem.links.iter().map(|link| {
+                let n = link.tau_s.len() as f64;
+                let projected = link.orthonormal.tr_mul(&link.measured);
+                let left_out = projected.len() - (most - terms);
+                let rss = link.residual.norm_squared() + projected.rows_range(left_out..).norm_squared();
+                n * (rss / n).max(f64::MIN_POSITIVE).ln()
+            });
+            deviance.sum::<f64>() + (terms * problem.links.len()) as f64 * values.ln()
+        };
+        (0..=most).min_by(|a, b| criterion(*a).total_cmp(&criterion(*b))).unwrap_or(0)
+    }
+
+    /// The deviance that offsets and drifts alone would have.
+    pub fn deviance_without_modes(&self, signal: &Signal) -> f64 {
+        let terms = self.links.first().map_or(0, |l| l.drift_rad.len());
+        let problem = Projection::new(signal, self.origin_s, &[], terms);
+        let deviance = problem.links.iter().map(|link| {
+            let n = link.tau_s.len() as f64;
+            n * (link.residual.norm_squared() / n).max(f64::MIN_POSITIVE).ln()
+        });
+        deviance.sum()
+    }
+
+    /// Mean square of a mode over the record, all links together: how strong it is.
+    pub fn strength(&self, mode: usize, duration_s: f64) -> f64 {
+        let squares: f64 = self.links.iter().map(|l| l.amplitudes_rad[mode].norm_sqr()).sum();
+        squares * self.poles[mode].mean_square(duration_s)
+    }
+
     /// The residuals as a signal.
     pub fn residuals(&self, signal: &Signal) -> Signal {
         signal.with_values(self.links.iter().map(|l| l.residual_rad.clone()).collect())
@@ -156,170 +289,7 @@ impl SinusoidFit {
 
     /// Number of parameters: poles, amplitudes, offsets.
     pub fn parameters(&self) -> usize {
-        2 * self.poles.len() + self.links.len() * (1 + 2 * self.poles.len())
-    }
-}
-
-/// The least-squares problem in the poles alone.
-struct Projection {
-    links: Vec<Projected>,
-    parameters: DVector<f64>,
-}
-
-/// One link's share of it, at the present poles.
-struct Projected {
-    tau_s: Vec<f64>,
-    measured: DVector<f64>,
-    weight: f64,
-    orthonormal: DMatrix<f64>,
-    triangle: DMatrix<f64>,
-    /// offset, a₁, b₁, a₂, b₂, …
-    coefficients: DVector<f64>,
-    residual: DVector<f64>,
-}
-
-impl Projected {
-    fn update(&mut self, parameters: &DVector<f64>) {
-        let columns = 1 + parameters.len();
-        let mut basis = DMatrix::from_element(self.tau_s.len(), columns, 1.0);
-        for (row, tau) in self.tau_s.iter().enumerate() {
-            for m in 0..parameters.len() / 2 {
-                let envelope = (-parameters[2 * m + 1] * tau).exp();
-                let (sin, cos) = (parameters[2 * m] * tau).sin_cos();
-                basis[(row, 1 + 2 * m)] = envelope * cos;
-                basis[(row, 2 + 2 * m)] = envelope * sin;
-            }
-        }
-        let qr = basis.qr();
-        self.orthonormal = qr.q();
-        self.triangle = qr.r();
-        let projected = self.orthonormal.tr_mul(&self.measured);
-        self.residual = &self.measured - &self.orthonormal * &projected;
-        self.coefficients = self
-            .triangle
-            .solve_upper_triangular(&projected)
-            .unwrap_or_else(|| DVector::from_element(columns, f64::NAN));
-    }
-
-    /// Kaufman's Jacobian of the residual: −P⊥ (∂Φ/∂α) c, unweighted.
-    fn jacobian(&self, parameters: &DVector<f64>) -> DMatrix<f64> {
-        let mut slope = DMatrix::zeros(self.tau_s.len(), parameters.len());
-        for (row, tau) in self.tau_s.iter().enumerate() {
-            for m in 0..parameters.len() / 2 {
-                let envelope = (-parameters[2 * m + 1] * tau).exp();
-                let (sin, cos) = (parameters[2 * m] * tau).sin_cos();
-                let (a, b) = (self.coefficients[1 + 2 * m], self.coefficients[2 + 2 * m]);
-                slope[(row, 2 * m)] = envelope * tau * (b * cos - a * sin);
-                slope[(row, 2 * m + 1)] = -envelope * tau * (a * cos + b * sin);
-            }
-        }
-        &self.orthonormal * self.orthonormal.tr_mul(&slope) - slope
-    }
-}
-
-impl Projection {
-    fn new(signal: &Signal, origin_s: f64, start: &[Pole]) -> Self {
-        let link = |l: &LinkSamples| Projected {
-            tau_s: l.t_s.iter().map(|t| t - origin_s).collect(),
-            measured: DVector::from_column_slice(&l.theta_rad),
-            weight: 1.0,
-            orthonormal: DMatrix::zeros(0, 0),
-            triangle: DMatrix::zeros(0, 0),
-            coefficients: DVector::zeros(0),
-            residual: DVector::zeros(0),
-        };
-        let parameters = start.iter().flat_map(|p| [p.omega_rad_s, p.decay_per_s]).collect::<Vec<_>>();
-        let mut problem =
-            Self { links: signal.links.iter().map(link).collect(), parameters: DVector::zeros(parameters.len()) };
-        problem.set_params(&DVector::from_vec(parameters));
-        problem
-    }
-
-    fn poles(&self) -> Vec<Pole> {
-        let pairs = self.parameters.as_slice().chunks_exact(2);
-        pairs.map(|p| Pole { omega_rad_s: p[0], decay_per_s: p[1] }).collect()
-    }
-
-    /// Sets each link's weight to the inverse of its noise.
-    fn weigh(&mut self) -> Option<()> {
-        let noises: Vec<f64> = self.links.iter().map(|l| l.residual.norm_squared() / l.tau_s.len() as f64).collect();
-        let largest = noises.iter().copied().fold(0.0, f64::max);
-        if !largest.is_finite() {
-            return None;
-        }
-        for (link, noise) in self.links.iter_mut().zip(&noises) {
-            // an exact fit of one link must not silence the other
-            link.weight = 1.0 / noise.max(1e-6 * largest).max(f64::MIN_POSITIVE).sqrt();
-        }
-        Some(())
-    }
-
-    fn finish(self, origin_s: f64, poles: Vec<Pole>) -> Option<SinusoidFit> {
-        let values: usize = self.links.iter().map(|l| l.tau_s.len()).sum();
-        let linear = 1 + 2 * poles.len();
-        let share = 2.0 * poles.len() as f64 / values as f64;
-        let degrees_of_freedom =
-            (values - self.links.len() * linear).checked_sub(2 * poles.len()).filter(|d| *d > 0)? as f64;
-        let jacobian = self.jacobian()?;
-        let chi2: f64 = self.residuals()?.norm_squared();
-        let covariance = jacobian.tr_mul(&jacobian).try_inverse()? * (chi2 / degrees_of_freedom);
-        let mut links = Vec::new();
-        let mut deviance = 0.0;
-        for link in self.links {
-            let n = link.tau_s.len() as f64;
-            let rss = link.residual.norm_squared();
-            deviance += n * (rss / n).max(f64::MIN_POSITIVE).ln();
-            let noise_rad = (rss / (n * (1.0 - share) - linear as f64).max(1.0)).sqrt();
-            let inverse = link.triangle.try_inverse()?;
-            let spread = |k: usize| inverse.row(k).norm();
-            let c = &link.coefficients;
-            let modes = 0..poles.len();
-            links.push(LinkFit {
-                offset_rad: c[0],
-                amplitudes_rad: modes.clone().map(|m| Complex::new(c[1 + 2 * m], -c[2 + 2 * m])).collect(),
-                amplitude_sd_rad: modes
-                    .map(|m| noise_rad * spread(1 + 2 * m).hypot(spread(2 + 2 * m)) * std::f64::consts::FRAC_1_SQRT_2)
-                    .collect(),
-                residual_rad: link.residual.as_slice().to_vec(),
-                noise_rad,
-            });
-        }
-        let finite = covariance.iter().all(|c| c.is_finite());
-        finite.then_some(SinusoidFit { origin_s, poles, covariance, links, degrees_of_freedom, deviance })
-    }
-}
-
-impl LeastSquaresProblem<f64, Dyn, Dyn> for Projection {
-    type ResidualStorage = Owned<f64, Dyn>;
-    type JacobianStorage = Owned<f64, Dyn, Dyn>;
-    type ParameterStorage = Owned<f64, Dyn>;
-
-    fn set_params(&mut self, parameters: &DVector<f64>) {
-        self.parameters.copy_from(parameters);
-        for link in &mut self.links {
-            link.update(parameters);
-        }
-    }
-
-    fn params(&self) -> DVector<f64> {
-        self.parameters.clone()
-    }
-
-    fn residuals(&self) -> Option<DVector<f64>> {
-        let values = self.links.iter().flat_map(|l| l.residual.iter().map(|r| r * l.weight));
-        let all = DVector::from_vec(values.collect());
-        all.iter().all(|r| r.is_finite()).then_some(all)
-    }
-
-    fn jacobian(&self) -> Option<DMatrix<f64>> {
-        let rows = self.links.iter().map(|l| l.tau_s.len()).sum();
-        let mut all = DMatrix::zeros(rows, self.parameters.len());
-        let mut row = 0;
-        for link in &self.links {
-            let part = link.jacobian(&self.parameters) * link.weight;
-            all.rows_mut(row, part.nrows()).copy_from(&part);
-            row += part.nrows();
-        }
-        all.iter().all(|v| v.is_finite()).then_some(all)
+        let drift = self.links.first().map_or(0, |l| l.drift_rad.len());
+        2 * self.poles.len() + self.links.len() * (1 + drift + 2 * self.poles.len())
     }
 }

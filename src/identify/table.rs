@@ -2,19 +2,25 @@
 
 use std::fmt::{self, Display, Formatter};
 
+use super::damping::Damping;
 use super::estimate::{Estimate, probability};
 use super::estimators::Method;
-use super::mode::{Damping, Mode};
+use super::mode::Mode;
 use super::{Identification, Record};
 
 impl Display for Identification {
     fn fmt(&self, f: &mut Formatter<'_>) -> fmt::Result {
+        writeln!(f, "{}", self.summary)?;
         self.record.fmt(f)?;
+        if self.drift_rad.iter().any(|d| *d > 0.0) {
+            let each: Vec<String> = self.drift_rad.iter().map(|d| format!("{:.3}°", d.to_degrees())).collect();
+            writeln!(f, "  drift over the record {}, no part of any mode", each.join(", "))?;
+        }
         if let Some(count) = &self.mode_count {
             writeln!(f, "  {}", count.statement)?;
         }
-        for (index, mode) in self.modes.iter().enumerate() {
-            writeln!(f, "\nMode {}", index + 1)?;
+        for mode in &self.modes {
+            writeln!(f, "\nMode {}", mode.number)?;
             mode.fmt(f)?;
         }
         if let Some(floor) = &self.floor {
@@ -23,8 +29,10 @@ impl Display for Identification {
         if let Some(e) = &self.equivalents {
             writeln!(
                 f,
-                "\nEquivalent single oscillator (mode 1; M = {:.4e} kg, I about the hinge = {:.4e} kg·m²)",
-                e.mass_kg, e.inertia_kg_m2
+                "\nEquivalent single oscillator (mode {}; M = {:.4e} kg, I about the hinge = {:.4e} kg·m²)",
+                self.swing_mode.unwrap_or(1),
+                e.mass_kg,
+                e.inertia_kg_m2
             )?;
             writeln!(
                 f,
@@ -85,9 +93,9 @@ impl Display for Mode {
                     ", θ{}/θ1 = {:.4} ± {:.4} at {:.2}° ± {:.2}°",
                     link + 1,
                     ratio.value,
-                    half(ratio),
+                    ratio.half(),
                     phase.value,
-                    half(&phase)
+                    phase.half()
                 )?;
             }
             writeln!(f)?;
@@ -137,8 +145,8 @@ impl Mode {
                 "  {:8.2}{:12.3}{:>26}{:>28}",
                 step.t_s,
                 step.amplitude_rad.to_degrees(),
-                format!("{:.5} ± {:.5}", frequency.value, half(frequency)),
-                format!("{:.6} ± {:.6}", damping.value, half(damping))
+                format!("{:.5} ± {:.5}", frequency.value, frequency.half()),
+                format!("{:.6} ± {:.6}", damping.value, damping.half())
             )?;
         }
         if let Some(law) = envelope.frequency {
@@ -165,15 +173,11 @@ impl Mode {
     }
 }
 
-fn half(e: &Estimate) -> f64 {
-    0.5 * (e.high - e.low)
-}
-
 /// `value [low, high]`.
 fn interval(e: &Estimate, digits: usize) -> String {
     format!("{:.digits$} [{:.digits$}, {:.digits$}]", e.value, e.low, e.high)
 }
 
 fn scientific(e: &Estimate) -> String {
-    format!("{:.4e} ± {:.1e}", e.value, half(e))
+    format!("{:.4e} ± {:.1e}", e.value, e.half())
 }

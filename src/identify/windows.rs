@@ -1,6 +1,9 @@
 //! A recording cut into windows of a few cycles, with damped sinusoids fitted in each on its own.
 //!
 //! Amplitude and phase at a window's middle do not depend on the frequency and damping fitted within it, nor on the other windows.
+//!
+//! The windows are cut for all modes together, by the slowest one's cycles. Where that leaves fewer than three in which a faster mode is seen, or where the
+//! slowest has too few cycles, [`Windows::of_mode`] cuts them by the mode's own, the others taken away.
 
 use nalgebra::Complex;
 
@@ -105,6 +108,14 @@ impl Windows {
         }
         windows.fits = fits;
         Ok(windows)
+    }
+
+    /// One mode alone in windows of its own cycles, every other one taken away as the whole record's fit has it.
+    ///
+    /// # Errors
+    /// As [`Windows::of`].
+    pub fn of_mode(signal: &Signal, fit: &SinusoidFit, mode: usize) -> Result<Self, String> {
+        Self::of(&fit.isolate(signal, mode), &fit.only(mode))
     }
 
     /// The signal with the offset and every mode but one taken away as each window shows them; samples outside every window are left out.

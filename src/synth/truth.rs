@@ -4,6 +4,7 @@ use std::io::Write;
 use std::path::Path;
 
 use crate::error::{Error, Result};
+use crate::output::{Temporary, temporary_beside};
 
 /// The truth of one frame.
 #[derive(Debug, Clone, PartialEq)]
@@ -48,7 +49,7 @@ pub fn write_csv(rows: &[Truth], out: impl Write) -> csv::Result<()> {
 
 /// A truth table on its way to a file: written whole to a temporary beside it, then renamed by [`PendingTable::finish`].
 pub struct PendingTable {
-    file: tempfile::NamedTempFile,
+    file: Temporary,
 }
 
 impl PendingTable {
@@ -57,18 +58,10 @@ impl PendingTable {
     /// # Errors
     /// [`Error::Unwritable`].
     pub fn beside(target: &Path) -> Result<Self> {
-        let folder = target.parent().filter(|f| !f.as_os_str().is_empty()).unwrap_or(Path::new("."));
         if target.is_dir() {
             return Err(Error::unwritable(target, std::io::Error::other("it is a folder")));
         }
-        let mut builder = tempfile::Builder::new();
-        builder.prefix(".freeswing-").suffix(".csv");
-        #[cfg(unix)]
-        {
-            use std::os::unix::fs::PermissionsExt;
-            builder.permissions(std::fs::Permissions::from_mode(0o666));
-        }
-        Ok(Self { file: builder.tempfile_in(folder).map_err(|e| Error::unwritable(target, e))? })
+        Ok(Self { file: temporary_beside(target)? })
     }
 
     /// Writes the rows and gives the file its name.
@@ -78,7 +71,7 @@ impl PendingTable {
     pub fn finish(self, rows: &[Truth], target: &Path) -> Result<()> {
         let broken = |e: csv::Error| Error::unwritable(target, std::io::Error::other(e));
         write_csv(rows, self.file.as_file()).map_err(broken)?;
-        self.file.persist(target).map(drop).map_err(|e| Error::unwritable(target, e.error))
+        self.file.persist(target)
     }
 }
 

@@ -1,5 +1,6 @@
 //! The container: which stream, in which orientation, and its packets one after the other.
 
+use std::io::Read as _;
 use std::path::{Path, PathBuf};
 
 use ffmpeg_the_third as ffmpeg;
@@ -137,8 +138,26 @@ fn check_file(path: &Path) -> Result<()> {
         let detail = if kind.is_dir() { "it is a folder" } else { "it is a pipe or a device" }.to_owned();
         return Err(Error::NotAVideo { path: path.to_owned(), detail });
     }
-    std::fs::File::open(path).map_err(failed)?;
-    if kind.len() == 0 { Err(Error::EmptyFile { path: path.to_owned() }) } else { Ok(()) }
+    let mut file = std::fs::File::open(path).map_err(failed)?;
+    if kind.len() == 0 {
+        return Err(Error::EmptyFile { path: path.to_owned() });
+    }
+    let mut head = [0; 256];
+    let read = file.read(&mut head).map_err(failed)?;
+    if is_table(&head[..read]) {
+        let detail = "it is a table of text; `freeswing identify`, `fit` and `diagnose` read those".to_owned();
+        return Err(Error::NotAVideo { path: path.to_owned(), detail });
+    }
+    Ok(())
+}
+
+/// Whether a file begins with lines of names or numbers separated by commas, semicolons or tabs.
+fn is_table(head: &[u8]) -> bool {
+    let is_text = |b: &u8| b.is_ascii_graphic() || matches!(b, b' ' | b'\t' | b'\r' | b'\n') || !b.is_ascii();
+    let line = head.split(|b| *b == b'\n').next().unwrap_or_default();
+    let separators = line.iter().filter(|b| matches!(b, b',' | b';' | b'\t')).count();
+    // FFmpeg reads a list of files, which begins with a word and no separator, as a video
+    head.iter().all(is_text) && line.len() < head.len() && separators > 0
 }
 
 fn not_a_video(path: &Path, error: &ffmpeg::Error) -> Error {

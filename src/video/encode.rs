@@ -1,6 +1,5 @@
 //! Pictures → a video file, written whole or not at all.
 
-use std::ffi::OsString;
 use std::io;
 use std::path::{Path, PathBuf};
 
@@ -14,6 +13,7 @@ use tempfile::TempPath;
 use super::picture::{Layout, Matrix, OwnedPicture};
 use crate::error::{Error, Result};
 use crate::experiment::{Codec, CodecName, PixelFormat};
+use crate::output;
 
 /// The stamps' unit in MP4, MOV and MKV: an exact number of ticks a frame at 24, 25, 30, 50, 60 and 30/1.001 a second, and within
 /// MPEG-4's limit of 65535. (MKV rounds to a millisecond.)
@@ -185,22 +185,10 @@ fn container(target: &Path) -> std::result::Result<Container, String> {
 
 /// A file of the same extension in the same folder, so that the muxer is right and the rename is atomic.
 fn temporary_beside(target: &Path) -> Result<TempPath> {
-    let folder = target.parent().filter(|f| !f.as_os_str().is_empty()).unwrap_or(Path::new("."));
     if target.is_dir() {
         return Err(Error::unwritable(target, io::Error::other("it is a folder")));
     }
-    let mut suffix = OsString::from(".");
-    suffix.push(target.extension().unwrap_or_default());
-    let mut builder = tempfile::Builder::new();
-    builder.prefix(".freeswing-").suffix(&suffix);
-    #[cfg(unix)]
-    {
-        use std::os::unix::fs::PermissionsExt;
-        // As any new file: the umask takes away what it must.
-        builder.permissions(std::fs::Permissions::from_mode(0o666));
-    }
-    let file = builder.tempfile_in(folder).map_err(|e| Error::unwritable(target, e))?;
-    Ok(file.into_temp_path())
+    Ok(output::temporary_beside(target)?.into_path())
 }
 
 /// 1/fps as a fraction, exact for whole rates and for n·1000/1001.

@@ -5,7 +5,7 @@ mod file;
 mod page;
 mod words;
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use serde_json::json;
 
@@ -79,6 +79,7 @@ impl DiagnoseArgs {
     /// # Errors
     /// One line: what, where, what to do.
     pub fn run(&self) -> Result<()> {
+        self.figure.as_deref().map(check_figure).transpose()?;
         let experiment = Experiment::read(&self.config)?;
         if self.detectable {
             return self.plan(&experiment);
@@ -129,6 +130,23 @@ impl DiagnoseArgs {
         let text = if self.quiet { String::new() } else { heading + &page::limits_table(&limits) };
         super::deliver(&text, &json!({"schema": "freeswing.diagnosis/1", "detectable": file::limits(&limits)}), json)
     }
+}
+
+/// A figure is SVG, which its name must say.
+fn check_figure(path: &Path) -> Result<()> {
+    let is_svg = path.extension().is_some_and(|e| e.eq_ignore_ascii_case("svg"));
+    // standard output and devices have no extension
+    if is_svg || path.as_os_str() == "-" || (path.exists() && !path.is_file()) {
+        return Ok(());
+    }
+    let svg = path.with_extension("svg");
+    let message = format!(
+        "{}: figures are SVG; name it {}, which browsers and office programs open (`rsvg-convert {} -o x.png` makes a PNG of it)",
+        path.display(),
+        svg.display(),
+        svg.display()
+    );
+    Err(Error::Option { option: "--figure".to_owned(), message })
 }
 
 fn rmse_rad(fit: &Refit<'_>) -> Vec<f64> {

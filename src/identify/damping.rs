@@ -1,0 +1,113 @@
+//! A mode's damping ratio, and how it goes with the amplitude.
+
+use serde::Serialize;
+
+use super::envelope::{Envelope, Step};
+use super::estimate::Estimate;
+
+/// ξ, or why the data do not tell it.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Damping {
+    /// Its interval stays clear of zero.
+    Identified(Estimate),
+    /// Its interval reaches zero, or holds all that ξ can be.
+    NotIdentifiable {
+        /// 95 % interval, where it excludes anything.
+        estimate: Option<Estimate>,
+        /// With the number that makes it so.
+        reason: String,
+    },
+}
+
+impl Damping {
+    /// The whole record's ξ, without regard to amplitude, tells a decay whose ξ at small amplitude is open from none at all.
+    pub(super) fn of(estimate: Estimate, whole: &Estimate, duration_s: f64) -> Self {
+        if estimate.within(0.0, 1.0) && estimate.low > 0.0 {
+            return Self::Identified(estimate);
+        }
+        let bounded = estimate.within(-1.0, 1.0);
+        let reason = if bounded && estimate.high <= 0.0 {
+            let percent = 100.0 * (-std::f64::consts::TAU * estimate.value).exp_m1();
+            format!("the amplitude grows, by {percent:.1} % a cycle: driven, fed by another mode, or two beating")
+        } else if whole.within(-1.0, 1.0) && whole.low > 0.0 {
+            format!(
+                "the swing decays, as with ξ = {:.4} over the record, but so much depends on amplitude that ξ at small amplitude is open; use --from for a later, smaller swing",
+                whole.value
+            )
+        } else if bounded {
+            format!(
+                "the decay over {duration_s:.3} s is within its uncertainty: ξ ≤ {:.2e} is all that can be said",
+                estimate.high
+            )
+        } else {
+            format!("{duration_s:.3} s of so uneven a motion leave every ξ from 0 to 1 possible")
+        };
+        Self::NotIdentifiable { estimate: Some(estimate).filter(|_| bounded), reason }
+    }
+
+    /// The identified value.
+    pub fn estimate(&self) -> Option<&Estimate> {
+        match self {
+            Self::Identified(estimate) => Some(estimate),
+            Self::NotIdentifiable { .. } => None,
+        }
+    }
+
+    /// The interval, identified or not, where it excludes anything.
+    pub fn interval(&self) -> Option<&Estimate> {
+        match self {
+            Self::Identified(estimate) => Some(estimate),
+            Self::NotIdentifiable { estimate, .. } => estimate.as_ref(),
+        }
+    }
+}
+
+/// How ξ goes with the amplitude.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Trend {
+    /// Drag.
+    GrowsWithAmplitude,
+    /// Dry friction.
+    FallsWithAmplitude,
+    /// Both.
+    LeastBetween,
+    /// No linear damper, and neither of the three.
+    Uneven,
+}
+
+impl Trend {
+    /// Of the steps from window to window: means over fifths of them by amplitude, three standard deviations apart.
+    pub(super) fn of(envelope: &Envelope) -> Self {
+        let mut steps: Vec<_> = envelope.steps.iter().collect();
+        steps.sort_by(|a, b| b.amplitude_rad.total_cmp(&a.amplitude_rad));
+        let fifth = steps.len().div_ceil(5).max(1);
+        let mean = |few: &[&Step]| {
+            let (weight, sum) = few.iter().map(|s| &s.damping_ratio).fold((0.0, 0.0), |(w, sum), xi| {
+                let certainty = xi.sd.powi(-2);
+                (w + certainty, sum + certainty * xi.value)
+            });
+            [sum / weight, f64::recip(weight).sqrt()]
+        };
+        let means: Vec<[f64; 2]> = steps.chunks(fifth).map(mean).collect();
+        let above = |a: &[f64; 2], b: &[f64; 2]| a[0] - b[0] > 3.0 * a[1].hypot(b[1]);
+        let [large, between @ .., small] = &means[..] else { return Self::Uneven };
+        match between.iter().min_by(|a, b| a[0].total_cmp(&b[0])) {
+            Some(least) if above(large, least) && above(small, least) => Self::LeastBetween,
+            _ if above(large, small) => Self::GrowsWithAmplitude,
+            _ if above(small, large) => Self::FallsWithAmplitude,
+            _ => Self::Uneven,
+        }
+    }
+
+    /// For a sentence about ξ.
+    pub fn words(self) -> &'static str {
+        match self {
+            Self::GrowsWithAmplitude => "grows with amplitude, as drag does",
+            Self::FallsWithAmplitude => "grows as the swing becomes small, as dry friction does",
+            Self::LeastBetween => "least at a middle amplitude: dry friction below it, drag above",
+            Self::Uneven => "not the same over the record",
+        }
+    }
+}

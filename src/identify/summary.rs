@@ -1,0 +1,78 @@
+//! The answer in one line.
+
+use super::Identification;
+use super::damping::Damping;
+use super::estimate::Estimate;
+use super::mode::Mode;
+
+/// How the note begins that says why there is no mode.
+pub(super) const NOTHING: &str = "no oscillation is identifiable: ";
+
+/// Each mode's frequency and ξ, the strongest first, or why there is none.
+pub(super) fn summary(found: &Identification) -> String {
+    if found.modes.is_empty() {
+        return match found.notes.iter().rev().find(|note| note.starts_with(NOTHING)) {
+            Some(reason) => {
+                format!("not identifiable: {}", reason.trim_start_matches(NOTHING))
+            }
+            None => "not identifiable".to_owned(),
+        };
+    }
+    let modes: Vec<String> = found.modes.iter().map(of_mode).collect();
+    let missing = found.spectrum.missing_share;
+    let gaps = (missing > 0.5).then(|| format!("{:.0} % of the record is missing", 100.0 * missing));
+    let doubt = gaps.or_else(|| found.record.doubt()).or_else(|| found.modes.iter().find_map(Mode::doubt));
+    let doubts = doubt.map(|doubt| format!(" — {doubt}"));
+    let floor = found.floor.iter().filter(|f| f.below).map(|f| format!(" — {}", f.statement));
+    let part = found.tumbling.iter().map(|t| format!(" — {}", t.statement));
+    modes.join("; ") + &part.chain(doubts).chain(floor).collect::<String>()
+}
+
+fn of_mode(mode: &Mode) -> String {
+    let index: String =
+        mode.number.to_string().chars().filter_map(|c| char::from_u32(0x2080 + c.to_digit(10)?)).collect();
+    let f = rounded(&mode.frequency_hz, 1.0);
+    let small = mode.basis.starts_with("windows");
+    let damping = match &mode.damping {
+        Damping::Identified(xi) => match mode.damping_trend {
+            Some(trend) => {
+                let [low, high] = [xi.low, xi.high].map(|end| significant(100.0 * end));
+                format!("ξ{index} = {low} to {high} % over the record, {}", trend.words())
+            }
+            None => {
+                let at = if small { " at small amplitude" } else { "" };
+                format!("ξ{index} = {} %{at}", rounded(xi, 100.0))
+            }
+        },
+        Damping::NotIdentifiable { reason, .. } => format!("ξ{index} not identifiable ({reason})"),
+    };
+    format!("f{index} = {f} Hz, {damping}")
+}
+
+/// `value ± half` with two digits of the half width.
+fn rounded(estimate: &Estimate, factor: f64) -> String {
+    let (value, half) = (factor * estimate.value, factor * estimate.half());
+    if value.abs() < 1e-4 {
+        return format!("{value:.2e} ± {half:.0e}");
+    }
+    let digits = if half > 0.0 { (1.0 - half.log10().floor()).clamp(0.0, 9.0) as usize } else { 6 };
+    format!("{value:.digits$} ± {half:.digits$}")
+}
+
+/// Two significant digits.
+fn significant(value: f64) -> String {
+    let digits = if value > 0.0 { (1.0 - value.log10().floor()).clamp(0.0, 9.0) as usize } else { 2 };
+    format!("{value:.digits$}")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_number_is_printed_to_two_digits_of_its_uncertainty() {
+        let e = Estimate { value: 1.360_04, sd: 0.0002, low: 1.359_64, high: 1.360_44 };
+        assert_eq!(rounded(&e, 1.0), "1.36004 ± 0.00040");
+        assert_eq!(rounded(&Estimate { value: 0.012, sd: 0.002, low: 0.008, high: 0.016 }, 100.0), "1.20 ± 0.40");
+    }
+}
