@@ -8,6 +8,11 @@ use predicates::prelude::*;
 use predicates::str::contains;
 
 const SWING: &str = "
+[specimen]
+mass_kg = 0.3606e-3
+length_m = 0.20
+width_m = 0.05
+link_lengths_m = [0.10, 0.10]
 [model]
 k_eq_n_m_per_rad = 2.0e-4
 c_eq_n_m_s_per_rad = 2.0e-6
@@ -164,7 +169,7 @@ fn bad_input_is_one_line_and_exit_code_2() {
 #[test]
 fn a_joint_parameter_of_one_link_is_refused() {
     let folder = Folder::new();
-    let one = "[specimen]\nlink_lengths_m = [0.2]\n[model]\nrelease_rad = [0.4]\n";
+    let one = "[specimen]\nmass_kg = 0.3606e-3\nlink_lengths_m = [0.2]\n[model]\nrelease_rad = [0.4]\n";
     let angles = folder.angles(one);
     let config = folder.path("simulated.toml");
     freeswing("fit")
@@ -181,6 +186,11 @@ fn a_joint_parameter_of_one_link_is_refused() {
 fn the_bending_stiffness_of_a_strip_is_fitted() {
     let folder = Folder::new();
     let strip = "
+[specimen]
+mass_kg = 0.3606e-3
+length_m = 0.20
+width_m = 0.05
+link_lengths_m = [0.10, 0.10]
 [model]
 c_eq_n_m_s_per_rad = 5.0e-7
 release_rad = [0.5, 0.62]

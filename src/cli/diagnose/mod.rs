@@ -79,7 +79,7 @@ impl DiagnoseArgs {
     /// # Errors
     /// One line: what, where, what to do.
     pub fn run(&self) -> Result<()> {
-        let experiment = Experiment::read(&self.config)?;
+        let experiment = super::read_experiment(&self.config)?;
         if self.detectable {
             return self.plan(&experiment);
         }

@@ -1,0 +1,156 @@
+//! Several beginnings, the best end.
+
+use super::descent::{Descent, Outcome};
+use super::{Problem, Record, Seen, begin, shooting, straight};
+use crate::error::{Error, Result};
+use crate::experiment::{Experiment, Hysteresis};
+use crate::model::Parameter;
+use crate::progress::Progress;
+
+/// χ² of one value that a descent may leave before another beginning is tried. What the noise is known to is a tenth.
+const LEFT: f64 = 1.5;
+/// A descent that leaves more than this, over the variance of the noise, is tried from the values as they are, too.
+const ASTRAY: f64 = 25.0;
+/// A spring that differs from the seen one by more than this factor is not where to begin.
+const FAR_OFF: f64 = 1.5;
+/// Beginnings of a hysteresis: its yield angle as part of the largest bend, its share of the spring; and the part of the recordings that chooses.
+const YIELDS: [f64; 3] = [0.05, 0.2, 0.6];
+const SPRINGS: [f64; 2] = [0.4, 0.9];
+const BEGINNING: f64 = 0.15;
+/// Beginnings, each of which is a stage.
+pub const STAGES: u64 = 3;
+
+/// What all beginnings share.
+struct Search<'a, 's> {
+    records: &'a [Record],
+    free: &'s [Parameter],
+    noise_rad: &'s [Vec<f64>],
+}
+
+/// Where a descent ended, and of what.
+type End<'a> = (Problem<'a>, Outcome);
+
+/// The best of the descents from the file's values, from those of the recordings' modes where these leave more than noise, and from those of a hysteresis. Where
+/// the file's spring is far from the seen one, the order is turned.
+pub fn best_end<'a>(
+    records: &'a [Record],
+    experiment: &Experiment,
+    free: &[Parameter],
+    noise_rad: &[Vec<f64>],
+    progress: &dyn Progress,
+) -> Result<End<'a>> {
+    let search = Search { records, free, noise_rad };
+    let begun = search.from_modes(experiment);
+    let mut order = vec![experiment];
+    order.extend(&begun);
+    let springs = order.iter().map(|begun| begin::spring_of(begun, free)).collect::<Option<Vec<_>>>();
+    if springs.is_some_and(|springs| (springs[springs.len() - 1] / springs[0].max(1e-300)).ln().abs() > FAR_OFF.ln()) {
+        order.reverse();
+    }
+    let mut best: Option<End<'a>> = None;
+    for begun in order {
+        if search.may_find_more(best.as_ref()) {
+            best = better(best, search.from(begun)?);
+        }
+        progress.advance(1);
+    }
+    progress.advance(u64::from(begun.is_none()));
+    if free.contains(&Parameter::HysteresisTorque) && search.may_find_more(best.as_ref()) {
+        let yielding = search.with_hysteresis(begun.as_ref().unwrap_or(experiment), best.as_ref())?;
+        best = better(best, yielding.map_or(Ok(None), |begun| search.from(&begun))?);
+    }
+    progress.advance(1);
+    best.ok_or_else(refused)
+}
+
+fn better<'a>(a: Option<End<'a>>, b: Option<End<'a>>) -> Option<End<'a>> {
+    a.into_iter().chain(b).min_by(|a, b| a.1.cost.total_cmp(&b.1.cost))
+}
+
+/// What to say where nothing can be descended from.
+pub fn refused() -> Error {
+    Error::Simulation {
+        detail: "no motion near the start values follows the recording; check [specimen] and [model]".into(),
+    }
+}
+
+/// Descends in the variables that suit the problem; the blocks at the end are those of its own.
+pub fn descend(problem: &Problem<'_>, descent: &Descent, x: Vec<f64>) -> Option<Outcome> {
+    let outcome = straight::descend(problem, descent, x)?;
+    let blocks = problem.blocks(&outcome.x)?;
+    Some(Outcome { blocks, ..outcome })
+}
+
+impl<'a> Search<'a, '_> {
+    fn from(&self, experiment: &Experiment) -> Result<Option<End<'a>>> {
+        let mut problem = Problem::new(self.records, experiment, self.free)?;
+        let shot = shooting::multiple_shooting(&mut problem)?.x;
+        for (noise, sd_rad) in problem.noise.iter_mut().zip(self.noise_rad) {
+            noise.sd_rad.clone_from(sd_rad);
+        }
+        problem.integrate_below_the_noise();
+        let within = problem.accuracy_of(problem.longest_s(), problem.accuracy.step_error_rad);
+        problem.accuracy = within;
+        let robust = Descent { huber: 4.0, most_steps: 30, enough: 0.03, ..Descent::default() };
+        // stretches that a model cannot follow may lead astray from values that were near
+        let stated = [problem.start_values()?, shot[self.free.len()..].to_vec()].concat();
+        let from_stretches = descend(&problem, &robust, shot);
+        let astray = from_stretches.as_ref().is_none_or(|end| end.cost > ASTRAY * end.residuals() as f64);
+        let from_stated = if astray && !self.free.is_empty() { descend(&problem, &robust, stated) } else { None };
+        let ends = [from_stretches, from_stated].into_iter().flatten();
+        Ok(ends.min_by(|a, b| a.cost.total_cmp(&b.cost)).map(|end| (problem, end)))
+    }
+
+    /// Whether another beginning may lead further: more is left than noise.
+    fn may_find_more(&self, end: Option<&End<'_>>) -> bool {
+        end.is_none_or(|(_, end)| end.cost > LEFT * end.residuals().max(1) as f64)
+    }
+
+    /// The experiment as the modes of the longest recording have it, where a spring or a damper is free.
+    fn from_modes(&self, experiment: &Experiment) -> Option<Experiment> {
+        let begun_with = |p: &Parameter| {
+            p.is_spring() || matches!(p, Parameter::JointDamping | Parameter::HingeViscous | Parameter::AirLinear)
+        };
+        self.free.iter().find(|p| begun_with(p))?;
+        let longest = self.records.iter().max_by_key(|record| record.len())?;
+        Some(begin::from_modes(experiment, self.free, &Seen::of(longest)?))
+    }
+
+    /// The experiment with a hysteresis in place of a part of its spring: of several the one that follows the beginning of the recordings best.
+    fn with_hysteresis(&self, experiment: &Experiment, best: Option<&End<'_>>) -> Result<Option<Experiment>> {
+        let Some((problem, end)) = best else { return Ok(None) };
+        let beginning: Vec<Record> =
+            self.records.iter().map(|record| record.until((BEGINNING * record.len() as f64) as usize)).collect();
+        if beginning.iter().any(|record| record.values(0..record.len()) < 4 * end.x.len()) {
+            return Ok(None);
+        }
+        let largest_rad = self.records.iter().map(largest_bend_rad).fold(0.0, f64::max);
+        let mut found: Option<(f64, Experiment)> = None;
+        for (share_of_bend, share_of_spring) in YIELDS.iter().flat_map(|y| SPRINGS.iter().map(move |s| (y, s))) {
+            let mut tried = experiment.clone();
+            let (model, yield_rad) = (&mut tried.model, share_of_bend * largest_rad);
+            let torque_n_m = share_of_spring * model.k_eq_n_m_per_rad * yield_rad;
+            model.effects.joint_hysteretic = Some(Hysteresis { torque_n_m, yield_rad });
+            model.k_eq_n_m_per_rad *= 1.0 - share_of_spring;
+            model.c_eq_n_m_s_per_rad *= 1.0 - share_of_spring;
+            let mut of_beginning = Problem::new(&beginning, &tried, self.free)?;
+            of_beginning.noise.clone_from(&problem.noise);
+            of_beginning.accuracy = of_beginning.accuracy_of(of_beginning.longest_s(), 1e-5);
+            let x = [of_beginning.start_values()?, end.x[self.free.len()..].to_vec()].concat();
+            let cost = of_beginning.cost(&x);
+            if found.as_ref().is_none_or(|(least, _)| cost < *least) {
+                found = Some((cost, tried));
+            }
+        }
+        Ok(found.map(|(_, begun)| begun))
+    }
+}
+
+/// Largest measured difference of two neighbouring angles.
+fn largest_bend_rad(record: &Record) -> f64 {
+    let of = |pair: &[Vec<Option<f64>>]| {
+        let bends = pair[0].iter().zip(&pair[1]).filter_map(|(upper, lower)| Some(((*lower)? - (*upper)?).abs()));
+        bends.fold(0.0, f64::max)
+    };
+    record.theta_rad.windows(2).map(of).fold(1e-6, f64::max)
+}
