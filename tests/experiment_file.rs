@@ -113,7 +113,7 @@ fn what_no_specimen_can_be_is_an_error_with_its_numbers() {
             strip(&[("length_m = 0.20", "length_m = 0.10")]),
             ["sum to 0.2 m and specimen.length_m = 0.1", "longer than the strip"],
         ),
-        (strip(&[("[0.10, 0.10]", "[100, 100]")]), ["link_lengths_m[0] = 100", "millimetres, write 0.1"]),
+        (strip(&[("[0.10, 0.10]", "[110, 90]")]), ["link_lengths_m[0] = 110", "millimetres, write 0.11"]),
         (strip(&[("length_m = 0.20", "length_m = 200.0")]), ["specimen.length_m = 200", "millimetres, write 0.2"]),
         (format!("{STRIP}gravity_m_s2 = 980.665\n"), ["gravity_m_s2 = 980.665", "cm/s²"]),
         (strip(&[("width_m", "lumps = [0.25, 0.5, 0.25]\nwidth_m")]), ["specimen.lumps", "write inertia = \"lumps\""]),

@@ -61,6 +61,12 @@ impl FitArgs {
         let marks = model.chain().groups().len();
         let records = super::recordings(&self.angles, marks, (self.from, self.until))?;
         let free = free_parameters(&experiment, marks, &self.free, &self.fix)?;
+        if experiment.model.effects.dropped_frames.is_some() {
+            let id = Parameter::DroppedFrames.id();
+            eprintln!(
+                "warning: model.effects.{id} is not fitted: where frames are missing only `freeswing diagnose` finds"
+            );
+        }
         let json = self.json.as_deref().map(OutputFile::create).transpose()?;
         let seen: Vec<Option<Seen>> = records.iter().map(Seen::of).collect();
         for (record, seen) in records.iter().zip(&seen) {
@@ -104,6 +110,10 @@ fn free_parameters(experiment: &Experiment, marks: usize, more: &[String], fix: 
     for id in more {
         free.push(parse(id)?);
     }
+    if free.contains(&Parameter::DroppedFrames) {
+        let message = "a fit does not know where frames are missing; `freeswing diagnose` finds them".to_owned();
+        return Err(Error::Option { option: Parameter::DroppedFrames.id().to_owned(), message });
+    }
     free.retain(|p| !fix.contains(p));
     let mut once = Vec::new();
     free.retain(|p| {
@@ -139,6 +149,12 @@ struct Report<'a> {
 impl Report<'_> {
     fn text(&self) -> String {
         let mut text = format!("{}\n\n", self.specimen);
+        for index in 0..self.records.len() {
+            if let Some(statement) = self.pace_statement(index) {
+                text.push_str(&paragraph("", &format!("{}: {statement}", self.records[index].path.display())));
+                text.push('\n');
+            }
+        }
         self.parameters(&mut text);
         for index in 0..self.records.len() {
             self.recording(index, &mut text);
@@ -221,9 +237,6 @@ impl Report<'_> {
         text.push_str(&table.text());
         for (name, side) in [("Fitted", &self.fitted), ("With the file's values", &self.given)] {
             text.push_str(&paragraph("  ", &format!("{name}: {}", side.verdicts[index].statement())));
-        }
-        if let Some(statement) = self.pace_statement(index) {
-            text.push_str(&paragraph("  ", &statement));
         }
         let outliers = self.fitted.fit.outliers[index].len();
         if outliers > 0 {

@@ -151,7 +151,7 @@ impl Finding {
 
 fn length(key: &str, length_m: f64) -> Option<Finding> {
     Finding::of(length_m, [0.0, LONG_M], [0.0, LONGEST_M], || {
-        let (unit, factor) = if length_m > 100.0 { ("millimetres", 1e-3) } else { ("centimetres", 1e-2) };
+        let (unit, factor) = if length_m >= LONGEST_M { ("millimetres", 1e-3) } else { ("centimetres", 1e-2) };
         format!(
             "{key} = {length_m}: {length_m} m is long for a specimen before a camera; if it is {unit}, write {}",
             length_m * factor

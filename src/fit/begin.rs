@@ -14,12 +14,24 @@ use crate::model::{ForwardModel, Parameter};
 const SOFTEST: f64 = 1e-5;
 const STIFFEST: f64 = 1e4;
 /// Halvings of the ratio of the two.
-const HALVINGS: usize = 40;
+const HALVINGS: usize = 16;
 /// A damper from which its damping ratio is read off, over √(stiffness × inertia).
 const LITTLE: f64 = 1e-3;
 
-/// The experiment with the free spring and linear dampers set to what the modes say; the same where they say nothing.
-pub fn from_modes(experiment: &Experiment, free: &[Parameter], seen: &Seen) -> Experiment {
+/// A frequency beyond this part of half the rate may be that of its mirror image on the other side of it.
+const MIRRORED: f64 = 0.6;
+
+/// The experiment with the free spring and linear dampers set to what the modes say, likeliest first; the same where they say nothing.
+pub fn from_modes(experiment: &Experiment, free: &[Parameter], seen: &Seen) -> Vec<Experiment> {
+    let mut begun = vec![with_modes(experiment, free, seen)];
+    if let Some(fast) = seen.fast.as_ref().filter(|fast| fast.frequency_hz > MIRRORED * seen.nyquist_hz) {
+        let mirrored = SeenMode { frequency_hz: 2.0 * seen.nyquist_hz - fast.frequency_hz, ..fast.clone() };
+        begun.push(with_modes(experiment, free, &Seen { fast: Some(mirrored), ..seen.clone() }));
+    }
+    begun
+}
+
+fn with_modes(experiment: &Experiment, free: &[Parameter], seen: &Seen) -> Experiment {
     let mut begun = experiment.clone();
     let spring = free.iter().copied().find(|parameter| parameter.is_spring());
     if let Some(spring) = spring

@@ -93,15 +93,12 @@ impl Pace {
             Some((_, unit)) => text += &format!(" (the lengths look like {unit})"),
             None => text += ", if the lengths are wrong or in another unit",
         }
-        text += &format!("; or the time base is: true time would be {} times the stamps", digits(1.0 / ratio));
-        let scale = 1.0 / ratio;
-        if let Some((_, unit)) =
-            TIME_UNITS.iter().find(|(factor, _)| near(1.0 / scale, 1.0 / factor) || near(scale, 1.0 / factor))
-        {
+        text += &format!("; or the time base is: true time would be {} times the stamps", digits(ratio));
+        if let Some((_, unit)) = TIME_UNITS.iter().find(|(factor, _)| near(ratio, 1.0 / factor)) {
             text += &format!(" (t_s looks like {unit})");
-        } else if let Some(frames) = SLOW_MOTIONS.iter().find(|frames| near(scale, 1.0 / **frames)) {
+        } else if let Some(frames) = SLOW_MOTIONS.iter().find(|frames| near(ratio, 1.0 / **frames)) {
             text += &format!(" (slow motion, played {frames} times slower?)");
-        } else if let Some(frames) = SLOW_MOTIONS.iter().find(|frames| near(scale, **frames)) {
+        } else if let Some(frames) = SLOW_MOTIONS.iter().find(|frames| near(ratio, **frames)) {
             text += &format!(" (every {frames}th frame kept, or a time lapse?)");
         }
         text +=

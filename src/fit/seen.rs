@@ -23,8 +23,10 @@ const PENDULUM: f64 = 1.0 / 16.0;
 pub struct SeenMode {
     /// Natural frequency at small amplitude.
     pub frequency_hz: f64,
-    /// Half its 95 % interval.
+    /// Half its 95 % interval, which what amplitude may do to it widens.
     pub frequency_half_hz: f64,
+    /// The same without that, as a share.
+    pub(super) vague: f64,
     /// Of the whole recording, whatever its amplitude.
     pub mean_frequency_hz: f64,
     /// ξ, where the decay is told from none.
@@ -42,6 +44,8 @@ pub struct Seen {
     pub slow: SeenMode,
     /// The next, where one is seen.
     pub fast: Option<SeenMode>,
+    /// Half the rate.
+    pub nyquist_hz: f64,
     /// Frequencies of all that stands out.
     pub peaks_hz: Vec<f64>,
 }
@@ -68,14 +72,14 @@ impl Seen {
             second(clear_modes(&identify(&early, None).ok()?))
         };
         let peaks_hz = found.spectrum.significant().map(|p| p.frequency_hz.value).collect();
-        Some(Self { fast: second(modes).or_else(early), slow, peaks_hz })
+        Some(Self { fast: second(modes).or_else(early), slow, nyquist_hz: series.nyquist_hz(), peaks_hz })
     }
 }
 
 /// The modes of a known frequency, slowest first.
 fn clear_modes(found: &Identification) -> Vec<SeenMode> {
     let mut modes: Vec<SeenMode> = found.modes.iter().map(SeenMode::of).collect();
-    modes.retain(|mode| mode.frequency_hz > 0.0 && mode.frequency_half_hz < VAGUE * mode.frequency_hz);
+    modes.retain(|mode| mode.frequency_hz > 0.0 && mode.vague < VAGUE);
     modes.sort_by(|a, b| a.frequency_hz.total_cmp(&b.frequency_hz));
     modes
 }
@@ -90,6 +94,7 @@ impl SeenMode {
         Self {
             frequency_hz: small.value,
             frequency_half_hz: 0.5 * (small.high - small.low),
+            vague: 0.5 * (mode.frequency_hz.high - mode.frequency_hz.low) / mode.frequency_hz.value.abs().max(1e-12),
             mean_frequency_hz: whole.map_or(small.value, |w| w.value),
             damping_ratio: mode.damping.estimate().map(|xi| xi.value),
             amplitude_rad: mode.shape.iter().map(|l| l.amplitude_rad).fold(0.0, f64::max),
