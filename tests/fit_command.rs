@@ -103,6 +103,67 @@ hinge_viscous = 1e-3
     freeswing("fit").arg(angles).arg("--config").arg(config).assert().success().stdout(contains("hinge_viscous"));
 }
 
+const PENDULUM: &str = "
+[[specimen.links]]
+length_m = 0.26
+mass_kg = 0.1
+com_m = 0.26
+inertia_kg_m2 = 1e-5
+[model]
+release_rad = [0.3]
+[model.effects]
+hinge_viscous = 1e-4
+";
+
+#[test]
+fn a_wrong_length_is_told_with_the_factor_and_does_not_inflate_the_noise() {
+    let folder = Folder::new();
+    let angles = folder.angles(PENDULUM);
+    let config = folder.write("longer.toml", &PENDULUM.replace("0.26", "0.62"));
+    let json = folder.path("fit.json");
+    freeswing("fit")
+        .arg(&angles)
+        .arg("--config")
+        .arg(config)
+        .arg("--json")
+        .arg(&json)
+        .assert()
+        .success()
+        .stdout(contains("Fitted: not reproduced"));
+    let report: serde_json::Value = serde_json::from_str(&fs::read_to_string(json).unwrap()).unwrap();
+    let recording = &report["recordings"][0];
+    let noise_rad = recording["fitted"]["noise_rad"][0].as_f64().unwrap();
+    assert!((noise_rad / 1e-3 - 1.0).abs() < 0.15, "{noise_rad}");
+    assert!(
+        (recording["pace"]["ratio"].as_f64().unwrap() / (0.62f64 / 0.26).sqrt() - 1.0).abs() < 2e-3,
+        "{recording:#}"
+    );
+    assert_eq!(recording["fitted"]["reproduced"], false);
+}
+
+#[test]
+fn a_table_in_milliseconds_is_not_fitted_but_told() {
+    let folder = Folder::new();
+    let angles = folder.angles(PENDULUM);
+    let text = fs::read_to_string(&angles).unwrap();
+    let in_milliseconds = |line: &str| {
+        let mut fields: Vec<String> = line.split(',').map(str::to_owned).collect();
+        if let Ok(t_s) = fields[1].parse::<f64>() {
+            fields[1] = (1e3 * t_s).to_string();
+        }
+        fields.join(",")
+    };
+    let table = folder.write("ms.csv", &text.lines().map(in_milliseconds).collect::<Vec<_>>().join("\n"));
+    freeswing("fit")
+        .arg(table)
+        .arg("--config")
+        .arg(folder.path("simulated.toml"))
+        .assert()
+        .code(2)
+        .stdout("")
+        .stderr(contains("times slower than a pendulum of 0.26 m").and(contains("(t_s looks like milliseconds)")));
+}
+
 #[test]
 fn json_on_standard_output_is_all_there_is() {
     let folder = Folder::new();

@@ -21,6 +21,9 @@ const LITTLE: f64 = 1e-3;
 /// A frequency beyond this part of half the rate may be that of its mirror image on the other side of it.
 const MIRRORED: f64 = 0.6;
 
+/// Damping ratio of a second mode that is not seen.
+const SILENT: f64 = 0.3;
+
 /// The experiment with the free spring and linear dampers set to what the modes say, likeliest first; the same where they say nothing.
 pub fn from_modes(experiment: &Experiment, free: &[Parameter], seen: &Seen) -> Vec<Experiment> {
     let mut begun = vec![with_modes(experiment, free, seen)];
@@ -41,8 +44,11 @@ fn with_modes(experiment: &Experiment, free: &[Parameter], seen: &Seen) -> Exper
     }
     let joint = Some(Parameter::JointDamping).filter(|joint| free.contains(joint));
     let outside = [Parameter::HingeViscous, Parameter::AirLinear].into_iter().find(|damper| free.contains(damper));
-    for (damper, seen, mode) in [(joint, seen.fast.as_ref(), 1), (outside, Some(&seen.slow), 0)] {
-        if let (Some(damper), Some(seen)) = (damper, seen)
+    // a second mode that is not seen does not ring: begun with little damping, it would end on a line in the noise
+    let silent = || SeenMode { damping_ratio: Some(SILENT), ..seen.slow.clone() };
+    let fast = seen.fast.clone().unwrap_or_else(silent);
+    for (damper, seen, mode) in [(joint, &fast, 1), (outside, &seen.slow, 0)] {
+        if let Some(damper) = damper
             && let Some(damping) = damping_of(&begun, damper, seen, mode)
         {
             set(&mut begun, damper, damping);
@@ -151,5 +157,73 @@ fn set(experiment: &mut Experiment, parameter: Parameter, value: f64) {
         Parameter::HingeViscous => model.effects.hinge_viscous = Some(value),
         Parameter::AirLinear => model.effects.air_linear = Some(value),
         _ => {}
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use nalgebra::Complex;
+
+    /// What a specimen with a spring shows.
+    fn seen(experiment: &Experiment) -> Seen {
+        let modes = Modes::of(&Linearised::of(experiment).unwrap()).unwrap().modes;
+        let of = |mode: &Mode| SeenMode {
+            frequency_hz: mode.frequency_hz,
+            frequency_half_hz: 0.0,
+            vague: 0.0,
+            mean_frequency_hz: mode.frequency_hz,
+            damping_ratio: Some(mode.damping_ratio),
+            amplitude_rad: 0.1,
+            shape: mode
+                .shape
+                .iter()
+                .map(|c| Complex::from_polar(c.amplitude, c.phase_rad) / mode.shape[0].amplitude)
+                .collect(),
+        };
+        Seen { slow: of(&modes[0]), fast: Some(of(&modes[1])), nyquist_hz: 60.0, peaks_hz: Vec::new() }
+    }
+
+    fn with(stiffness: f64, damping: f64) -> Experiment {
+        let mut experiment = Experiment::default();
+        experiment.model.k_eq_n_m_per_rad = stiffness;
+        experiment.model.c_eq_n_m_s_per_rad = damping;
+        experiment
+    }
+
+    const FREE: [Parameter; 2] = [Parameter::JointStiffness, Parameter::JointDamping];
+
+    #[test]
+    fn the_second_mode_gives_the_spring_and_the_damper_wherever_the_file_stands() {
+        let truth = seen(&with(1e-3, 1e-6));
+        for stated in [1e-5, 1e-4, 1e-2, 1e-1] {
+            let begun = &from_modes(&with(stated, 3e-5), &FREE, &truth)[0].model;
+            assert!((begun.k_eq_n_m_per_rad / 1e-3 - 1.0).abs() < 1e-2, "{begun:?}");
+            assert!((begun.c_eq_n_m_s_per_rad / 1e-6 - 1.0).abs() < 2e-2, "{begun:?}");
+        }
+    }
+
+    #[test]
+    fn the_shape_of_the_first_mode_gives_the_spring_where_no_second_is_seen() {
+        let truth = Seen { fast: None, ..seen(&with(1e-3, 1e-6)) };
+        let begun = &from_modes(&with(1e-5, 1e-6), &FREE, &truth)[0].model;
+        assert!((begun.k_eq_n_m_per_rad / 1e-3 - 1.0).abs() < 2e-2, "{begun:?}");
+    }
+
+    #[test]
+    fn a_second_mode_beyond_half_the_rate_is_sought_at_its_mirror_image() {
+        let mut truth = seen(&with(1e-3, 1e-6));
+        // 14.3 Hz at 25 rows a second are seen at 10.7 Hz
+        truth.nyquist_hz = 12.5;
+        let fast = truth.fast.as_mut().unwrap();
+        fast.frequency_hz = 25.0 - fast.frequency_hz;
+        let begun = from_modes(&with(1e-4, 1e-6), &FREE, &truth);
+        assert!((begun[1].model.k_eq_n_m_per_rad / 1e-3 - 1.0).abs() < 1e-2, "{begun:?}");
+    }
+
+    #[test]
+    fn the_slow_mode_of_two_rods_lies_between_limp_and_rigid() {
+        let [low_hz, high_hz] = slow_mode_hz(&with(2e-4, 1e-6)).unwrap();
+        assert!((low_hz - 1.3486).abs() < 1e-3 && (high_hz - 1.3649).abs() < 1e-3, "{low_hz} {high_hz}");
     }
 }

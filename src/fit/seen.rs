@@ -25,7 +25,7 @@ pub struct SeenMode {
     pub frequency_hz: f64,
     /// Half its 95 % interval, which what amplitude may do to it widens.
     pub frequency_half_hz: f64,
-    /// The same without that, as a share.
+    /// Half the interval of the mean frequency, as a share.
     pub(super) vague: f64,
     /// Of the whole recording, whatever its amplitude.
     pub mean_frequency_hz: f64,
@@ -94,7 +94,7 @@ impl SeenMode {
         Self {
             frequency_hz: small.value,
             frequency_half_hz: 0.5 * (small.high - small.low),
-            vague: 0.5 * (mode.frequency_hz.high - mode.frequency_hz.low) / mode.frequency_hz.value.abs().max(1e-12),
+            vague: whole.map_or(f64::INFINITY, |f| 0.5 * (f.high - f.low) / f.value.abs().max(1e-12)),
             mean_frequency_hz: whole.map_or(small.value, |w| w.value),
             damping_ratio: mode.damping.estimate().map(|xi| xi.value),
             amplitude_rad: mode.shape.iter().map(|l| l.amplitude_rad).fold(0.0, f64::max),
