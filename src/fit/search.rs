@@ -34,6 +34,13 @@ struct Search<'a, 's> {
     noise_rad: &'s [Vec<f64>],
 }
 
+/// Beginnings that the recordings' modes say, and whether the second mode is among them: without it they come after the file's values, for they are vague, and a
+/// stiff joint with little damping ends on a line in the noise.
+struct Modes {
+    begun: Vec<Experiment>,
+    rings: bool,
+}
+
 /// Where a descent ended, and of what.
 type End<'a> = (Problem<'a>, Outcome);
 
@@ -47,13 +54,11 @@ pub fn best_end<'a>(
     progress: &dyn Progress,
 ) -> Result<End<'a>> {
     let search = Search { records, free, noise_rad };
-    let begun = search.from_modes(experiment);
+    let Modes { begun, rings } = search.from_modes(experiment);
     let mut order = vec![experiment];
     order.extend(&begun);
     let springs = order.iter().map(|begun| begin::spring_of(begun, free)).collect::<Option<Vec<_>>>();
-    if springs.is_some_and(|springs| springs[1..].iter().all(|spring| is_far_off(*spring, springs[0])))
-        && order.len() > 1
-    {
+    if springs.is_some_and(|springs| springs[1..].iter().all(|spring| is_far_off(*spring, springs[0]))) && rings {
         order.rotate_left(1);
     }
     let mut best: Option<End<'a>> = None;
@@ -132,14 +137,14 @@ impl<'a> Search<'a, '_> {
     }
 
     /// The experiment as the modes of the longest recording have it, where a spring or a damper is free.
-    fn from_modes(&self, experiment: &Experiment) -> Vec<Experiment> {
+    fn from_modes(&self, experiment: &Experiment) -> Modes {
         let begun_with = |p: &Parameter| {
             p.is_spring() || matches!(p, Parameter::JointDamping | Parameter::HingeViscous | Parameter::AirLinear)
         };
         let longest = self.records.iter().max_by_key(|record| record.len());
         match longest.filter(|_| self.free.iter().any(begun_with)).and_then(Seen::of) {
-            Some(seen) => begin::from_modes(experiment, self.free, &seen),
-            None => Vec::new(),
+            Some(seen) => Modes { begun: begin::from_modes(experiment, self.free, &seen), rings: seen.fast.is_some() },
+            None => Modes { begun: Vec::new(), rings: false },
         }
     }
 
