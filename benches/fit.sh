@@ -15,6 +15,11 @@ cargo build --release --quiet
 # K, C, hinge damper
 experiment() {
     cat <<TOML
+[specimen]
+mass_kg = 0.3606e-3
+length_m = 0.20
+width_m = 0.05
+link_lengths_m = [0.10, 0.10]
 [model]
 k_eq_n_m_per_rad = $1
 c_eq_n_m_s_per_rad = $2

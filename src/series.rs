@@ -7,7 +7,7 @@ use std::ops::Range;
 use std::path::{Path, PathBuf};
 
 use crate::error::{Error, Result};
-use crate::statistics::median_step_s;
+use crate::statistics::{median, median_step_s};
 
 /// Fewest rows, and fewest values of each angle, from which anything can be said.
 pub const FEWEST_ROWS: usize = 8;
@@ -17,6 +17,11 @@ const STILL_RAD: f64 = 1e-6;
 
 /// A column of which more than this part of the numbers is negative holds no standard deviations, whatever its name.
 const MOST_NEGATIVE: f64 = 0.25;
+
+/// No thing before a camera swings more slowly: a pendulum of this period is 900 m long.
+const LONGEST_PERIOD_S: f64 = 60.0;
+/// The same where rows are a second apart exactly, as frame numbers are; 25 m long.
+const LONGEST_BY_FRAME_S: f64 = 10.0;
 
 /// Consecutive swings beyond a full turn that no hanging chain makes.
 const IMPOSSIBLE_SWINGS: usize = 4;
@@ -87,6 +92,7 @@ impl AngleSeries {
         }
         series.check(&table)?;
         series.keep_deviations();
+        series.warnings.extend(series.slow_clock());
         Ok(series)
     }
 
@@ -129,6 +135,21 @@ impl AngleSeries {
                 *sd = sd.filter(|sd| *sd > 0.0 && !is_none);
             }
         }
+    }
+
+    /// What to say of stamps in which a swing takes longer than that of any hung thing.
+    fn slow_clock(&self) -> Option<String> {
+        let angles: Vec<(f64, f64)> =
+            self.t_s.iter().zip(&self.theta_rad[0]).filter_map(|(t, a)| Some((*t, (*a)?))).collect();
+        let counts = self.t_s.windows(2).all(|pair| pair[1] - pair[0] == 1.0);
+        let longest_s = if counts { LONGEST_BY_FRAME_S } else { LONGEST_PERIOD_S };
+        let period_s = period_s(&angles).filter(|period_s| *period_s > longest_s)?;
+        let unit = if counts { "frame numbers: divide by the frame rate" } else { "milliseconds: divide by 1000" };
+        Some(format!(
+            "{}: a swing takes {period_s:.0} s, as of a pendulum {:.0} m long; t_s looks like {unit}",
+            self.path.display(),
+            9.81 * (period_s / std::f64::consts::TAU).powi(2)
+        ))
     }
 
     fn check(&self, table: &Table) -> Result<()> {
@@ -247,6 +268,21 @@ fn impossible_swing(values: &[f64]) -> Option<f64> {
         .map(|few| few.iter().copied().fold(f64::INFINITY, f64::min))
         .filter(|least| *least > std::f64::consts::TAU)
         .max_by(f64::total_cmp)
+}
+
+/// The usual time from one rise through the middle to the next, where there are a few.
+fn period_s(angles: &[(f64, f64)]) -> Option<f64> {
+    let (low, high) = angles.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), a| (l.min(a.1), h.max(a.1)));
+    let (middle, beyond) = (0.5 * (low + high), 0.1 * (high - low));
+    let (mut below, mut rises) = (false, Vec::new());
+    for (t_s, angle) in angles {
+        if below && angle - middle > beyond {
+            rises.push(*t_s);
+        }
+        below = if below { angle - middle <= beyond } else { middle - angle > beyond };
+    }
+    let mut periods: Vec<f64> = rises.windows(2).map(|pair| pair[1] - pair[0]).collect();
+    median(&mut periods).filter(|_| periods.len() >= 2)
 }
 
 /// The distances between consecutive turning points that are at least `least` apart.
@@ -544,6 +580,22 @@ mod tests {
         assert!(message.ends_with("full turns if radians: looks like degrees; multiply by π/180"), "{message}");
         assert!(message.starts_with("a.csv: theta1_rad swings to and fro by 4"), "{message}");
         parse(&table(|t| 3.1 * (6.0 * t).cos(), 200)).unwrap();
+    }
+
+    #[test]
+    fn milliseconds_and_frame_numbers_are_recognised() {
+        let warnings = |step: f64| {
+            let mut text = "t_s,theta1_rad\n".to_owned();
+            for row in 0..300 {
+                let _ = writeln!(text, "{},{:.6}", f64::from(row) * step, 0.3 * (f64::from(row) * 0.25).cos());
+            }
+            parse(&text).unwrap().warnings
+        };
+        assert!(warnings(0.0333).is_empty());
+        let [milliseconds] = &warnings(33.3)[..] else { panic!("no warning") };
+        assert!(milliseconds.contains("t_s looks like milliseconds: divide by 1000"), "{milliseconds}");
+        let [frames] = &warnings(1.0)[..] else { panic!("no warning") };
+        assert!(frames.contains("t_s looks like frame numbers"), "{frames}");
     }
 
     #[test]

@@ -12,6 +12,11 @@ use rand_distr::{Distribution, Normal};
 use serde_json::Value;
 
 const BASE: &str = "
+[specimen]
+mass_kg = 0.3606e-3
+length_m = 0.20
+width_m = 0.05
+link_lengths_m = [0.10, 0.10]
 [model]
 k_eq_n_m_per_rad = 2.0e-4
 c_eq_n_m_s_per_rad = 2.0e-7

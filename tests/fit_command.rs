@@ -8,6 +8,11 @@ use predicates::prelude::*;
 use predicates::str::contains;
 
 const SWING: &str = "
+[specimen]
+mass_kg = 0.3606e-3
+length_m = 0.20
+width_m = 0.05
+link_lengths_m = [0.10, 0.10]
 [model]
 k_eq_n_m_per_rad = 2.0e-4
 c_eq_n_m_s_per_rad = 2.0e-6
@@ -98,6 +103,70 @@ hinge_viscous = 1e-3
     freeswing("fit").arg(angles).arg("--config").arg(config).assert().success().stdout(contains("hinge_viscous"));
 }
 
+const PENDULUM: &str = "
+[[specimen.links]]
+length_m = 0.26
+mass_kg = 0.1
+com_m = 0.26
+inertia_kg_m2 = 1e-5
+[model]
+release_rad = [0.3]
+[model.effects]
+hinge_viscous = 1e-4
+";
+
+#[test]
+fn a_wrong_length_is_told_with_the_factor_and_does_not_inflate_the_noise() {
+    let folder = Folder::new();
+    let angles = folder.angles(PENDULUM);
+    let config = folder.write("longer.toml", &PENDULUM.replace("0.26", "0.62"));
+    let json = folder.path("fit.json");
+    freeswing("fit")
+        .arg(&angles)
+        .arg("--config")
+        .arg(config)
+        .arg("--json")
+        .arg(&json)
+        .assert()
+        .success()
+        .stdout(contains("Fitted: not reproduced"));
+    let report: serde_json::Value = serde_json::from_str(&fs::read_to_string(json).unwrap()).unwrap();
+    let recording = &report["recordings"][0];
+    let noise_rad = recording["fitted"]["noise_rad"][0].as_f64().unwrap();
+    assert!((noise_rad / 1e-3 - 1.0).abs() < 0.15, "{noise_rad}");
+    let pace = &recording["pace"];
+    assert!((pace["ratio"].as_f64().unwrap() / (0.62f64 / 0.26).sqrt() - 1.0).abs() < 1e-2, "{pace}");
+    let statement = pace["statement"].as_str().unwrap();
+    assert!(
+        statement.contains("times faster than a pendulum of 0.62 m") && statement.contains(" m would"),
+        "{statement}"
+    );
+    assert_eq!(recording["fitted"]["reproduced"], false);
+}
+
+#[test]
+fn a_table_in_milliseconds_is_not_fitted_but_told() {
+    let folder = Folder::new();
+    let angles = folder.angles(PENDULUM);
+    let text = fs::read_to_string(&angles).unwrap();
+    let in_milliseconds = |line: &str| {
+        let mut fields: Vec<String> = line.split(',').map(str::to_owned).collect();
+        if let Ok(t_s) = fields[1].parse::<f64>() {
+            fields[1] = (1e3 * t_s).to_string();
+        }
+        fields.join(",")
+    };
+    let table = folder.write("ms.csv", &text.lines().map(in_milliseconds).collect::<Vec<_>>().join("\n"));
+    freeswing("fit")
+        .arg(table)
+        .arg("--config")
+        .arg(folder.path("simulated.toml"))
+        .assert()
+        .code(2)
+        .stdout("")
+        .stderr(contains("times slower than a pendulum of 0.26 m").and(contains("(t_s looks like milliseconds)")));
+}
+
 #[test]
 fn json_on_standard_output_is_all_there_is() {
     let folder = Folder::new();
@@ -164,7 +233,7 @@ fn bad_input_is_one_line_and_exit_code_2() {
 #[test]
 fn a_joint_parameter_of_one_link_is_refused() {
     let folder = Folder::new();
-    let one = "[specimen]\nlink_lengths_m = [0.2]\n[model]\nrelease_rad = [0.4]\n";
+    let one = "[specimen]\nmass_kg = 0.3606e-3\nlink_lengths_m = [0.2]\n[model]\nrelease_rad = [0.4]\n";
     let angles = folder.angles(one);
     let config = folder.path("simulated.toml");
     freeswing("fit")
@@ -181,6 +250,11 @@ fn a_joint_parameter_of_one_link_is_refused() {
 fn the_bending_stiffness_of_a_strip_is_fitted() {
     let folder = Folder::new();
     let strip = "
+[specimen]
+mass_kg = 0.3606e-3
+length_m = 0.20
+width_m = 0.05
+link_lengths_m = [0.10, 0.10]
 [model]
 c_eq_n_m_s_per_rad = 5.0e-7
 release_rad = [0.5, 0.62]

@@ -59,7 +59,7 @@ impl Bench {
 #[test]
 fn the_table_and_the_json_tell_the_same() {
     let bench = Bench::with(&good());
-    let config = "[specimen]\nmass_kg = 0.3606e-3\n[rig]\ngravity_m_s2 = 9.80665\n";
+    let config = "[specimen]\nmass_kg = 0.3606e-3\nlink_lengths_m = [0.10, 0.10]\n[rig]\ngravity_m_s2 = 9.80665\n";
     std::fs::write(bench.folder.path().join("e.toml"), config).unwrap();
     let output = bench.run(&["a.csv", "--config", "e.toml", "--json", "out.json"]);
     let text = String::from_utf8(output.stdout).unwrap();
@@ -110,7 +110,11 @@ fn a_frequency_below_the_floor_is_named_with_what_mends_it() {
         text
     });
     let bench = Bench::with(&slow);
-    std::fs::write(bench.folder.path().join("e.toml"), "[specimen]\nlength_m = 0.2\n").unwrap();
+    std::fs::write(
+        bench.folder.path().join("e.toml"),
+        "[specimen]\nmass_kg = 0.3606e-3\nlink_lengths_m = [0.10, 0.10]\n",
+    )
+    .unwrap();
     let text = String::from_utf8(bench.run(&["a.csv", "--config", "e.toml"]).stdout).unwrap();
     assert!(
         text.contains("is below the floor of 1.3400 Hz (the limp strip): time base, length or gravity is wrong"),

@@ -17,7 +17,7 @@ fn config(text: &str) -> tempfile::NamedTempFile {
     file
 }
 
-const PAPER_RODS: &str = "[rig]\ngravity_m_s2 = 9.81\n[model]\nk_eq_n_m_per_rad = 0.0\nc_eq_n_m_s_per_rad = 0.0\n";
+const PAPER_RODS: &str = "[specimen]\nmass_kg = 0.3606e-3\nlink_lengths_m = [0.10, 0.10]\n[rig]\ngravity_m_s2 = 9.81\n[model]\nk_eq_n_m_per_rad = 0.0\nc_eq_n_m_s_per_rad = 0.0\n";
 
 #[test]
 fn the_table_shows_the_rods_the_printed_formula_and_the_floor() {
@@ -43,14 +43,18 @@ fn the_recordings_strips_have_beam_modes() {
 
 #[test]
 fn overdamped_motions_are_listed_as_such() {
-    let stiff = config("[model]\nk_eq_n_m_per_rad = 0.0258\nc_eq_n_m_s_per_rad = 2.467e-4\n");
+    let stiff = config(
+        "[specimen]\nmass_kg = 0.3606e-3\nlink_lengths_m = [0.10, 0.10]\n[model]\nk_eq_n_m_per_rad = 0.0258\nc_eq_n_m_s_per_rad = 2.467e-4\n",
+    );
     modes(stiff.path()).assert().success().stdout(contains("overdamped"));
 }
 
 #[test]
 fn many_links_fit_the_terminal() {
     let lengths = vec!["0.01"; 20].join(", ");
-    let chain = config(&format!("[specimen]\nlink_lengths_m = [{lengths}]\n[model]\nrelease_rad = [0.1]\n"));
+    let chain = config(&format!(
+        "[specimen]\nmass_kg = 0.3606e-3\nlink_lengths_m = [{lengths}]\n[model]\nrelease_rad = [0.1]\n"
+    ));
     let output = modes(chain.path()).assert().success().stdout(contains("… and "));
     let text = String::from_utf8(output.get_output().stdout.clone()).unwrap();
     assert!(text.lines().all(|line| line.chars().count() <= 100), "{text}");
@@ -96,10 +100,14 @@ fn bad_configurations_are_one_line_and_exit_code_2() {
     refused(config("[specimen]\nmass_kg = 0.0\n").path(), "specimen.mass_kg = 0: must be a positive number");
     refused(config("[specimen]\nlenght_m = 0.2\n").path(), "the nearest known one is `length_m`");
     refused(
-        config("[specimen]\ninertia = \"lumps\"\nlumps = [0.5, 0.5, 0.0]\n").path(),
+        config("[specimen]\nmass_kg = 0.3606e-3\nlink_lengths_m = [0.10, 0.10]\ninertia = \"lumps\"\nlumps = [0.5, 0.5, 0.0]\n").path(),
         "a link swings without inertia",
     );
-    refused(config("[model.effects]\nrest_curl = 40.0\n[specimen]\n").path(), "no stable rest position");
+    refused(
+        config("[model.effects]\nrest_curl = 40.0\n[specimen]\nmass_kg = 0.3606e-3\nlink_lengths_m = [0.10, 0.10]\n")
+            .path(),
+        "no stable rest position",
+    );
     refused(config("[model.effects]\nhinge_stiffness = nan\n").path(), "must be zero or a positive number");
     refused(config("[model.effects]\nadded_mass = -1.0\n").path(), "must be zero or a positive number");
 }

@@ -5,12 +5,14 @@ use std::path::PathBuf;
 
 use serde_json::{Value, json};
 
+use super::Bar;
 use super::table::{Table, number, paragraph};
 use crate::error::{Error, Result};
 use crate::experiment::Experiment;
-use crate::fit::{self, Fit, Record, Verdict};
+use crate::fit::{self, Fit, Pace, Record, Seen, Verdict};
 use crate::model::{ForwardModel, Parameter};
 use crate::output::OutputFile;
+use crate::progress::Progress;
 
 /// Fit the forward model to recordings: parameters, simulated against measured, does it reproduce the decay.
 #[derive(Debug, clap::Args)]
@@ -20,7 +22,9 @@ Examples:
   freeswing fit small.csv large.csv --config experiment.toml --free hinge_coulomb --json fit.json
 
 Free are the joint's spring and damper, every effect named in [model.effects] (its value is the start), and of one link the hinge's
-viscous damper. A joint whose k_eq_n_m_per_rad is 0 has no spring. Several recordings share all parameters but not their release.")]
+viscous damper. A joint whose k_eq_n_m_per_rad is 0 has no spring. Several recordings share all parameters but not their release.
+The fit begins with the file's values and with those that the recording's own frequencies and decay say. \"Reproduced\" means: the residual
+is no more than the noise, which is taken from the angles alone, and at least nine tenths of the variance are explained.")]
 pub struct FitArgs {
     /// Tables of angles of one specimen; `-` is standard input.
     #[arg(required = true, value_name = "ANGLES")]
@@ -54,20 +58,35 @@ impl FitArgs {
     /// # Errors
     /// One line: what, where, what to do.
     pub fn run(&self) -> Result<()> {
-        let experiment = Experiment::read(&self.config)?;
+        let experiment = super::read_experiment(&self.config)?;
         let model = ForwardModel::of(&experiment)?;
         let marks = model.chain().groups().len();
         let records = super::recordings(&self.angles, marks, (self.from, self.until))?;
         let free = free_parameters(&experiment, marks, &self.free, &self.fix)?;
+        if experiment.model.effects.dropped_frames.is_some() {
+            let id = Parameter::DroppedFrames.id();
+            eprintln!(
+                "warning: model.effects.{id} is not fitted: where frames are missing only `freeswing diagnose` finds"
+            );
+        }
         let json = self.json.as_deref().map(OutputFile::create).transpose()?;
+        let seen: Vec<Option<Seen>> = records.iter().map(Seen::of).collect();
+        for (record, seen) in records.iter().zip(&seen) {
+            seen.as_ref().map_or(Ok(()), |seen| fit::refuse_another_pace(record, seen, &experiment))?;
+        }
         let window_s = std::f64::consts::TAU / model.pace_rad_s();
+        let bar = Bar::of_fits(self.quiet);
+        bar.begin("fitting", Some(fit::stages(&[]) + fit::stages(&free)));
+        let side = |free: &[Parameter]| Ok(Side::of(fit::fit_watched(&records, &experiment, free, &bar)?, window_s));
         let report = Report {
-            given: Side::of(fit::fit(&records, &experiment, &[])?, window_s),
-            fitted: Side::of(fit::fit(&records, &experiment, &free)?, window_s),
+            given: side(&[])?,
+            fitted: side(&free)?,
             start: free.iter().map(|p| model.value(*p).unwrap_or(0.0)).collect(),
+            paces: seen.iter().map(|seen| Pace::of(seen.as_ref()?, &experiment)).collect(),
             records: &records,
             specimen: &experiment.specimen.name,
         };
+        drop(bar);
         let text = if self.quiet { String::new() } else { report.text() };
         super::deliver(&text, &report.json(), json)
     }
@@ -93,6 +112,10 @@ fn free_parameters(experiment: &Experiment, marks: usize, more: &[String], fix: 
     for id in more {
         free.push(parse(id)?);
     }
+    if free.contains(&Parameter::DroppedFrames) {
+        let message = "a fit does not know where frames are missing; `freeswing diagnose` finds them".to_owned();
+        return Err(Error::Option { option: Parameter::DroppedFrames.id().to_owned(), message });
+    }
     free.retain(|p| !fix.contains(p));
     let mut once = Vec::new();
     free.retain(|p| {
@@ -111,7 +134,7 @@ struct Side {
 
 impl Side {
     fn of(fit: Fit, window_s: f64) -> Self {
-        let verdicts = fit.residuals.iter().map(|r| Verdict::of(r, window_s)).collect();
+        let verdicts = (0..fit.residuals.len()).map(|record| Verdict::of_fit(&fit, record, window_s)).collect();
         Self { fit, verdicts }
     }
 }
@@ -120,6 +143,7 @@ struct Report<'a> {
     given: Side,
     fitted: Side,
     start: Vec<f64>,
+    paces: Vec<Option<Pace>>,
     records: &'a [Record],
     specimen: &'a str,
 }
@@ -127,6 +151,12 @@ struct Report<'a> {
 impl Report<'_> {
     fn text(&self) -> String {
         let mut text = format!("{}\n\n", self.specimen);
+        for index in 0..self.records.len() {
+            if let Some(statement) = self.pace_statement(index) {
+                text.push_str(&paragraph("", &format!("{}: {statement}", self.records[index].path.display())));
+                text.push('\n');
+            }
+        }
         self.parameters(&mut text);
         for index in 0..self.records.len() {
             self.recording(index, &mut text);
@@ -163,8 +193,8 @@ impl Report<'_> {
             text.push_str(&paragraph("  ", &format!("{} and {} are correlated by {correlation:.3}", pair[0], pair[1])));
         }
         if self.fitted.fit.ending != fit::Ending::Converged {
-            let line = "The descent has not converged: no motion of this model comes near the recording, and the values mean little. \
-                        Let more parameters free, or use a shorter stretch (--from, --until).";
+            let line = "The fit has not converged within its budget: the values mean little. Let more parameters free, or use a \
+                        shorter stretch (--from, --until).";
             text.push_str(&paragraph("  ", line));
         }
         if self.fitted.fit.coloured {
@@ -218,6 +248,12 @@ impl Report<'_> {
         self.peaks(index, text);
     }
 
+    /// What a recording that is not reproduced says of lengths, clock and units.
+    fn pace_statement(&self, index: usize) -> Option<String> {
+        let pace = self.paces[index].as_ref().filter(|_| !self.fitted.verdicts[index].is_reproduced())?;
+        pace.statement()
+    }
+
     /// A few turning points from the first to the last.
     fn peaks(&self, index: usize, text: &mut String) {
         for (link, peaks) in self.fitted.verdicts[index].peaks.iter().enumerate() {
@@ -266,6 +302,7 @@ impl Report<'_> {
                 "start_rad_and_rad_s": side.fit.starts[index],
                 "reproduced": verdict.is_reproduced(),
                 "statement": verdict.statement(),
+                "explained": verdict.explained,
                 "departs": verdict.departs.map(|d| json!({
                     "angle": d.link + 1, "from_s": d.from_s, "amplitude_rad": d.amplitude_rad, "rms_rad": d.rms_rad,
                     "share_of_windows_after": d.share,
@@ -281,6 +318,9 @@ impl Report<'_> {
             "file": record.path,
             "rows": record.len(),
             "outliers": self.fitted.fit.outliers[index].iter().map(|o| json!({"angle": o.link + 1, "t_s": record.t_s[o.row]})).collect::<Vec<_>>(),
+            "pace": self.paces[index].as_ref().map(|pace| json!({
+                "seen_hz": pace.seen_hz, "model_hz": pace.model_hz, "ratio": pace.ratio(), "statement": self.pace_statement(index),
+            })),
             "fitted": side(&self.fitted),
             "given": side(&self.given),
         })

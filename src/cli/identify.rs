@@ -47,7 +47,7 @@ impl IdentifyArgs {
     /// # Errors
     /// One line: what, where, what to do.
     pub fn run(&self) -> Result<()> {
-        let experiment = self.config.as_deref().map(Experiment::read).transpose()?;
+        let experiment = self.config.as_deref().map(Experiment::read).transpose()?.filter(describes_specimen);
         self.keep_inputs()?;
         let json = self.json.as_deref().map(OutputFile::create).transpose()?;
         let series = self.stretch(super::read_angles(&self.angles)?)?;
@@ -86,4 +86,13 @@ impl IdentifyArgs {
         }
         Ok(())
     }
+}
+
+/// Whether a file describes a specimen; what is missing or odd is said on standard error.
+fn describes_specimen(experiment: &Experiment) -> bool {
+    experiment.warnings.iter().for_each(|warning| eprintln!("warning: {warning}"));
+    if let Some(missing) = &experiment.missing {
+        eprintln!("warning: {missing}; going on without the specimen");
+    }
+    experiment.missing.is_none()
 }

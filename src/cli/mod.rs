@@ -19,6 +19,7 @@ use clap::{Parser, Subcommand};
 
 pub use bar::Bar;
 
+use crate::experiment::Experiment;
 use crate::fit::Record;
 use crate::output::OutputFile;
 use crate::series::AngleSeries;
@@ -94,6 +95,15 @@ fn read_angles(path: &Path) -> crate::Result<AngleSeries> {
         eprintln!("warning: {warning}");
     }
     Ok(series)
+}
+
+/// An experiment file for a command that needs the specimen; what is odd in it is said on standard error.
+fn read_experiment(path: &Path) -> crate::Result<Experiment> {
+    let experiment = Experiment::read_with_specimen(path)?;
+    for warning in &experiment.warnings {
+        eprintln!("warning: {warning}");
+    }
+    Ok(experiment)
 }
 
 /// The tables of some recordings, from one stamp until another.

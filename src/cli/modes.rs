@@ -6,7 +6,6 @@ use std::path::PathBuf;
 
 use super::table::{Table, number, paragraph, setting};
 use crate::error::Result;
-use crate::experiment::Experiment;
 use crate::model::modes::{Component, RodMode, Survey};
 use crate::output::OutputFile;
 
@@ -38,7 +37,7 @@ impl ModesArgs {
     /// # Errors
     /// One line: what, where, what to do.
     pub fn run(&self) -> Result<()> {
-        let experiment = Experiment::read(&self.config)?;
+        let experiment = super::read_experiment(&self.config)?;
         let survey = Survey::of(&experiment)?;
         super::deliver(&survey_text(&survey), &survey, self.json.as_deref().map(OutputFile::create).transpose()?)
     }

@@ -4,7 +4,6 @@ use std::path::PathBuf;
 
 use super::Bar;
 use crate::error::{Error, Result};
-use crate::experiment::Experiment;
 use crate::progress::Progress;
 use crate::synth::Recording;
 
@@ -43,7 +42,7 @@ impl RenderArgs {
     /// # Errors
     /// One line: what, where, what to do.
     pub fn run(&self) -> Result<()> {
-        let mut experiment = Experiment::read(&self.config)?;
+        let mut experiment = super::read_experiment(&self.config)?;
         let render = &mut experiment.render;
         render.seed = self.seed.unwrap_or(render.seed);
         render.duration_s = self.duration.unwrap_or(render.duration_s);

@@ -7,7 +7,6 @@ use rand::SeedableRng;
 use rand_distr::{Distribution, Normal};
 
 use crate::error::{Error, Result};
-use crate::experiment::Experiment;
 use crate::output::OutputFile;
 use crate::synth::Swing;
 
@@ -49,7 +48,7 @@ impl SimulateArgs {
     /// # Errors
     /// One line: what, where, what to do.
     pub fn run(&self) -> Result<()> {
-        let mut experiment = Experiment::read(&self.config)?;
+        let mut experiment = super::read_experiment(&self.config)?;
         let render = &mut experiment.render;
         render.duration_s = positive("--duration", self.duration.unwrap_or(render.duration_s))?;
         render.fps = positive("--rate", self.rate.unwrap_or(render.fps))?;

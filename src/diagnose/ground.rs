@@ -1,6 +1,5 @@
 //! What every fit of one diagnosis shares, and the ways to make one: near another fit, anew, again.
 
-use super::hysteresis::Straightened;
 use super::noise::BEYOND_NOISE;
 use super::refit::Refit;
 use super::{Cause, noise};
@@ -9,7 +8,7 @@ use crate::experiment::{Experiment, Hysteresis};
 use crate::fit::descent::Descent;
 use crate::fit::shooting::multiple_shooting;
 use crate::fit::whitening::{Colour, RecordNoise};
-use crate::fit::{Belief, Problem, Record};
+use crate::fit::{Belief, Problem, Record, straight};
 use crate::model::Parameter;
 use crate::model::observe::chord_angles_rad;
 
@@ -292,15 +291,7 @@ impl<'a> Ground<'a> {
         problem: Problem<'a>,
         x: Vec<f64>,
     ) -> Option<Refit<'a>> {
-        let lower = problem.lower();
-        let outcome = match Straightened::of(&problem) {
-            None => descent.run(x, &lower, |x| problem.blocks(x))?,
-            Some(valley) => valley.bend(descent.run(valley.straight(x), &lower, |x| {
-                let mut blocks = problem.blocks(&valley.bent(x))?;
-                valley.straighten(&mut blocks, x);
-                Some(blocks)
-            })?),
-        };
+        let outcome = straight::descend(&problem, &descent, x)?;
         Some(Refit::of(hypothesis.clone(), problem, outcome))
     }
 

@@ -1,7 +1,4 @@
-//! The joint's hysteresis needs starts and variables of its own.
-//!
-//! Before it yields, a hysteresis is a spring of stiffness T_h/Δ_y beside the joint's K, and their sum is what a recording tells best. In (K, T_h, Δ_y)
-//! the valley of equal sums is bent, and a descent creeps along it; in (K, T_h/Δ_y, Δ_y) it is straight.
+//! The joint's hysteresis needs starts of its own, beside variables of its own ([`crate::fit::straight`]).
 
 use rayon::prelude::*;
 
@@ -10,8 +7,6 @@ use super::refit::Refit;
 use super::screen::Score;
 use super::single::Lacks;
 use super::{Cause, growing};
-use crate::fit::Problem;
-use crate::fit::descent::{Block, Outcome};
 use crate::model::Parameter;
 
 /// Starts: yield angles as parts of the largest bend, and the hysteresis' part of the spring.
@@ -25,66 +20,6 @@ const BEGUN: usize = 12;
 const ENDED: usize = 3;
 /// Parts of the recordings that are followed before the whole is.
 const PARTS: [f64; 2] = [0.15, 0.5];
-
-/// Where T_h and Δ_y stand among a problem's variables.
-#[derive(Debug, Clone, Copy)]
-pub struct Straightened {
-    torque: usize,
-    yields: usize,
-}
-
-impl Straightened {
-    /// Of a problem with a hysteresis.
-    pub fn of(problem: &Problem<'_>) -> Option<Self> {
-        let place = |parameter| problem.free.iter().position(|p| *p == parameter);
-        Some(Self { torque: place(Parameter::HysteresisTorque)?, yields: place(Parameter::HysteresisYield)? })
-    }
-
-    /// T_h → T_h/Δ_y.
-    pub fn straight(self, mut x: Vec<f64>) -> Vec<f64> {
-        x[self.torque] /= x[self.yields];
-        x
-    }
-
-    /// T_h/Δ_y → T_h.
-    pub fn bent(self, x: &[f64]) -> Vec<f64> {
-        let mut x = x.to_vec();
-        x[self.torque] *= x[self.yields];
-        x
-    }
-
-    /// Derivatives with (T_h, Δ_y) to those with (k, Δ_y), k = T_h/Δ_y: ∂/∂k = Δ_y ∂/∂T_h, and at constant k ∂/∂Δ_y gains k ∂/∂T_h.
-    pub fn straighten(self, blocks: &mut [Block], straight: &[f64]) {
-        let (stiffness, yield_rad) = (straight[self.torque], straight[self.yields]);
-        for block in blocks {
-            let place = |variable| block.columns.iter().position(|c| *c == variable);
-            let (Some(torque), Some(yields)) = (place(self.torque), place(self.yields)) else { continue };
-            let with_torque = block.slopes.column(torque).into_owned();
-            block.slopes.column_mut(yields).axpy(stiffness, &with_torque, 1.0);
-            block.slopes.column_mut(torque).scale_mut(yield_rad);
-        }
-    }
-
-    /// The end of a descent in (T_h, Δ_y) again: x and JᵀJ.
-    pub fn bend(self, mut outcome: Outcome) -> Outcome {
-        let (stiffness, yield_rad) = (outcome.x[self.torque], outcome.x[self.yields]);
-        let (torque, yields) = (self.torque, self.yields);
-        let normal = &mut outcome.normal;
-        // k = T/Δ: ∂/∂T = (1/Δ) ∂/∂k, and at constant T ∂/∂Δ loses (k/Δ) ∂/∂k; rows, then columns
-        for row in 0..normal.nrows() {
-            let with_stiffness = normal[(row, torque)];
-            normal[(row, torque)] = with_stiffness / yield_rad;
-            normal[(row, yields)] -= stiffness / yield_rad * with_stiffness;
-        }
-        for column in 0..normal.ncols() {
-            let with_stiffness = normal[(torque, column)];
-            normal[(torque, column)] = with_stiffness / yield_rad;
-            normal[(yields, column)] -= stiffness / yield_rad * with_stiffness;
-        }
-        outcome.x = self.bent(&outcome.x);
-        outcome
-    }
-}
 
 /// The hysteresis alone, from every start that may lead to its minimum: where the score points, as a part of the spring where there is something to explain,
 /// and from short stretches, which do not know what the base model has given up, where nothing else explains it.
@@ -167,52 +102,4 @@ pub(super) fn anywhere<'a>(ground: &Ground<'a>, fit: &Refit<'a>) -> Option<Refit
         ground.descend_from(&hypothesis, half.x, ground::MOST_STEPS)
     });
     ended.min_by(|a, b| a.chi2.total_cmp(&b.chi2))
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::fit::Ending;
-    use nalgebra::{DMatrix, DVector};
-
-    /// What is fitted: some linear function of (T_h, Δ_y) and another variable.
-    fn slopes() -> DMatrix<f64> {
-        DMatrix::from_row_slice(4, 3, &[1.0, 3.0, -2.0, 0.5, -1.0, 4.0, 2.0, 0.3, 1.0, -1.0, 2.0, 0.7])
-    }
-
-    #[test]
-    fn there_and_back_the_normal_matrix_is_the_same() {
-        let valley = Straightened { torque: 0, yields: 2 };
-        let x = vec![3e-6, 7.0, 0.05];
-        let straight = valley.straight(x.clone());
-        assert!((straight[0] - 6e-5).abs() < 1e-18);
-        let residual = DVector::zeros(4);
-        let mut blocks = vec![Block { columns: vec![0, 1, 2], residual, slopes: slopes(), robust: true }];
-        valley.straighten(&mut blocks, &straight);
-        let normal = blocks[0].slopes.tr_mul(&blocks[0].slopes);
-        let outcome =
-            Outcome { x: straight, cost: 0.0, blocks: Vec::new(), normal, steps: 0, ending: Ending::Converged };
-        let back = valley.bend(outcome);
-        assert!(back.x.iter().zip(&x).all(|(a, b)| (a / b - 1.0).abs() < 1e-12), "{:?}", back.x);
-        let direct = slopes().tr_mul(&slopes());
-        assert!((&back.normal - &direct).amax() < 1e-9 * direct.amax(), "{} {direct}", back.normal);
-    }
-
-    #[test]
-    fn derivatives_are_those_of_the_straight_variables() {
-        let valley = Straightened { torque: 0, yields: 2 };
-        let straight = [0.6, 7.0, 0.5];
-        let value = |straight: &[f64]| slopes() * DVector::from_vec(valley.bent(straight));
-        let residual = DVector::zeros(4);
-        let mut blocks = vec![Block { columns: vec![0, 1, 2], residual, slopes: slopes(), robust: true }];
-        valley.straighten(&mut blocks, &straight);
-        for column in 0..3 {
-            let step = 1e-6 * straight[column];
-            let mut moved = straight;
-            moved[column] += step;
-            let difference = (value(&moved) - value(&straight)) / step;
-            let slope = blocks[0].slopes.column(column);
-            assert!((difference - slope).amax() < 1e-5 * slope.amax(), "{column}");
-        }
-    }
 }

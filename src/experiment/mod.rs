@@ -2,6 +2,7 @@
 //!
 //! Unknown keys are an error that names the key and the nearest known one.
 
+mod consistency;
 mod model;
 mod render;
 mod rig;
@@ -31,6 +32,12 @@ pub struct Experiment {
     pub model: Model,
     /// How a synthetic recording is made.
     pub render: Render,
+    /// What of the specimen the file does not say, in words; nothing where it says enough.
+    #[serde(skip)]
+    pub missing: Option<String>,
+    /// What in the file is odd, and may yet be true.
+    #[serde(skip)]
+    pub warnings: Vec<String>,
 }
 
 impl Experiment {
@@ -53,6 +60,18 @@ impl Experiment {
         Self::parse(&unmeasured::without(&text), path)
     }
 
+    /// The same for work that needs the specimen.
+    ///
+    /// # Errors
+    /// As [`Experiment::read`], and [`Error::Config`] that asks for what is missing.
+    pub fn read_with_specimen(path: &Path) -> Result<Self> {
+        let experiment = Self::read(path)?;
+        match experiment.missing {
+            Some(message) => Err(Error::Config { path: path.to_owned(), line: None, message }),
+            None => Ok(experiment),
+        }
+    }
+
     /// Parses the text of a file; `path` only appears in errors.
     ///
     /// # Errors
@@ -68,10 +87,15 @@ impl Experiment {
         let keys: toml::Table = toml::from_str(text).map_err(wrong)?;
         experiment.model.states_damping = keys.get("model").is_some_and(|m| m.get("c_eq_n_m_s_per_rad").is_some());
         let invalid = |message: String| Error::Config { path: path.to_owned(), line: None, message };
+        let name = path.file_stem().map_or_else(|| "specimen".into(), std::ffi::OsStr::to_string_lossy);
+        experiment.missing = consistency::missing(&keys);
+        consistency::complete(&mut experiment.specimen, &keys, &name);
         experiment.specimen.validate().map_err(invalid)?;
         experiment.rig.validate().map_err(invalid)?;
         experiment.model.validate().map_err(invalid)?;
         experiment.render.validate().map_err(invalid)?;
+        let odd = consistency::contradictions(&experiment, &keys).map_err(invalid)?;
+        experiment.warnings = odd.into_iter().map(|warning| format!("{}: {warning}", path.display())).collect();
         Ok(experiment)
     }
 }
@@ -79,6 +103,9 @@ impl Experiment {
 /// Turns serde's "unknown field `a`, expected one of `b`, `c`" into a line that proposes the nearest key.
 fn with_nearest_key(message: &str) -> String {
     let message = message.lines().next().unwrap_or_default();
+    if let Some(key) = message.strip_prefix("missing field `").and_then(|rest| rest.strip_suffix('`')) {
+        return format!("`{key}` is missing{}", example(key));
+    }
     let Some(rest) = message.strip_prefix("unknown field ") else {
         return message.to_owned();
     };
@@ -91,6 +118,21 @@ fn with_nearest_key(message: &str) -> String {
         Some((_, key)) => format!("unknown key `{unknown}`; the nearest known one is `{key}`"),
         None => format!("unknown key `{unknown}`; this table takes no keys"),
     }
+}
+
+/// What a key of a table that needs all of its keys means, and how it is written.
+fn example(key: &str) -> String {
+    let known = [
+        ("length_m", "m, pivot to pivot; for example length_m = 0.1727"),
+        ("mass_kg", "kg; for example mass_kg = 0.0938"),
+        ("com_m", "m, from the link's pivot to its centre of mass; for example com_m = 0.1086"),
+        ("inertia_kg_m2", "kg·m², about the centre of mass; for example inertia_kg_m2 = 4.375e-4"),
+        ("torque_n_m", "N·m; for example torque_n_m = 1e-6"),
+        ("yield_rad", "rad; for example yield_rad = 0.03"),
+        ("amplitude_m", "m; for example amplitude_m = 1e-4"),
+        ("frequency_hz", "Hz; for example frequency_hz = 2.0"),
+    ];
+    known.iter().find(|(name, _)| *name == key).map_or(String::new(), |(_, text)| format!(" ({text})"))
 }
 
 /// `value` must be finite and positive.

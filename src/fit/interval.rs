@@ -6,6 +6,7 @@ use super::Problem;
 use super::descent::{Block, Descent, Ending, Outcome};
 use super::problem::stacked;
 use crate::model::Parameter;
+use crate::progress::Progress;
 
 /// 95 % of a normal distribution lie within this many standard deviations.
 const Z95: f64 = 1.959_964;
@@ -16,6 +17,8 @@ const LAGS: usize = 10;
 const CHI2_LAGS: f64 = 29.59;
 /// Points of a profile tried for each end of an interval.
 const PROFILE_POINTS: usize = 8;
+/// Variance of what is left, over the noise's, beyond which an interval is the curvature's: the model is wrong by more than it can tell.
+const FAR_FROM_NOISE: f64 = 25.0;
 /// A combination of parameters is not determined when its logarithm is less certain than this.
 const UNDETERMINED: f64 = 1.0;
 
@@ -58,7 +61,7 @@ pub(super) struct Uncertainty {
 /// white residuals      cov = s² (JᵀJ)⁻¹                                   s² = Σr²/(N − p)
 /// correlated           cov = (JᵀJ)⁻¹ [Σₗ wₗ Σₜ gₜ gₜ₊ₗᵀ] (JᵀJ)⁻¹          gₜ = Jₜᵀ rₜ,  w Bartlett's (Newey and West 1987)
 /// ```
-pub(super) fn uncertainty(problem: &Problem<'_>, outcome: &Outcome) -> Uncertainty {
+pub(super) fn uncertainty(problem: &Problem<'_>, outcome: &Outcome, progress: &dyn Progress) -> Uncertainty {
     let free = problem.free.len();
     let lower = problem.lower();
     let freedom = outcome.residuals().saturating_sub(outcome.x.len()).max(1) as f64;
@@ -73,14 +76,10 @@ pub(super) fn uncertainty(problem: &Problem<'_>, outcome: &Outcome) -> Uncertain
         .map(|i| {
             let profile =
                 Profile { problem, outcome, inverse: &inverse, variance, index: i, sd: sd[i], lower: lower[i] };
-            Estimate {
-                parameter: problem.free[i],
-                value: outcome.x[i],
-                sd: sd[i],
-                low: profile.end(-1.0),
-                high: profile.end(1.0),
-                at_bound: outcome.x[i] <= lower[i],
-            }
+            let [low, high] = [-1.0, 1.0].map(|side| profile.end(side));
+            progress.advance(1);
+            let at_bound = outcome.x[i] <= lower[i];
+            Estimate { parameter: problem.free[i], value: outcome.x[i], sd: sd[i], low, high, at_bound }
         })
         .collect();
     Uncertainty { estimates, correlation, undetermined: undetermined(problem, outcome, &covariance), coloured }
@@ -187,8 +186,8 @@ impl Profile<'_, '_> {
     /// The end of the 95 % interval towards one side.
     fn end(&self, side: f64) -> f64 {
         let value = self.outcome.x[self.index];
-        if self.outcome.ending != Ending::Converged {
-            // there is no minimum to follow a profile from
+        if self.outcome.ending != Ending::Converged || self.variance > FAR_FROM_NOISE {
+            // there is no minimum to follow a profile from, or it is that of a model that is wrong
             return (value + side * Z95 * self.sd).max(self.lower);
         }
         let curved = (self.inverse[(self.index, self.index)] * self.variance).sqrt();

@@ -4,10 +4,16 @@
 //! |---|---|
 //! | [`base`] | what is free unless told otherwise |
 //! | [`record`] | the angles of a recording |
+//! | [`noise`] | its noise, from the angles alone |
+//! | [`seen`] | its modes, without the model |
+//! | [`pace`] | how fast it swings beside the specimen: wrong lengths, clocks and units |
 //! | [`predict`] | what the model says the camera sees |
 //! | [`problem`] | what is fitted to what |
+//! | [`begin`] | where a fit begins: with the seen modes |
 //! | [`shooting`] | multiple shooting: start values that cannot be out of step |
+//! | [`search`] | several beginnings, the best end |
 //! | [`descent`] | Levenberg–Marquardt with bounds |
+//! | [`straight`] | the variables in which a hysteresis is fitted |
 //! | [`interval`] | standard deviations and 95 % intervals |
 //! | [`whitening`] | residuals in units of their noise |
 //! | [`verdict`] | does the model reproduce the recording? |
@@ -16,32 +22,39 @@
 //! initial angles and rates are free.
 
 pub mod base;
+pub mod begin;
 pub mod descent;
 pub mod interval;
+pub mod noise;
+pub mod pace;
 pub mod predict;
 pub mod problem;
 pub mod record;
+mod search;
+pub mod seen;
 pub mod shooting;
+pub mod straight;
 pub mod verdict;
 pub mod whitening;
 
-use crate::error::{Error, Result};
+use crate::error::Result;
 use crate::experiment::Experiment;
 use crate::model::Parameter;
+use crate::progress::{Progress, Silent};
 use crate::statistics::median;
 
 pub use base::base_parameters;
 pub use descent::{Descent, Ending};
 pub use interval::Estimate;
+pub use pace::{Pace, refuse_another_pace};
 pub use predict::Prediction;
 pub use problem::{Belief, Problem};
 pub use record::Record;
+pub use seen::Seen;
 pub use verdict::Verdict;
 
 /// Residuals beyond this many standard deviations of their neighbours are outliers.
 const OUTLIER: f64 = 6.0;
-/// A descent that leaves more than this, over the variance of the noise, is tried from the file's values as well.
-const ASTRAY: f64 = 25.0;
 
 /// A fitted model.
 #[derive(Debug, Clone)]
@@ -82,7 +95,7 @@ pub struct Residuals {
     pub values: Vec<Vec<Residual>>,
     /// Root mean square of each angle.
     pub rmse_rad: Vec<f64>,
-    /// Noise of each angle: what is left when the model may start anew every swing or two.
+    /// Noise of each angle, from the angles alone ([`noise`]).
     pub noise_rad: Vec<f64>,
 }
 
@@ -115,35 +128,38 @@ impl Fit {
 
 /// Fits the free parameters and every recording's start.
 ///
-/// The start values of the parameters are those of `experiment.model`. First multiple shooting ([`shooting`]), then whole recordings as one motion
-/// each, with outliers left out.
+/// It begins with the values of `experiment.model` and, where these lead nowhere, with those that the recordings' modes say ([`begin`]): each time first
+/// multiple shooting ([`shooting`]), then whole recordings as one motion each. The best end is descended from once more with outliers left out.
 ///
 /// # Errors
-/// [`Error::Option`], [`Error::Simulation`]: see [`Problem::new`]; and where no motion near the start values can be integrated.
+/// [`crate::Error::Option`], [`crate::Error::Simulation`]: see [`Problem::new`]; and where no motion near the start values can be integrated.
 pub fn fit(records: &[Record], experiment: &Experiment, free: &[Parameter]) -> Result<Fit> {
-    let mut problem = Problem::new(records, experiment, free)?;
-    let shot = shooting::multiple_shooting(&mut problem)?.x;
-    let noise_rad: Vec<Vec<f64>> = problem.noise.iter().map(|noise| noise.sd_rad.clone()).collect();
-    problem.integrate_below_the_noise();
-    let refused = || Error::Simulation {
-        detail: "no motion near the start values follows the recording; check [specimen] and [model]".into(),
-    };
-    let lower = problem.lower();
-    let robust = Descent { huber: 4.0, most_steps: 30, enough: 0.03, ..Descent::default() };
-    let descended = |start: Vec<f64>| robust.run(start, &lower, |x| problem.blocks(x));
-    // stretches that a model cannot follow may lead astray from values that were near
-    let stated = [problem.start_values()?, shot[free.len()..].to_vec()].concat();
-    let from_stretches = descended(shot);
-    let astray = from_stretches.as_ref().is_none_or(|end| end.cost > ASTRAY * end.residuals() as f64);
-    let from_stated = if astray { descended(stated) } else { None };
-    let ends = [from_stretches, from_stated].into_iter().flatten();
-    let first = ends.min_by(|a, b| a.cost.total_cmp(&b.cost)).ok_or_else(refused)?;
+    fit_watched(records, experiment, free, &Silent)
+}
+
+/// Stages that [`fit_watched`] tells of.
+pub fn stages(free: &[Parameter]) -> u64 {
+    search::STAGES + 1 + free.len() as u64
+}
+
+/// The same, telling how far it is: [`stages`] steps.
+///
+/// # Errors
+/// As [`fit`].
+pub fn fit_watched(
+    records: &[Record],
+    experiment: &Experiment,
+    free: &[Parameter],
+    progress: &dyn Progress,
+) -> Result<Fit> {
+    let noise_rad: Vec<Vec<f64>> = records.iter().map(noise::noise_rad).collect();
+    let (problem, first) = search::best_end(records, experiment, free, &noise_rad, progress)?;
     let (kept, outliers) = without_outliers(&problem, &first.x)?;
     let problem = Problem { records: &kept, ..problem };
-    let outcome = Descent { most_steps: 30, enough: 1e-3, ..Descent::default() }
-        .run(first.x, &lower, |x| problem.blocks(x))
-        .ok_or_else(refused)?;
-    let uncertainty = interval::uncertainty(&problem, &outcome);
+    let descent = Descent { most_steps: 30, enough: 1e-3, ..Descent::default() };
+    let outcome = search::descend(&problem, &descent, first.x).ok_or_else(search::refused)?;
+    progress.advance(1);
+    let uncertainty = interval::uncertainty(&problem, &outcome, progress);
     let residuals = residuals(&problem, &outcome.x, &noise_rad)?;
     Ok(Fit {
         starts: (0..kept.len()).map(|record| problem.seen_start(&outcome.x, record)).collect(),

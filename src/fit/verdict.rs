@@ -1,12 +1,68 @@
 //! Does the model reproduce the recording? The question the paper asks by eye (its Fig. 19), answered with numbers.
 
-use super::Residuals;
+use super::{Ending, Fit, Residuals};
+use crate::model::Parameter;
 
 /// A window whose mean square exceeds the noise's by chance less often than this, all windows taken together, is a misfit.
 const CHANCE: f64 = 1e-3;
 
 /// The noise itself is known to about this share.
 const NOISE_SHARE: f64 = 0.1;
+
+/// A model that reproduces a recording explains this part of each angle's variance; where the noise is more than the rest, nobody can tell.
+const EXPLAINED: f64 = 0.9;
+/// Fewer swings than this are told by their start alone.
+const FEWEST_SWINGS: f64 = 2.0;
+/// A swing is seen where it crosses the middle by this many times the noise to either side.
+const CROSSING: f64 = 3.0;
+
+/// Errors of a clock and of a scale that a camera may have.
+const CLOCK: f64 = 0.05;
+const GAIN: f64 = 0.3;
+
+/// Why a residual without a misfit is no proof that the model reproduces the recording.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Doubt {
+    /// The recording holds only so many swings.
+    TooShort { swings: f64 },
+    /// The noise of an angle is this part of its variance.
+    TooNoisy { link: usize, share: f64 },
+    /// The model explains only this part of an angle's variance.
+    LittleExplained { link: usize, share: f64 },
+    /// The fit was given up before it had converged.
+    NotConverged,
+    /// A clock or a gain so far off is none.
+    Implausible { id: &'static str, value: f64 },
+}
+
+impl Doubt {
+    /// Whether it is about the recording, whatever the model makes of it.
+    fn is_of_recording(self) -> bool {
+        matches!(self, Self::TooShort { .. } | Self::TooNoisy { .. })
+    }
+
+    fn statement(self) -> String {
+        match self {
+            Self::TooShort { swings } => format!(
+                "not judged: the recording holds {swings:.1} swings; with fewer than {FEWEST_SWINGS:.0} the start alone explains it. Record longer."
+            ),
+            Self::TooNoisy { link, share } => format!(
+                "not judged: {:.0} % of the variance of θ{} are noise, in which any misfit hides. Use an earlier or a better stretch.",
+                1e2 * share,
+                link + 1
+            ),
+            Self::LittleExplained { link, share } => format!(
+                "not reproduced: the model explains {:.0} % of the variance of θ{}, and does not follow the motion.",
+                1e2 * share.max(0.0),
+                link + 1
+            ),
+            Self::NotConverged => "not reproduced: the fit has not converged within its budget.".to_owned(),
+            Self::Implausible { id, value } => format!(
+                "not reproduced: the residual is the noise's, but with {id} = {value:.3}, which is no error of a camera: lengths, stamps or units are wrong."
+            ),
+        }
+    }
+}
 
 /// The model beside the recording.
 #[derive(Debug, Clone, PartialEq)]
@@ -19,6 +75,10 @@ pub struct Verdict {
     pub peaks: Vec<Vec<Peak>>,
     /// rms over noise of each angle over the whole recording.
     pub ratio: Vec<f64>,
+    /// Part of each angle's variance that the model explains; negative where it adds to it.
+    pub explained: Vec<f64>,
+    /// Why even a residual at the noise is no proof.
+    pub doubt: Option<Doubt>,
 }
 
 /// Where the model leaves the recording.
@@ -102,31 +162,116 @@ impl Verdict {
             .collect();
         let departs = departure(&windows);
         let ratio = (0..links).map(|l| residuals.rmse_rad[l] / residuals.noise_rad[l].max(1e-300)).collect();
-        Self { departs, peaks: residuals.values.iter().map(|values| peaks(values)).collect(), windows, ratio }
+        let explained: Vec<f64> = residuals.values.iter().map(|values| explained(values)).collect();
+        let peaks = residuals.values.iter().map(|values| peaks(values)).collect();
+        let doubt = doubt(residuals, &explained);
+        Self { departs, peaks, windows, ratio, explained, doubt }
+    }
+
+    /// The same of a fit, which may have been given up, or have bent what nobody may bend.
+    #[must_use]
+    pub fn of_fit(fit: &Fit, record: usize, window_s: f64) -> Self {
+        let verdict = Self::of(&fit.residuals[record], window_s);
+        let of_fit = (fit.ending != Ending::Converged).then_some(Doubt::NotConverged);
+        let implausible = || {
+            let far = |parameter: Parameter, most: f64| {
+                let value = fit.estimate(parameter)?.value;
+                (value.abs() > most).then_some(Doubt::Implausible { id: parameter.id(), value })
+            };
+            far(Parameter::TimeBase, CLOCK).or_else(|| far(Parameter::AngleGain, GAIN))
+        };
+        Self { doubt: verdict.doubt.or(of_fit).or_else(implausible), ..verdict }
     }
 
     /// In words: reproduced or not, from which second on, at which amplitude, how far the phase drifts.
     pub fn statement(&self) -> String {
+        if let Some(doubt) = self.doubt.filter(|doubt| self.departs.is_none() || doubt.is_of_recording()) {
+            return doubt.statement();
+        }
         let Some(departure) = self.departs else {
-            return "reproduced: in no window does the residual exceed the noise.".to_owned();
+            let least = self.explained.iter().copied().fold(1.0, f64::min);
+            return format!(
+                "reproduced: in no window does the residual exceed the noise, and {} of the variance is explained.",
+                share(least)
+            );
         };
         let Departure { link, from_s, amplitude_rad, rms_rad, share } = departure;
-        let last = self.windows.iter().rev().find_map(|w| w.links.get(link)).copied();
+        // of a model that does not follow the motion neither means anything
+        let follows = self.explained[link] >= EXPLAINED;
+        let last = self.windows.iter().rev().find_map(|w| w.links.get(link)).copied().filter(|_| follows);
         let drift = last.map_or(String::new(), |l| {
             format!(" At the end the recording is {:+.1} ms late and {:+.1} % larger.", 1e3 * l.lag_s, 1e2 * l.gain)
         });
+        let little = match self.explained[link] {
+            explained if explained < EXPLAINED => {
+                format!(" The model explains {:.0} % of the variance of θ{}.", 1e2 * explained.max(0.0), link + 1)
+            }
+            _ => String::new(),
+        };
         format!(
-            "not reproduced: from {from_s:.2} s on, at an amplitude of {amplitude_rad:.3} rad, θ{} differs by {:.2} mrad rms; {:.0} % of the windows from there on exceed the noise.{drift}",
+            "not reproduced: from {from_s:.2} s on, at an amplitude of {amplitude_rad:.3} rad, θ{} differs by {:.2} mrad rms; {:.0} % of the windows from there on exceed the noise.{drift}{little}",
             link + 1,
             1e3 * rms_rad,
             1e2 * share,
         )
     }
 
-    /// Whether no window is a misfit.
+    /// Whether no window is a misfit and nothing speaks against it.
     pub fn is_reproduced(&self) -> bool {
-        self.departs.is_none()
+        self.departs.is_none() && self.doubt.is_none()
     }
+}
+
+/// A share in per cent that never rounds to all of it.
+fn share(of: f64) -> String {
+    if of > 0.9999 { "more than 99.99 %".to_owned() } else { format!("{:.2} %", 1e2 * of) }
+}
+
+/// Part of the variance about the mean that the model explains.
+fn explained(values: &[super::Residual]) -> f64 {
+    let left: f64 = values.iter().map(|r| r.left_rad().powi(2)).sum();
+    1.0 - left / (variance(values) * values.len() as f64).max(1e-300)
+}
+
+fn variance(values: &[super::Residual]) -> f64 {
+    let n = values.len().max(1) as f64;
+    let middle = values.iter().map(|r| r.measured_rad).sum::<f64>() / n;
+    values.iter().map(|r| (r.measured_rad - middle).powi(2)).sum::<f64>() / n
+}
+
+fn doubt(residuals: &Residuals, explained: &[f64]) -> Option<Doubt> {
+    let swings = |(values, noise_rad): (&Vec<super::Residual>, &f64)| swings(values, CROSSING * noise_rad);
+    let swings = residuals.values.iter().zip(&residuals.noise_rad).map(swings).fold(0.0, f64::max);
+    let noisy = |link: usize| {
+        let share = residuals.noise_rad[link].powi(2) / variance(&residuals.values[link]).max(1e-300);
+        (share > 1.0 - EXPLAINED).then_some(Doubt::TooNoisy { link, share: share.min(1.0) })
+    };
+    let links = 0..explained.len();
+    let least = links.clone().min_by(|a, b| explained[*a].total_cmp(&explained[*b]));
+    let little =
+        |link: usize| (explained[link] < EXPLAINED).then_some(Doubt::LittleExplained { link, share: explained[link] });
+    (swings < FEWEST_SWINGS)
+        .then_some(Doubt::TooShort { swings })
+        .or_else(|| links.clone().find_map(noisy))
+        .or_else(|| least.and_then(little))
+}
+
+/// Swings from the first to the last crossing of the middle, which is left by some angle to either side between them.
+fn swings(values: &[super::Residual], beyond_rad: f64) -> f64 {
+    let (low, high) = values
+        .iter()
+        .fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), r| (low.min(r.measured_rad), high.max(r.measured_rad)));
+    let mean = values.iter().map(|r| r.measured_rad).sum::<f64>() / values.len().max(1) as f64;
+    let beyond_rad = beyond_rad.min(0.25 * (high - low));
+    let (mut crossings, mut side) = (0usize, 0.0);
+    for r in values {
+        let off_rad = r.measured_rad - mean;
+        if off_rad.abs() > beyond_rad && off_rad.signum() != side {
+            crossings += usize::from(side != 0.0);
+            side = off_rad.signum();
+        }
+    }
+    0.5 * crossings as f64
 }
 
 fn judge(values: &[super::Residual], noise_rad: f64, chance: f64) -> WindowLink {

@@ -80,7 +80,7 @@ impl DiagnoseArgs {
     /// One line: what, where, what to do.
     pub fn run(&self) -> Result<()> {
         self.figure.as_deref().map(check_figure).transpose()?;
-        let experiment = Experiment::read(&self.config)?;
+        let experiment = super::read_experiment(&self.config)?;
         if self.detectable {
             return self.plan(&experiment);
         }

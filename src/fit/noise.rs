@@ -1,0 +1,195 @@
+//! The noise of a recording, from its angles alone: what no motion as smooth as the recording's own can explain.
+//!
+//! It knows no model, so a model that does not fit cannot raise it. Two methods, each of which counts some motion with the noise and never less than the
+//! noise; so the smaller is taken.
+//!
+//! ```text
+//! Neighbours     of d + 1 rows at their true times the divided difference of order d,  Σ wₖθₖ with wₖ ∝ Πⱼ 1/(tₖ − tⱼ), |w| = 1:  a motion of frequency f
+//!                leaves (2 sin πfΔt)^d / √(2d choose d) of itself, noise leaves all
+//! Subspace       of all stretches of L rows, steps even, the r directions that hold most of their power are the motion's (Hankel matrix; Broomhead and
+//!                King, Physica D 20 (1986) 217); from one half of the recording they are learnt, in the other the mean power of the L − r others is σ²
+//! ```
+
+use nalgebra::{DMatrix, SymmetricEigen};
+
+use super::Record;
+use crate::statistics::{median, median_step_s};
+
+/// Orders of the differences. Higher ones suppress motion better, and need more rows without a gap.
+const ORDERS: std::ops::RangeInclusive<usize> = 2..=10;
+/// Rows of a stretch.
+const LENGTHS: [usize; 3] = [16, 32, 48];
+/// Parts of a stretch's directions that the motion may take.
+const OF_MOTION: [f64; 3] = [0.25, 0.5, 0.75];
+/// Each half of a recording has this many stretches for every row of one.
+const STRETCHES: usize = 2;
+/// Steps are even within this part of the usual one.
+const EVEN: f64 = 0.1;
+/// Differences beyond this many robust standard deviations are outliers'.
+const APART: f64 = 6.0;
+/// Where more than this part stands apart, that is how the noise is.
+const MOST_APART: f64 = 0.1;
+/// An exact table still has the digits it was written with.
+const LEAST_RAD: f64 = 1e-9;
+
+/// Standard deviation of each angle's noise.
+pub fn noise_rad(record: &Record) -> Vec<f64> {
+    record.theta_rad.iter().map(|angles| of_angle(&record.t_s, angles)).collect()
+}
+
+fn of_angle(t_s: &[f64], angles: &[Option<f64>]) -> f64 {
+    let step_s = median_step_s(t_s).unwrap_or(1.0);
+    let differences = ORDERS.filter_map(|order| Differences::of(t_s, angles, step_s, order));
+    let Some(neighbours) = differences.min_by(|a, b| a.sd.total_cmp(&b.sd)) else { return LEAST_RAD };
+    let mut kept = angles.to_vec();
+    neighbours.apart.iter().for_each(|rows| kept[rows.clone()].fill(None));
+    let subspace = LENGTHS.iter().filter_map(|length| beside_the_motion(t_s, &kept, step_s, *length));
+    subspace.fold(neighbours.sd, f64::min).max(LEAST_RAD)
+}
+
+/// Normalised divided differences of one order.
+struct Differences {
+    sd: f64,
+    /// Rows of those that stand apart.
+    apart: Vec<std::ops::Range<usize>>,
+}
+
+impl Differences {
+    fn of(t_s: &[f64], angles: &[Option<f64>], step_s: f64, order: usize) -> Option<Self> {
+        let at = |first: usize| {
+            let rows = first..first + order + 1;
+            let gapless = t_s[rows.end - 1] - t_s[first] < (order as f64 + 0.9) * step_s;
+            let values: Option<Vec<f64>> = angles[rows.clone()].iter().copied().collect();
+            Some((rows.clone(), difference(&t_s[rows], &values.filter(|_| gapless)?, step_s)))
+        };
+        let all: Vec<_> = (0..t_s.len().saturating_sub(order)).filter_map(at).collect();
+        if all.len() < 2 * order {
+            return None;
+        }
+        let mut sizes: Vec<f64> = all.iter().map(|(_, d)| d.abs()).collect();
+        let limit = APART * 1.4826 * median(&mut sizes)?;
+        let (near, apart): (Vec<_>, Vec<_>) = all.into_iter().partition(|(_, d)| d.abs() <= limit);
+        let square = |of: &[(std::ops::Range<usize>, f64)]| of.iter().map(|(_, d)| d * d).sum::<f64>();
+        if apart.len() as f64 > MOST_APART * (near.len() + apart.len()) as f64 {
+            let sd = ((square(&near) + square(&apart)) / (near.len() + apart.len()) as f64).sqrt();
+            return Some(Self { sd, apart: Vec::new() });
+        }
+        let sd = (square(&near) / near.len() as f64).sqrt();
+        Some(Self { sd, apart: apart.into_iter().map(|(rows, _)| rows).collect() })
+    }
+}
+
+/// Σ wₖθₖ.
+fn difference(t_s: &[f64], values: &[f64], step_s: f64) -> f64 {
+    let weight = |k: usize| {
+        let others = (0..t_s.len()).filter(|j| *j != k);
+        others.map(|j| step_s / (t_s[k] - t_s[j])).product::<f64>()
+    };
+    let weights: Vec<f64> = (0..t_s.len()).map(weight).collect();
+    let norm = weights.iter().map(|w| w * w).sum::<f64>().sqrt();
+    weights.iter().zip(values).map(|(w, v)| w * v).sum::<f64>() / norm
+}
+
+/// The noise beside the subspace of the motion in stretches of `length` rows; `None` where there are too few.
+fn beside_the_motion(t_s: &[f64], angles: &[Option<f64>], step_s: f64, length: usize) -> Option<f64> {
+    let even = |rows: &std::ops::Range<usize>| {
+        t_s[rows.clone()].windows(2).all(|pair| (pair[1] - pair[0] - step_s).abs() <= EVEN * step_s)
+    };
+    let stretch = |first: usize| {
+        let rows = first..first + length;
+        let values: Option<Vec<f64>> = angles[rows.clone()].iter().copied().collect();
+        values.filter(|_| even(&rows))
+    };
+    let middle = t_s.len() / 2;
+    let halves = [0..(middle + 1).saturating_sub(length), middle..(t_s.len() + 1).saturating_sub(length)];
+    let powers = halves.map(|firsts| {
+        let (mut power, mut count) = (DMatrix::<f64>::zeros(length, length), 0);
+        for values in firsts.filter_map(stretch) {
+            let values = nalgebra::DVector::from_vec(values);
+            power.syger(1.0, &values, &values, 1.0);
+            count += 1;
+        }
+        power.fill_upper_triangle_with_lower_triangle();
+        (count >= STRETCHES * length).then(|| power / f64::from(count.max(1) as u32))
+    });
+    let [Some(first), Some(second)] = powers else { return None };
+    let across = |learnt: &DMatrix<f64>, held: &DMatrix<f64>| {
+        let eigen = SymmetricEigen::new(learnt.clone());
+        let mut order: Vec<usize> = (0..length).collect();
+        order.sort_by(|a, b| eigen.eigenvalues[*a].total_cmp(&eigen.eigenvalues[*b]));
+        let along: Vec<f64> = order
+            .iter()
+            .map(|k| {
+                let direction = eigen.eigenvectors.column(*k);
+                direction.dot(&(held * direction)).max(0.0)
+            })
+            .collect();
+        let beside = |share: &f64| {
+            let kept = length - (share * length as f64) as usize;
+            along[..kept].iter().sum::<f64>() / kept as f64
+        };
+        OF_MOTION.iter().map(beside).fold(f64::INFINITY, f64::min)
+    };
+    Some(across(&first, &second).min(across(&second, &first)).sqrt())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use rand::{RngExt, SeedableRng};
+    use rand_distr::{Distribution, StandardNormal};
+
+    const NOISE_RAD: f64 = 1e-3;
+
+    /// Two modes, the second near a third of the rate, whose frequency falls with amplitude.
+    fn swing(t_s: f64) -> f64 {
+        let decayed = (-0.05 * t_s).exp();
+        0.5 * decayed * (8.5 * t_s * (1.0 + 0.005 * decayed)).cos() + 0.1 * (-0.1 * t_s).exp() * (60.0 * t_s).cos()
+    }
+
+    fn record(t_s: Vec<f64>, seed: u64) -> Record {
+        let mut random = rand::rngs::StdRng::seed_from_u64(seed);
+        let noisy = |t: &f64| {
+            let noise: f64 = StandardNormal.sample(&mut random);
+            Some(swing(*t) + NOISE_RAD * noise)
+        };
+        let theta_rad = vec![t_s.iter().map(noisy).collect()];
+        Record { path: "swing".into(), relative_sd: vec![vec![1.0; t_s.len()]], t_s, theta_rad, in_step: 0.0 }
+    }
+
+    fn is_noise(record: &Record, tolerance: f64) {
+        let found = noise_rad(record)[0];
+        assert!((found / NOISE_RAD - 1.0).abs() < tolerance, "{found}");
+    }
+
+    #[test]
+    fn a_fast_second_mode_is_not_taken_for_noise() {
+        for seed in 0..4 {
+            is_noise(&record((0..600).map(|i| f64::from(i) / 30.0).collect(), seed), 0.1);
+        }
+    }
+
+    #[test]
+    fn outliers_and_gaps_are_not_either() {
+        let mut record = record((0..900).map(|i| f64::from(i) / 30.0).collect(), 5);
+        for row in [40, 41, 333, 512] {
+            record.theta_rad[0][row] = Some(1.5);
+        }
+        record.theta_rad[0][200..290].fill(None);
+        is_noise(&record, 0.15);
+    }
+
+    #[test]
+    fn stamps_that_jitter_are_no_noise_where_they_are_true() {
+        let mut random = rand::rngs::StdRng::seed_from_u64(9);
+        let t_s = (0..1200).map(|i| f64::from(i) / 120.0 + 0.003 * random.random_range(-1.0..1.0)).collect();
+        is_noise(&record(t_s, 6), 0.15);
+    }
+
+    #[test]
+    fn a_table_without_noise_has_hardly_any() {
+        let mut record = record((0..600).map(|i| f64::from(i) / 30.0).collect(), 0);
+        record.theta_rad[0] = record.t_s.iter().map(|t| Some(swing(*t))).collect();
+        assert!(noise_rad(&record)[0] < 1e-5);
+    }
+}

@@ -1,0 +1,196 @@
+//! How fast the recording swings beside how fast the specimen would: a wrong length, time base or unit, in words.
+
+use std::f64::consts::PI;
+
+use super::begin::{slow_mode_hz, undamped};
+use super::{Record, Seen};
+use crate::error::{Error, Result};
+use crate::experiment::Experiment;
+
+/// Below this share the air that swings along, a joint or a clock may be the reason: it is said beside them.
+const LARGE: f64 = 0.15;
+/// Below this share a difference is no news.
+const SMALL: f64 = 0.005;
+/// Beyond this ratio no motion of the model can follow the recording at all, and its least squares mean nothing. Units differ by more: a square root of 39 for
+/// inches, of 100 and of 1000 for centimetres and millimetres.
+const HOPELESS: f64 = 5.0;
+/// A factor is that of a unit within this share.
+const UNIT: f64 = 0.05;
+/// Lengths stated in these units stand in metres this many times too large.
+const LENGTH_UNITS: [(f64, &str); 4] =
+    [(1000.0, "millimetres"), (100.0, "centimetres"), (39.37, "inches"), (3.281, "feet")];
+/// Stamps in these units stand in seconds this many times too large.
+const TIME_UNITS: [(f64, &str); 3] = [(1e6, "microseconds"), (1e3, "milliseconds"), (1.0 / 60.0, "minutes")];
+/// Frames a second of a slow-motion film, over those it plays at.
+const SLOW_MOTIONS: [f64; 5] = [2.0, 4.0, 8.0, 16.0, 32.0];
+/// Angles of which one measured part in this of its own is the same as the model's.
+const SHAPE: f64 = 0.1;
+
+/// The frequencies of the slow mode, seen and modelled.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Pace {
+    /// As seen, at small amplitude.
+    pub seen_hz: f64,
+    /// Of the specimen with the joints as they are, or as stiff or as soft as they may be, whichever comes nearest.
+    pub model_hz: f64,
+    /// Half the 95 % interval of the ratio, as a share.
+    half: f64,
+    length_m: f64,
+    links: usize,
+    gravity_m_s2: f64,
+    /// What the angles themselves say.
+    pub shape: Option<String>,
+}
+
+impl Pace {
+    /// Of what a recording shows and what an experiment's specimen does.
+    pub fn of(seen: &Seen, experiment: &Experiment) -> Option<Self> {
+        let [low_hz, high_hz] = slow_mode_hz(experiment)?;
+        let seen_hz = seen.slow.frequency_hz;
+        Some(Self {
+            seen_hz,
+            model_hz: seen_hz.clamp(low_hz, high_hz),
+            half: seen.slow.frequency_half_hz / seen_hz,
+            length_m: experiment.specimen.lengths_m().iter().sum(),
+            links: experiment.specimen.lengths_m().len(),
+            gravity_m_s2: experiment.rig.gravity_m_s2,
+            shape: shape(seen, experiment),
+        })
+    }
+
+    /// How many times as fast as the specimen the recording swings.
+    pub fn ratio(&self) -> f64 {
+        self.seen_hz / self.model_hz
+    }
+
+    /// Whether the two differ by more than the recording leaves open.
+    pub fn differs(&self) -> bool {
+        (self.ratio() - 1.0).abs() > SMALL.max(2.0 * self.half)
+    }
+
+    /// What differs and what would explain it; `None` where nothing does.
+    pub fn statement(&self) -> Option<String> {
+        let pace = self.differs().then(|| self.explained());
+        let parts: Vec<String> = pace.into_iter().chain(self.shape.clone()).collect();
+        (!parts.is_empty()).then(|| parts.join(" "))
+    }
+
+    fn explained(&self) -> String {
+        let ratio = self.ratio();
+        let (times, way) = if ratio > 1.0 { (ratio, "faster") } else { (1.0 / ratio, "slower") };
+        let body = if self.links == 1 { "a pendulum" } else { "a specimen" };
+        let mut text = format!(
+            "The recording swings {} times {way} than {body} of {} m as the file describes it ({:.4} Hz, {:.4} Hz): ",
+            digits(times),
+            digits(self.length_m),
+            self.seen_hz,
+            self.model_hz
+        );
+        let length = 1.0 / (ratio * ratio);
+        text += &format!("{} m would", digits(self.length_m * length));
+        let near = |factor: f64, of: f64| (factor / of - 1.0).abs() < UNIT;
+        match LENGTH_UNITS.iter().find(|(factor, _)| near(1.0 / length, *factor)) {
+            Some((_, unit)) => text += &format!(" (the lengths look like {unit})"),
+            None => text += ", if the lengths are wrong or in another unit",
+        }
+        text += &format!("; or the time base is: true time would be {} times the stamps", digits(ratio));
+        if let Some((_, unit)) = TIME_UNITS.iter().find(|(factor, _)| near(ratio, 1.0 / factor)) {
+            text += &format!(" (t_s looks like {unit})");
+        } else if let Some(frames) = SLOW_MOTIONS.iter().find(|frames| near(ratio, 1.0 / **frames)) {
+            text += &format!(" (slow motion, played {frames} times slower?)");
+        } else if let Some(frames) = SLOW_MOTIONS.iter().find(|frames| near(ratio, **frames)) {
+            text += &format!(" (every {frames}th frame kept, or a time lapse?)");
+        }
+        text +=
+            &format!("; or gravity is {} m/s², not {}", digits(self.gravity_m_s2 * ratio * ratio), self.gravity_m_s2);
+        text += "; or the masses and inertias are not as stated";
+        if (ratio - 1.0).abs() < LARGE {
+            text += "; or an effect is missing that changes the frequency (added_mass, hinge_stiffness)";
+        }
+        text + "."
+    }
+}
+
+/// Before a fit: a recording whose pace no motion of the model comes near cannot be fitted.
+///
+/// # Errors
+/// [`Error::Table`] with the factor, where nothing in the recording swings within a factor of five of the specimen.
+pub fn refuse_another_pace(record: &Record, seen: &Seen, experiment: &Experiment) -> Result<()> {
+    let Some(pace) = Pace::of(seen, experiment) else { return Ok(()) };
+    let is_near = |hz: f64| (hz / pace.model_hz).ln().abs() < HOPELESS.ln();
+    if is_near(pace.seen_hz) || seen.peaks_hz.iter().any(|hz| is_near(*hz)) {
+        return Ok(());
+    }
+    let message = format!("cannot be fitted. {}", pace.explained());
+    Err(Error::Table { path: record.path.clone(), line: None, message: message.trim_end_matches('.').to_owned() })
+}
+
+/// What the angles of the slow mode say: degrees, a turned sign, columns that are swapped, angles from one link to the next.
+fn shape(seen: &Seen, experiment: &Experiment) -> Option<String> {
+    let model = undamped(experiment)?;
+    let model = model.first()?;
+    degrees(seen, model.frequency_hz).or_else(|| {
+        let first = model.shape.first()?;
+        let modelled: Vec<f64> =
+            model.shape.iter().map(|c| c.amplitude / first.amplitude * (c.phase_rad - first.phase_rad).cos()).collect();
+        if experiment.model.effects.distributed_flexibility.is_some() || modelled.len() != seen.slow.shape.len() {
+            return None;
+        }
+        (1..modelled.len()).find_map(|link| {
+            let (measured, ratio) = (seen.slow.shape[link], modelled[link]);
+            let (upper, lower) = (link, link + 1);
+            let near = |value: f64| (value / ratio - 1.0).abs() < SHAPE;
+            let size = measured.norm();
+            let against = (PI - measured.arg().abs()).abs() < 0.3;
+            let together = measured.arg().abs() < 0.3;
+            if against && ratio > 0.0 {
+                return Some(format!(
+                    "In the slow mode θ1 and θ{lower} swing against each other, of the specimen together: the sign of one of the angles is turned."
+                ));
+            }
+            if !together || near(size) || modelled.len() > 2 {
+                return None;
+            }
+            if near(1.0 / size) {
+                return Some(format!(
+                    "In the slow mode θ{lower} is {size:.2} times θ{upper}, of the specimen {ratio:.2} times: the columns look swapped."
+                ));
+            }
+            near(1.0 + size).then(|| format!(
+                "In the slow mode θ{lower} is {size:.2} times θ{upper}, of the specimen {ratio:.2} times: θ{lower} looks like the angle from link to link; freeswing wants it from the vertical."
+            ))
+        })
+    })
+}
+
+/// A swing of this angle in radians would be slower by T/T₀ = 1/agm(1, cos A/2).
+fn degrees(seen: &Seen, model_hz: f64) -> Option<String> {
+    let amplitude_rad = seen.slow.amplitude_rad.min(3.0);
+    let slowed = agm(1.0, (0.5 * amplitude_rad).cos());
+    let as_small = (seen.slow.mean_frequency_hz / model_hz - 1.0).abs();
+    (1.0 - slowed > 0.03 && as_small < 0.2 * (1.0 - slowed)).then(|| {
+        format!(
+            "The recording swings at {:.4} Hz as small angles do, although they reach {amplitude_rad:.1}: in radians it would be {:.4} Hz. The angles look like degrees; multiply them by π/180.",
+            seen.slow.mean_frequency_hz,
+            slowed * model_hz
+        )
+    })
+}
+
+/// Arithmetic-geometric mean.
+fn agm(mut a: f64, mut b: f64) -> f64 {
+    for _ in 0..20 {
+        (a, b) = (0.5 * (a + b), (a * b).sqrt());
+    }
+    a
+}
+
+/// Three significant digits.
+fn digits(value: f64) -> String {
+    let magnitude = value.abs().max(1e-12).log10().floor() as i32;
+    if !(-4..6).contains(&magnitude) {
+        return format!("{value:.2e}");
+    }
+    let text = format!("{value:.*}", (2 - magnitude).max(0) as usize);
+    if text.contains('.') { text.trim_end_matches('0').trim_end_matches('.').to_owned() } else { text }
+}
