@@ -184,14 +184,51 @@ impl<'a> Session<'a> {
         &self.stamps_s
     }
 
+    /// Pictures spread over the recording.
+    pub fn album(&self) -> &Album {
+        &self.album
+    }
+
+    /// Its stream.
+    pub fn stream(&self) -> &StreamInfo {
+        &self.stream
+    }
+
+    /// What is known of the camera's motion.
+    pub fn camera(&self) -> Camera {
+        self.camera
+    }
+
     /// Measures every frame.
     ///
     /// # Errors
     /// As [`measure`].
     pub fn run(&mut self, progress: &dyn Progress) -> Result<Measurement> {
-        let rig = &self.options.rig;
+        let mut tracker = Tracker::new(self.slots.clone(), self.options.rig.pivot_px);
         let detector = Detector::new(self.hues.clone());
-        let mut tracker = Tracker::new(self.slots.clone(), rig.pivot_px);
+        let decoded = self.each_frame(&detector, progress, &mut |frame| tracker.push(frame))?;
+        self.conclude(decoded, tracker)
+    }
+
+    /// Everything of these hues in every frame.
+    ///
+    /// # Errors
+    /// As [`measure`].
+    pub fn gather(&mut self, hues: Vec<Hue>, progress: &dyn Progress) -> Result<Vec<FrameBlobs>> {
+        let detector = Detector::new(hues);
+        let mut frames = Vec::new();
+        self.each_frame(&detector, progress, &mut |frame| frames.push(frame))?;
+        self.camera.finish(self.stamps_s.len());
+        Ok(frames)
+    }
+
+    fn each_frame(
+        &mut self,
+        detector: &Detector,
+        progress: &dyn Progress,
+        sink: &mut dyn FnMut(FrameBlobs),
+    ) -> Result<Decoded> {
+        let rig = &self.options.rig;
         progress.begin("tracking", self.stream.stated_frames);
         let view = View {
             orientation: self.stream.orientation,
@@ -209,10 +246,10 @@ impl<'a> Session<'a> {
             }
             stamps_s.push(frame.value.t_s);
             camera.note(&frame.value);
-            tracker.push(frame_blobs(frame));
+            sink(frame_blobs(frame));
         };
         let decoded =
-            self.recording.decode_in_order(self.options.workers, &|f| view.look(&detector, &f), &mut |outcome| {
+            self.recording.decode_in_order(self.options.workers, &|f| view.look(detector, &f), &mut |outcome| {
                 if progress.is_cancelled() {
                     return Err(Error::Interrupted);
                 }
@@ -221,7 +258,7 @@ impl<'a> Session<'a> {
                 Ok(())
             })?;
         spread.finish().for_each(&mut take);
-        self.conclude(decoded, tracker)
+        Ok(decoded)
     }
 
     fn conclude(&mut self, decoded: Decoded, tracker: Tracker) -> Result<Measurement> {

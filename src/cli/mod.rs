@@ -4,6 +4,7 @@ mod bar;
 mod diagnose;
 mod fit;
 mod identify;
+mod init;
 mod modes;
 mod paper;
 mod render;
@@ -34,6 +35,7 @@ pub struct Cli {
 
 #[derive(Debug, Subcommand)]
 enum Command {
+    Init(init::InitArgs),
     Track(track::TrackArgs),
     Identify(identify::IdentifyArgs),
     Fit(fit::FitArgs),
@@ -56,6 +58,7 @@ impl Cli {
     /// Runs the command.
     pub fn run() -> ExitCode {
         exit(match Self::parse().command {
+            Command::Init(args) => args.run(),
             Command::Track(args) => args.run(),
             Command::Fit(args) => args.run(),
             Command::Diagnose(args) => args.run(),
