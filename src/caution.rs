@@ -17,6 +17,8 @@ const LEAST_SQUEEZE: f64 = 0.03;
 /// Noise of a mark that calls for a word: a quarter of a pixel, and half a hundredth of the mark's width.
 const MOST_NOISE_PX: f64 = 0.25;
 const NOISE_OF_WIDTH: f64 = 0.005;
+/// Things that are listed one by one.
+const LISTED: usize = 4;
 /// Rates at which cameras record slow motion, and rates at which they play it.
 const SLOW_MOTION: [(f64, f64); 8] = [
     (120.0, 30.0),
@@ -51,6 +53,10 @@ fn spares(m: &Measurement) -> Vec<String> {
         let chosen = m.tracks.spares.iter().filter(|s| s.moves == moves);
         chosen.map(|s| format!("({:.0}, {:.0})", s.position_px[0], s.position_px[1])).collect()
     };
+    let places = |all: &[String]| {
+        let more = if all.len() > LISTED { ", …" } else { "" };
+        format!("{}{more}", all[..all.len().min(LISTED)].join(", "))
+    };
     let (moving, still) = (listed(true), listed(false));
     let marks = m.tracks.marks.len();
     let mut said = Vec::new();
@@ -60,7 +66,7 @@ fn spares(m: &Measurement) -> Vec<String> {
             moving.len(),
             if moving.len() == 1 { "" } else { "s" },
             if moving.len() == 1 { "s" } else { "" },
-            moving.join(" and "),
+            places(&moving),
             if moving.len() == 1 { "was" } else { "were" },
             marks + moving.len(),
             if moving.len() == 1 { "it is" } else { "they are" },
@@ -73,7 +79,7 @@ fn spares(m: &Measurement) -> Vec<String> {
             if still.len() == 1 { "" } else { "s" },
             if still.len() == 1 { "s" } else { "" },
             if still.len() == 1 { "was" } else { "were" },
-            still.join(" and "),
+            places(&still),
         ));
     }
     said
@@ -193,7 +199,10 @@ fn blur(m: &Measurement, mark: usize) -> Option<String> {
     let exposure_s = slope / width_px;
     let fastest = rows[rows.len() - 1 - rows.len() / 50][0];
     let blur_px = exposure_s * fastest;
-    (blur_px > width_px && exposure_s.is_finite()).then(|| {
+    // an exposure is no longer than a frame
+    let step_s = m.timing.median_step_s / m.time_scale;
+    let possible = a1 > 1.15 * a0 && exposure_s > 0.0 && exposure_s < 1.1 * step_s;
+    (blur_px > width_px && possible).then(|| {
         format!(
             "mark {} is smeared over {blur_px:.0} px where it is fastest, more than its width of {width_px:.0} px: the exposure is about 1/{:.0} s; set it to 1/{:.0} s or shorter, with more light",
             mark + 1,

@@ -295,13 +295,14 @@ struct Lookout {
     points_px: Vec<[f64; 2]>,
     background: Option<Background>,
     greatest_px: f64,
+    agreed: Vec<Vec<bool>>,
 }
 
 impl Lookout {
     fn new(options: &Options, stream: &StreamInfo) -> Self {
         let stored = |p: &[f64; 2]| stream.orientation.stored_point(*p, stream.stored_size_px);
         let points_px = options.rig.reference_marks.iter().map(stored).collect();
-        Self { points_px, background: None, greatest_px: 0.0 }
+        Self { points_px, background: None, greatest_px: 0.0, agreed: Vec::new() }
     }
 
     fn see(&mut self, frame: &Frame<'_>) {
@@ -310,6 +311,7 @@ impl Lookout {
             Some(background) => {
                 if let Some(camera) = background.locate(&frame.picture) {
                     self.greatest_px = self.greatest_px.max(camera.size_px());
+                    self.agreed.push(background.agreeing(&frame.picture, &camera));
                 }
             }
         }
@@ -322,7 +324,9 @@ impl Lookout {
             Steadying::WhereNeeded => !self.points_px.is_empty() || self.greatest_px > CAMERA_MOVES_PX,
         };
         let camera = Camera { greatest_shift_px: self.greatest_px, taken_out, ..Camera::default() };
-        (self.background.filter(|_| taken_out), camera)
+        let mut background = self.background.filter(|_| taken_out);
+        background.iter_mut().for_each(|b| b.keep_steady(&self.agreed));
+        (background, camera)
     }
 }
 

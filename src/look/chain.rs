@@ -9,6 +9,13 @@ const MOST_STRETCH: f64 = 0.15;
 const MOST_OFF_ARC: f64 = 0.12;
 /// ln of the ratio of areas beyond which two marks of one look are unlike.
 const MOST_UNLIKE: f64 = 1.0;
+/// What a thing of the marks' look that swings, and is none, takes from it.
+const STRAY: f64 = 0.2;
+/// Change of the distance from a still thing, over the motion, up to which it is the hinge though the arc's centre is
+/// elsewhere: the plane of the swing is turned, and the arc an ellipse. And how far it may lie off the line towards
+/// that centre, rad.
+const HINGE_STRETCH: f64 = 0.1;
+const HINGE_OFF_LINE_RAD: f64 = 0.1;
 /// Share of the frames in which a mark is seen, at least.
 const LEAST_PRESENCE: f64 = 0.4;
 /// How much farther a lower mark swings than an upper one, from which on that decides which is which.
@@ -34,10 +41,10 @@ pub fn longest(things: &[Thing], names: &[String]) -> Option<Chain> {
     let best = (0..names.len() as u8)
         .filter_map(|hue| of_look(things, &|t| t.hue == hue, hued(hue)))
         .max_by(|a, b| a.worth.total_cmp(&b.worth))?;
-    let hue = things[best.marks[0]].hue;
     // marks of several colours: what swings with the chain and is like its marks
-    let coloured = hued(hue).then(|| of_look(things, &|t| hued(t.hue), true)).flatten();
-    Some(coloured.filter(|c| c.marks.len() > best.marks.len()).unwrap_or(best))
+    let coloured = of_look(things, &|t| hued(t.hue), true);
+    let wins = |c: &Chain| (c.marks.len(), c.worth) > (best.marks.len(), best.worth);
+    Some(coloured.filter(wins).unwrap_or(best))
 }
 
 fn of_look(things: &[Thing], belongs: &dyn Fn(&Thing) -> bool, hued: bool) -> Option<Chain> {
@@ -46,6 +53,7 @@ fn of_look(things: &[Thing], belongs: &dyn Fn(&Thing) -> bool, hued: bool) -> Op
         .collect();
     movers.sort_by(|a, b| things[*b].presence.total_cmp(&things[*a].presence));
     let movers = distinct(things, &movers);
+    let crowd = movers.len();
     // every mover may be the one that the others are like; the largest set counts
     let sets = movers.iter().map(|first| rigid_set(things, &movers, *first));
     let mut marks = sets.max_by(|a, b| value(things, a).total_cmp(&value(things, b)))?;
@@ -64,7 +72,8 @@ fn of_look(things: &[Thing], belongs: &dyn Fn(&Thing) -> bool, hued: bool) -> Op
         hinge_marked = true;
     }
     // a hue tells a mark from what is printed on it or shines on it
-    let worth = value(things, &marks) + if hued { 0.5 } else { 0.0 };
+    let strays = crowd.saturating_sub(marks.len()) as f64;
+    let worth = value(things, &marks) + if hued { 0.5 } else { 0.0 } - STRAY * strays;
     Some(Chain { marks, arc, hinge_marked, worth })
 }
 
@@ -135,11 +144,15 @@ fn hinge(things: &[Thing], belongs: &dyn Fn(&Thing) -> bool, arc: &Arc, first: u
     let like = |t: &Thing| (t.area_px2 / things[first].area_px2).ln().abs() < MOST_UNLIKE;
     let still = |t: &Thing| t.travel_px < 0.1 * things[first].travel_px;
     let stays = |t: &Thing| t.stretch(&things[first]) < MOST_STRETCH;
+    let middle = things[first].place_px();
+    let towards = |p: [f64; 2]| (p[1] - middle[1]).atan2(p[0] - middle[0]);
+    let on_line = |t: &Thing| {
+        let turn = towards(t.place_px()) - towards(arc.centre_px);
+        turn.sin().abs() < HINGE_OFF_LINE_RAD && turn.cos() > 0.0 && t.stretch(&things[first]) < HINGE_STRETCH
+    };
+    let fits = |t: &Thing| belongs(t) && t.presence > LEAST_PRESENCE && still(t) && like(t) && stays(t);
     (0..things.len())
-        .filter(|i| {
-            *i != first && belongs(&things[*i]) && still(&things[*i]) && like(&things[*i]) && stays(&things[*i])
-        })
-        .filter(|i| things[*i].presence > LEAST_PRESENCE && off(&things[*i]) < 1.0)
+        .filter(|i| *i != first && fits(&things[*i]) && (off(&things[*i]) < 1.0 || on_line(&things[*i])))
         .min_by(|a, b| off(&things[*a]).total_cmp(&off(&things[*b])))
 }
 

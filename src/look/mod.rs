@@ -15,7 +15,7 @@ pub use preview::preview;
 
 use std::path::Path;
 
-use crate::detect::{Album, Hue};
+use crate::detect::{Album, Hue, Trial};
 use crate::error::{Error, Result};
 use crate::experiment::MarkColour;
 use crate::measure::{Camera, Options, Session};
@@ -27,6 +27,8 @@ use crate::video::{StreamInfo, Timing};
 const MOST_HUES: usize = 6;
 /// Hues weaker than this share of the strongest are noise, or too small to be marks.
 const LEAST_WEIGHT: f64 = 2e-3;
+/// Numbers of marks for which threshold and scale are chosen: how many there are is not known yet.
+const COUNTS: [usize; 3] = [1, 2, 3];
 /// Marks that are looked for at most.
 pub const MOST_MARKS: usize = 12;
 
@@ -118,21 +120,38 @@ fn looks(album: &Album) -> Result<Vec<(Hue, String)>> {
     let peaks = album.hues(0.0, std::f64::consts::PI);
     let least = LEAST_WEIGHT * peaks.first().map_or(0.0, |p| p.weight);
     let hues = peaks.iter().filter(|p| p.weight >= least).take(MOST_HUES);
-    let mut trials = Vec::new();
+    let mut trials: Vec<(Trial, Option<&str>)> = Vec::new();
     for peak in hues {
-        trials.extend(album.try_hue(peak.angle_rad, MOST_MARKS, None)?.map(|t| (t, None)));
+        for marks in COUNTS {
+            let known = |t: &Trial| trials.iter().any(|(o, _)| is_alike(o, t));
+            let trial = album.try_hue(peak.angle_rad, marks, None)?.filter(|t| !known(t));
+            trials.extend(trial.map(|t| (t, None)));
+        }
     }
     for (dark, name) in [(true, "dark"), (false, "light")] {
-        trials.extend(album.try_luma(dark, MOST_MARKS)?.map(|t| (t, Some(name))));
+        for marks in COUNTS {
+            let known = |t: &Trial| trials.iter().any(|(o, n)| *n == Some(name) && is_alike(o, t));
+            let trial = album.try_luma(dark, marks)?.filter(|t| !known(t));
+            trials.extend(trial.map(|t| (t, Some(name))));
+        }
     }
     for (trial, name) in trials {
         let Some(name) = name.map(str::to_owned).or_else(|| album.colour_name(&trial)) else { continue };
         let Ok(colour) = name.parse::<MarkColour>() else { continue };
-        let mut hue = Hue { colour, marks: MOST_MARKS, round: true, ..Hue::default() };
+        let mut hue = Hue { colour, marks: trial.marks, round: true, ..Hue::default() };
         hue.adopt(&trial, album.sample_px2());
         looks.push((hue, name));
     }
     Ok(looks)
+}
+
+/// Two trials would find the same.
+fn is_alike(a: &Trial, b: &Trial) -> bool {
+    let sizes = a.usual_samples().zip(b.usual_samples());
+    a.angle_rad == b.angle_rad
+        && (a.level, a.thin) == (b.level, b.thin)
+        && (a.threshold / b.threshold).ln().abs() < 0.2
+        && sizes.is_none_or(|(a, b)| (a / b).ln().abs() < 0.4)
 }
 
 fn nothing_swings(path: &Path, all: &[Thing], names: &[String], frames: &[FrameBlobs]) -> Error {
