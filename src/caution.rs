@@ -3,7 +3,7 @@
 use crate::experiment::Experiment;
 use crate::measure::{Measurement, Options};
 use crate::statistics::median;
-use crate::track::Point;
+use crate::track::{Point, Spare};
 
 /// A link whose length scatters by more than this share is no rigid link in the plane of the picture: lenses bend by
 /// less.
@@ -17,6 +17,8 @@ const LEAST_SQUEEZE: f64 = 0.03;
 /// Noise of a mark that calls for a word: a quarter of a pixel, and half a hundredth of the mark's width.
 const MOST_NOISE_PX: f64 = 0.25;
 const NOISE_OF_WIDTH: f64 = 0.005;
+/// Share of the marks' own motion from which another thing's is no trembling.
+const LEAST_TRAVEL: f64 = 0.05;
 /// Things that are listed one by one.
 const LISTED: usize = 4;
 /// Rates at which cameras record slow motion, and rates at which they play it.
@@ -49,8 +51,14 @@ pub fn cautions(m: &Measurement, options: &Options) -> Vec<String> {
 
 /// Things of the marks' colour that were not used.
 fn spares(m: &Measurement) -> Vec<String> {
+    let range = |points: &[Point]| {
+        let x = points.iter().filter_map(|p| p.measured).map(|m| m.position_px[0]);
+        0.5 * (x.clone().fold(f64::MIN, f64::max) - x.fold(f64::MAX, f64::min))
+    };
+    let widest_px = m.tracks.marks.iter().map(|points| range(points)).fold(0.0, f64::max);
     let listed = |moves: bool| -> Vec<String> {
-        let chosen = m.tracks.spares.iter().filter(|s| s.moves == moves);
+        let swings = |s: &Spare| s.moves && s.travel_px > LEAST_TRAVEL * widest_px;
+        let chosen = m.tracks.spares.iter().filter(|s| swings(s) == moves);
         chosen.map(|s| format!("({:.0}, {:.0})", s.position_px[0], s.position_px[1])).collect()
     };
     let places = |all: &[String]| {

@@ -62,7 +62,7 @@ pub struct Finding {
     pub stream: StreamInfo,
     /// The camera's motion.
     pub camera: Camera,
-    /// The usual picture, stored as red, green, blue at chroma resolution.
+    /// One picture, stored as red, green, blue at chroma resolution.
     pub background: Background,
 }
 
@@ -99,7 +99,11 @@ pub fn look(path: &Path, options: &Options, folder: &Path, progress: &dyn Progre
         .collect();
     let links_px = marks.windows(2).filter_map(|w| w[0].thing.distance_px(&w[1].thing)).collect();
     let swinging = usize::from(chain.hinge_marked);
-    let still = all.iter().filter(|t| !t.moves && marks.iter().any(|m| m.thing.hue == t.hue && m.thing != **t));
+    let beside = |t: &Thing, m: &Mark| {
+        m.thing.distance_px(t).is_some_and(|d| d > m.thing.area_px2.sqrt().max(t.area_px2.sqrt()))
+    };
+    let still = all.iter().filter(|t| !t.moves && marks.iter().any(|m| m.thing.hue == t.hue));
+    let still = still.filter(|t| marks.iter().all(|m| beside(t, m)));
     Ok(Finding {
         frequency_hz: marks.get(swinging).and_then(|m| turns_per_second(&m.thing, &t_s)),
         still: still.cloned().collect(),
@@ -135,7 +139,9 @@ fn looks(album: &Album) -> Result<Vec<(Hue, String)>> {
             trials.extend(trial.map(|t| (t, Some(name))));
         }
     }
-    for (trial, name) in trials {
+    // what shows more spots than there can be marks is a wall or a shadow
+    let few = |t: &Trial| t.likely().count() <= MOST_MARKS * t.spots.len();
+    for (trial, name) in trials.into_iter().filter(|(t, _)| few(t)) {
         let Some(name) = name.map(str::to_owned).or_else(|| album.colour_name(&trial)) else { continue };
         let Ok(colour) = name.parse::<MarkColour>() else { continue };
         let mut hue = Hue { colour, marks: trial.marks, round: true, ..Hue::default() };
@@ -190,7 +196,8 @@ fn turns_per_second(thing: &Thing, t_s: &[f64]) -> Option<f64> {
 
 fn background(album: &Album) -> Background {
     let width = album.pictures.first().map_or(0, |p| p.width);
-    let [y, b, r] = album.usual();
-    let rgb = y.iter().zip(&b).zip(&r).map(|((y, b), r)| album.rgb([*y, *b, *r])).collect();
+    let rgb = album.pictures.first().map_or_else(Vec::new, |p| {
+        p.luma.iter().zip(&p.cb).zip(&p.cr).map(|((y, b), r)| album.rgb([*y, *b, *r])).collect()
+    });
     Background { width, rgb, shifts: album.shifts }
 }
