@@ -117,6 +117,10 @@ pub fn to_csv(tracks: &Tracks, angles: &Angles) -> String {
     header.extend((1..=marks).flat_map(|m| [format!("m{m}_x_px"), format!("m{m}_y_px")]));
     header.extend((1..=links).map(|l| format!("theta{l}_rad")));
     header.extend((1..=links).map(|l| format!("theta{l}_sd_rad")));
+    let displacement = (links == 0).then(|| displacements(tracks));
+    if displacement.is_some() {
+        header.extend(["displacement_px".to_owned(), "displacement_sd_px".to_owned()]);
+    }
     header.push("flags".to_owned());
     header.extend((1..=marks).flat_map(|m| {
         ["x_sd_px", "y_sd_px", "filtered_x_px", "filtered_y_px", "filtered_x_sd_px", "filtered_y_sd_px"]
@@ -135,6 +139,9 @@ pub fn to_csv(tracks: &Tracks, angles: &Angles) -> String {
         for link in &angles.links {
             optional(&mut text, link[frame].map(|a| [a.sd_rad]), 7);
         }
+        if let Some(displacement) = &displacement {
+            optional(&mut text, displacement.get(frame).copied().flatten(), 4);
+        }
         let _ = write!(text, ",{}", flags(tracks, frame));
         for mark in &tracks.marks {
             let p = &mark[frame];
@@ -145,6 +152,32 @@ pub fn to_csv(tracks: &Tracks, angles: &Angles) -> String {
         text.push('\n');
     }
     text
+}
+
+/// The displacement of a mark that hangs from nothing known, with its standard deviation, px: from its mean place along
+/// the line on which it moves most, positive to the right, or down where that line is upright.
+///
+/// ```text
+/// s = (p − p̄)·e,   e the first principal axis of the positions,   σ_s² = eᵀ Σ e
+/// ```
+fn displacements(tracks: &Tracks) -> Vec<Option<[f64; 2]>> {
+    let Some(points) = tracks.marks.first() else { return Vec::new() };
+    let seen: Vec<Measured> = points.iter().filter_map(|p| p.measured).collect();
+    let n = seen.len().max(1) as f64;
+    let mean = [0, 1].map(|axis| seen.iter().map(|m| m.position_px[axis]).sum::<f64>() / n);
+    let moment = |i: usize, j: usize| {
+        seen.iter().map(|m| (m.position_px[i] - mean[i]) * (m.position_px[j] - mean[j])).sum::<f64>() / n
+    };
+    let angle = 0.5 * (2.0 * moment(0, 1)).atan2(moment(0, 0) - moment(1, 1));
+    let (sin, cos) = angle.sin_cos();
+    let sign = if cos.abs() > 1e-6 { cos.signum() } else { sin.signum() };
+    let (ex, ey) = (sign * cos, sign * sin);
+    let along = |m: Measured| {
+        let [xx, yy, xy] = m.covariance_px2;
+        let variance = ex * ex * xx + ey * ey * yy + 2.0 * ex * ey * xy;
+        [ex * (m.position_px[0] - mean[0]) + ey * (m.position_px[1] - mean[1]), variance.max(0.0).sqrt()]
+    };
+    points.iter().map(|p| p.measured.map(along)).collect()
 }
 
 fn optional<const N: usize>(text: &mut String, values: Option<[f64; N]>, decimals: usize) {

@@ -3,7 +3,7 @@
 use crate::experiment::Experiment;
 use crate::measure::{Measurement, Options};
 use crate::statistics::median;
-use crate::track::Point;
+use crate::track::{Point, Spare};
 
 /// A link whose length scatters by more than this share is no rigid link in the plane of the picture: lenses bend by
 /// less.
@@ -17,6 +17,10 @@ const LEAST_SQUEEZE: f64 = 0.03;
 /// Noise of a mark that calls for a word: a quarter of a pixel, and half a hundredth of the mark's width.
 const MOST_NOISE_PX: f64 = 0.25;
 const NOISE_OF_WIDTH: f64 = 0.005;
+/// Share of the marks' own motion from which another thing's is no trembling.
+const LEAST_TRAVEL: f64 = 0.05;
+/// Things that are listed one by one.
+const LISTED: usize = 4;
 /// Rates at which cameras record slow motion, and rates at which they play it.
 const SLOW_MOTION: [(f64, f64); 8] = [
     (120.0, 30.0),
@@ -47,9 +51,19 @@ pub fn cautions(m: &Measurement, options: &Options) -> Vec<String> {
 
 /// Things of the marks' colour that were not used.
 fn spares(m: &Measurement) -> Vec<String> {
+    let range = |points: &[Point]| {
+        let x = points.iter().filter_map(|p| p.measured).map(|m| m.position_px[0]);
+        0.5 * (x.clone().fold(f64::MIN, f64::max) - x.fold(f64::MAX, f64::min))
+    };
+    let widest_px = m.tracks.marks.iter().map(|points| range(points)).fold(0.0, f64::max);
     let listed = |moves: bool| -> Vec<String> {
-        let chosen = m.tracks.spares.iter().filter(|s| s.moves == moves);
+        let swings = |s: &Spare| s.moves && s.travel_px > LEAST_TRAVEL * widest_px;
+        let chosen = m.tracks.spares.iter().filter(|s| swings(s) == moves);
         chosen.map(|s| format!("({:.0}, {:.0})", s.position_px[0], s.position_px[1])).collect()
+    };
+    let places = |all: &[String]| {
+        let more = if all.len() > LISTED { ", …" } else { "" };
+        format!("{}{more}", all[..all.len().min(LISTED)].join(", "))
     };
     let (moving, still) = (listed(true), listed(false));
     let marks = m.tracks.marks.len();
@@ -60,7 +74,7 @@ fn spares(m: &Measurement) -> Vec<String> {
             moving.len(),
             if moving.len() == 1 { "" } else { "s" },
             if moving.len() == 1 { "s" } else { "" },
-            moving.join(" and "),
+            places(&moving),
             if moving.len() == 1 { "was" } else { "were" },
             marks + moving.len(),
             if moving.len() == 1 { "it is" } else { "they are" },
@@ -73,7 +87,7 @@ fn spares(m: &Measurement) -> Vec<String> {
             if still.len() == 1 { "" } else { "s" },
             if still.len() == 1 { "s" } else { "" },
             if still.len() == 1 { "was" } else { "were" },
-            still.join(" and "),
+            places(&still),
         ));
     }
     said
@@ -193,7 +207,10 @@ fn blur(m: &Measurement, mark: usize) -> Option<String> {
     let exposure_s = slope / width_px;
     let fastest = rows[rows.len() - 1 - rows.len() / 50][0];
     let blur_px = exposure_s * fastest;
-    (blur_px > width_px && exposure_s.is_finite()).then(|| {
+    // an exposure is no longer than a frame
+    let step_s = m.timing.median_step_s / m.time_scale;
+    let possible = a1 > 1.15 * a0 && exposure_s > 0.0 && exposure_s < 1.1 * step_s;
+    (blur_px > width_px && possible).then(|| {
         format!(
             "mark {} is smeared over {blur_px:.0} px where it is fastest, more than its width of {width_px:.0} px: the exposure is about 1/{:.0} s; set it to 1/{:.0} s or shorter, with more light",
             mark + 1,

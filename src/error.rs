@@ -52,6 +52,10 @@ pub enum Error {
     #[error("{}: no {colour} mark in any of {frames} frames: {found}; {remedy}", path.display())]
     NoMarks { path: PathBuf, colour: String, frames: u64, found: String, remedy: String },
 
+    /// A recording in which nothing looks like marks that swing.
+    #[error("{}: nothing in {frames} frames swings like marks: {found}; put round marks of one clear colour on what swings, or name what is there with `track --color`", path.display())]
+    NothingSwings { path: PathBuf, frames: usize, found: String },
+
     /// Fewer marks than asked for.
     #[error("{}: found {found} {colour} mark{} where {wanted} are needed{beside}; {remedy}", path.display(), if *found == 1 { "" } else { "s" })]
     TooFewMarks { path: PathBuf, colour: String, found: usize, wanted: usize, beside: String, remedy: String },

@@ -10,6 +10,7 @@
 //! | track | [`track`] | blobs → one track a mark |
 //! | calibrate | [`calibrate`] | pixels, y down → metres, y up |
 //! | angles | [`angles`] | tracks → θ₁, θ₂ with standard deviations |
+//! | look | [`look`] | a recording of which nothing is known → marks, pivot, links |
 //! | series | [`series`] | angles.csv → the same as numbers, checked |
 //! | overlay | [`overlay`] | recording, tracks and angles → a video that shows them |
 //! | model | [`model`] | specimen and effects → the motion at every instant, with its derivatives |
@@ -36,6 +37,7 @@ pub mod measure;
 mod rejected;
 mod caution;
 pub mod sidecar;
+pub mod look;
 pub mod overlay;
 pub mod series;
 pub mod model;

@@ -187,14 +187,51 @@ impl<'a> Session<'a> {
         &self.stamps_s
     }
 
+    /// Pictures spread over the recording.
+    pub fn album(&self) -> &Album {
+        &self.album
+    }
+
+    /// Its stream.
+    pub fn stream(&self) -> &StreamInfo {
+        &self.stream
+    }
+
+    /// What is known of the camera's motion.
+    pub fn camera(&self) -> Camera {
+        self.camera
+    }
+
     /// Measures every frame.
     ///
     /// # Errors
     /// As [`measure`].
     pub fn run(&mut self, progress: &dyn Progress) -> Result<Measurement> {
-        let rig = &self.options.rig;
+        let mut tracker = Tracker::new(self.slots.clone(), self.options.rig.pivot_px);
         let detector = Detector::new(self.hues.clone()).with_siting(self.siting);
-        let mut tracker = Tracker::new(self.slots.clone(), rig.pivot_px);
+        let decoded = self.each_frame(&detector, progress, &mut |frame| tracker.push(frame))?;
+        self.conclude(decoded, tracker)
+    }
+
+    /// Everything of these hues in every frame.
+    ///
+    /// # Errors
+    /// As [`measure`].
+    pub fn gather(&mut self, hues: Vec<Hue>, progress: &dyn Progress) -> Result<Vec<FrameBlobs>> {
+        let detector = Detector::new(hues);
+        let mut frames = Vec::new();
+        self.each_frame(&detector, progress, &mut |frame| frames.push(frame))?;
+        self.camera.finish(self.stamps_s.len());
+        Ok(frames)
+    }
+
+    fn each_frame(
+        &mut self,
+        detector: &Detector,
+        progress: &dyn Progress,
+        sink: &mut dyn FnMut(FrameBlobs),
+    ) -> Result<Decoded> {
+        let rig = &self.options.rig;
         progress.begin("tracking", self.stream.stated_frames);
         let view = View {
             orientation: self.stream.orientation,
@@ -212,10 +249,10 @@ impl<'a> Session<'a> {
             }
             stamps_s.push(frame.value.t_s);
             camera.note(&frame.value);
-            tracker.push(frame_blobs(frame));
+            sink(frame_blobs(frame));
         };
         let decoded =
-            self.recording.decode_in_order(self.options.workers, &|f| view.look(&detector, &f), &mut |outcome| {
+            self.recording.decode_in_order(self.options.workers, &|f| view.look(detector, &f), &mut |outcome| {
                 if progress.is_cancelled() {
                     return Err(Error::Interrupted);
                 }
@@ -224,7 +261,7 @@ impl<'a> Session<'a> {
                 Ok(())
             })?;
         spread.finish().for_each(&mut take);
-        self.conclude(decoded, tracker)
+        Ok(decoded)
     }
 
     fn conclude(&mut self, decoded: Decoded, tracker: Tracker) -> Result<Measurement> {
@@ -274,13 +311,14 @@ struct Lookout {
     points_px: Vec<[f64; 2]>,
     background: Option<Background>,
     greatest_px: f64,
+    agreed: Vec<Vec<bool>>,
 }
 
 impl Lookout {
     fn new(options: &Options, stream: &StreamInfo) -> Self {
         let stored = |p: &[f64; 2]| stream.orientation.stored_point(*p, stream.stored_size_px);
         let points_px = options.rig.reference_marks.iter().map(stored).collect();
-        Self { points_px, background: None, greatest_px: 0.0 }
+        Self { points_px, background: None, greatest_px: 0.0, agreed: Vec::new() }
     }
 
     fn see(&mut self, frame: &Frame<'_>) {
@@ -289,6 +327,7 @@ impl Lookout {
             Some(background) => {
                 if let Some(camera) = background.locate(&frame.picture) {
                     self.greatest_px = self.greatest_px.max(camera.size_px());
+                    self.agreed.push(background.agreeing(&frame.picture, &camera));
                 }
             }
         }
@@ -301,7 +340,9 @@ impl Lookout {
             Steadying::WhereNeeded => !self.points_px.is_empty() || self.greatest_px > CAMERA_MOVES_PX,
         };
         let camera = Camera { greatest_shift_px: self.greatest_px, taken_out, ..Camera::default() };
-        (self.background.filter(|_| taken_out), camera)
+        let mut background = self.background.filter(|_| taken_out);
+        background.iter_mut().for_each(|b| b.keep_steady(&self.agreed));
+        (background, camera)
     }
 }
 

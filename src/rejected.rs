@@ -26,6 +26,9 @@ impl Rejected<'_> {
     /// # Errors
     /// [`Error::NoMarks`] and [`Error::TooFewMarks`].
     pub fn check(&self, found: &[MarkFound], tracks: &Tracks) -> Result<()> {
+        if found.iter().any(|f| f.frames > 0) && !tracks.moves && tracks.t_s.len() > 1 {
+            return Err(self.nothing_swings(tracks)?);
+        }
         for (index, hue) in self.hues.iter().enumerate() {
             let seen = found.iter().filter(|f| usize::from(f.hue) == index && f.frames > 0).count();
             let spares: Vec<&Spare> = tracks.spares.iter().filter(|s| usize::from(s.hue) == index).collect();
@@ -35,9 +38,6 @@ impl Rejected<'_> {
             if seen < hue.marks {
                 return Err(self.too_few(hue, seen, &spares));
             }
-        }
-        if !tracks.moves && tracks.t_s.len() > 1 {
-            return Err(self.nothing_swings(tracks)?);
         }
         Ok(())
     }

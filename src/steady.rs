@@ -19,12 +19,13 @@ const REACH_PX: i64 = 20;
 const CELLS: [usize; 2] = [8, 6];
 /// Mean square of the weaker gradient, codes², below which a patch is too plain to be found again.
 const LEAST_GRADIENT: f64 = 2.0;
-/// Patches that are sought over the whole reach, to begin with.
-const SCOUTS: usize = 9;
-/// Fewest patches of the background that must agree.
+/// Fewest patches of the background that must agree, and as a share of those that are found again.
 const FEWEST_AGREEING: usize = 6;
+const AGREEING_SHARE: f64 = 0.35;
 /// Correlation of a patch with what it is found as, at least: three quarters of the variance in common.
 const LEAST_CORRELATION: f32 = 0.85;
+/// First shifts within which two patches say the same, px.
+const SAME_PX: f64 = 2.5;
 /// Residual within which a patch agrees, px, at least.
 const AGREEMENT_PX: f64 = 0.25;
 
@@ -103,43 +104,70 @@ impl Background {
         let start = self.scout(&luma)?;
         let found: Vec<([f64; 2], [f64; 2])> =
             self.patches.iter().filter_map(|p| Some(([p.x as f64, p.y as f64], p.find(&luma, start)?))).collect();
-        self.agree(found)
+        self.agree(found, start)
     }
 
-    /// A first shift in whole pixels: what most of the strongest patches say.
+    /// A first shift in whole pixels: the one that most patches say. What swings may hold the clearest patches.
     fn scout(&self, luma: &Luma<'_>) -> Option<[f64; 2]> {
-        let mut shifts: [Vec<f64>; 2] = [Vec::new(), Vec::new()];
-        for patch in self.patches.iter().take(SCOUTS) {
-            if let Some(shift) = patch.search(luma) {
-                (0..2).for_each(|axis| shifts[axis].push(shift[axis]));
-            }
-        }
-        let [x, y] = shifts.map(|mut s| median(&mut s));
-        Some([x?, y?])
+        let shifts: Vec<[f64; 2]> = self.patches.iter().filter_map(|p| p.search(luma)).collect();
+        let near = |a: &[f64; 2], b: &[f64; 2]| (a[0] - b[0]).hypot(a[1] - b[1]) < SAME_PX;
+        let agreeing = |a: &[f64; 2]| shifts.iter().filter(|b| near(a, b)).count();
+        let best = shifts.iter().max_by_key(|a| agreeing(a))?;
+        let mean = |axis: usize| {
+            let said = shifts.iter().filter(|b| near(best, b));
+            said.map(|b| b[axis]).sum::<f64>() / agreeing(best) as f64
+        };
+        Some([mean(0), mean(1)])
     }
 
-    /// Shift and turn on which most patches agree, by least squares over those that do.
-    fn agree(&self, found: Vec<([f64; 2], [f64; 2])>) -> Option<CameraShift> {
-        let [mx, my] = [0, 1].map(|axis| median(&mut found.iter().map(|f| f.1[axis]).collect::<Vec<_>>()));
+    /// Keeps the patches that agreed in at least half of some pictures.
+    pub fn keep_steady(&mut self, pictures: &[Vec<bool>]) {
+        if self.named || pictures.is_empty() {
+            return;
+        }
+        let mut index = 0;
+        self.patches.retain(|_| {
+            let agreed = pictures.iter().filter(|p| p.get(index).copied().unwrap_or(false)).count();
+            index += 1;
+            2 * agreed >= pictures.len()
+        });
+    }
+
+    /// Which patches agree with a shift of the camera in a picture.
+    pub fn agreeing(&self, picture: &Picture<'_>, camera: &CameraShift) -> Vec<bool> {
+        let luma = Luma::of(picture);
+        let agrees = |p: &Patch| {
+            let at = camera.at([p.x as f64, p.y as f64]);
+            p.find(&luma, at).is_some_and(|s| (s[0] - at[0]).hypot(s[1] - at[1]) < 2.0 * AGREEMENT_PX)
+        };
+        self.patches.iter().map(agrees).collect()
+    }
+
+    /// Shift and turn on which most patches agree, by least squares over those that do, from a first shift.
+    fn agree(&self, found: Vec<([f64; 2], [f64; 2])>, start: [f64; 2]) -> Option<CameraShift> {
         let mut camera =
-            CameraShift { shift_px: [mx?, my?], centre_px: self.centre_px, patches: found.len(), ..Default::default() };
-        let fewest = if self.named { 1 } else { FEWEST_AGREEING };
+            CameraShift { shift_px: start, centre_px: self.centre_px, patches: found.len(), ..Default::default() };
+        let share = (AGREEING_SHARE * found.len() as f64) as usize;
+        let fewest = if self.named { 1 } else { FEWEST_AGREEING.max(share) };
         for round in 0..6 {
             let rest = |f: &([f64; 2], [f64; 2])| {
                 let at = camera.at(f.0);
                 (f.1[0] - at[0]).hypot(f.1[1] - at[1])
             };
             let usual = median(&mut found.iter().map(rest).collect::<Vec<_>>()).unwrap_or(0.0);
-            // a turn is not known yet in the first round
-            let limit = (3.0 * usual).max(if round == 0 { 2.0 } else { AGREEMENT_PX });
+            // a turn, and parts of a pixel, are not known yet in the first round
+            let limit = if round == 0 { 3.0 } else { (3.0 * usual).clamp(AGREEMENT_PX, 1.0) };
             let kept: Vec<_> = found.iter().filter(|f| rest(f) <= limit).collect();
-            let few = !self.named && (2 * kept.len() < found.len() || !self.is_spread(&kept));
-            if kept.len() < fewest || few {
+            if kept.len() < fewest || !(self.named || self.is_spread(&kept)) {
                 return None;
             }
-            let squares: f64 = kept.iter().map(|f| rest(f).powi(2)).sum();
-            camera = self.least_squares(&kept)?;
-            camera.sd_px = (0.5 * squares).sqrt() / kept.len() as f64;
+            let next = self.least_squares(&kept)?;
+            let squares = |f: &&([f64; 2], [f64; 2])| {
+                let at = next.at(f.0);
+                (f.1[0] - at[0]).powi(2) + (f.1[1] - at[1]).powi(2)
+            };
+            let sum: f64 = kept.iter().map(squares).sum();
+            camera = CameraShift { sd_px: (0.5 * sum).sqrt() / kept.len() as f64, ..next };
         }
         Some(camera)
     }

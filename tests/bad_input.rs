@@ -345,8 +345,8 @@ fn options_that_make_no_sense() {
     let cases: [(&[&str], &str); 10] = [
         (&["--threshold", "300"], "--threshold: must lie between 0 and 255"),
         (&["--threshold", "nan"], "--threshold: must lie between 0 and 255"),
-        (&["--markers", "1"], "--markers: an angle needs 2 to 12 marks"),
-        (&["--markers", "1000000000"], "--markers: an angle needs 2 to 12 marks"),
+        (&["--markers", "0"], "--markers: 1 to 12 marks can be followed"),
+        (&["--markers", "1000000000"], "--markers: 1 to 12 marks can be followed"),
         (&["--color", "red", "--color", "red", "--markers", "4"], "--markers: 4 marks asked for, 2 colours given"),
         (&["--threads", "0"], "--threads: must be at least 1"),
         (&["--config", "typo.toml"], "typo.toml:2: unknown key `mirored`; the nearest known one is `mirrored`"),

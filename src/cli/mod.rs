@@ -4,6 +4,7 @@ mod bar;
 mod diagnose;
 mod fit;
 mod identify;
+mod init;
 mod modes;
 mod paper;
 mod render;
@@ -34,6 +35,7 @@ pub struct Cli {
 
 #[derive(Debug, Subcommand)]
 enum Command {
+    Init(init::InitArgs),
     Track(track::TrackArgs),
     Identify(identify::IdentifyArgs),
     Fit(fit::FitArgs),
@@ -57,6 +59,7 @@ impl Cli {
     pub fn run() -> ExitCode {
         bar::hear_interrupts();
         exit(match Self::parse().command {
+            Command::Init(args) => args.run(),
             Command::Track(args) => args.run(),
             Command::Fit(args) => args.run(),
             Command::Diagnose(args) => args.run(),

@@ -150,9 +150,9 @@ impl TrackArgs {
     /// # Errors
     /// Whatever [`measure`] and the outputs report.
     pub fn run(&self) -> Result<()> {
-        let experiment = self.config.as_deref().map(Experiment::read_rig).transpose()?.unwrap_or_default();
+        let experiment = self.config.as_deref().map(Experiment::read_rig).transpose()?;
         let folder = self.config.as_deref().and_then(Path::parent).unwrap_or(Path::new("")).to_owned();
-        let options = self.options(experiment.clone())?;
+        let options = self.options(experiment.clone().unwrap_or_default())?;
         self.keep_inputs()?;
         // before the first temporary file, so that Ctrl-C leaves none behind
         let bar = Bar::new(self.quiet);
@@ -169,7 +169,7 @@ impl TrackArgs {
         }
         let measurement = outcome?;
         let mut sidecar = Sidecar::new(&self.video, &options, &measurement)?;
-        sidecar.warnings.extend(slow_motion(&measurement, &experiment));
+        sidecar.warnings.extend(experiment.as_ref().and_then(|e| slow_motion(&measurement, e)));
         if let Some(target) = &self.overlay {
             let Measurement { tracks, angles, timing, .. } = &measurement;
             // the pictures carry the file's stamps

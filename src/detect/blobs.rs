@@ -38,6 +38,8 @@ pub(super) struct Target {
     pub thin: bool,
     /// 2^level chroma samples a sample.
     pub level: u32,
+    /// Only round spots count.
+    pub round: bool,
     /// Least and greatest number of samples.
     pub samples: [usize; 2],
 }
@@ -52,7 +54,7 @@ impl Target {
     fn accepts(&self, part: &Part) -> bool {
         let [least, most] = self.samples;
         let size = part.points.len();
-        (least..=most).contains(&size) && (!self.axis.is_luma() || part.roundness() >= LEAST_ROUNDNESS)
+        (least..=most).contains(&size) && (!self.round || part.roundness() >= LEAST_ROUNDNESS)
     }
 }
 

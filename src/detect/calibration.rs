@@ -52,6 +52,8 @@ pub struct Trial {
     pub threshold: f64,
     /// Lines are not filtered out.
     pub thin: bool,
+    /// Marks that were asked for.
+    pub marks: usize,
     /// By picture.
     pub spots: Vec<Vec<Spot>>,
     /// 1: as many round moving spots as there are marks, in every picture.
@@ -186,7 +188,7 @@ impl Album {
             spots.push(spots_of(plane, threshold, thin, least, moved.get(n).map(Vec::as_slice))?);
         }
         let quality = quality(&spots, ask.marks, moves, ask.axis.is_luma());
-        Ok(Some(Trial { angle_rad: None, level: ask.level, threshold, thin, spots, quality }))
+        Ok(Some(Trial { angle_rad: None, level: ask.level, threshold, thin, marks: ask.marks, spots, quality }))
     }
 
     /// What moves, at a coarser scale: where a quarter of the samples do.
@@ -296,9 +298,17 @@ impl Trial {
         self.spots.iter().flatten().filter(move |s| s.roundness >= LEAST_ROUNDNESS && (s.moves || !moves))
     }
 
-    /// Usual number of samples of a mark, at the trial's level.
+    /// Usual number of samples of a mark, at the trial's level: of the clearest spots, as many as there are marks.
     pub fn usual_samples(&self) -> Option<f64> {
-        let mut sizes: Vec<f64> = self.likely().map(|s| s.part.points.len() as f64).collect();
+        let moves = self.spots.iter().flatten().any(|s| s.moves);
+        let mut sizes = Vec::new();
+        for picture in &self.spots {
+            let likely = picture.iter().filter(|s| s.roundness >= LEAST_ROUNDNESS && (s.moves || !moves));
+            let mut clearest: Vec<(f64, usize)> =
+                likely.map(|s| (s.top * s.roundness.min(1.0), s.part.points.len())).collect();
+            clearest.sort_by(|a, b| (b.0 * b.1 as f64).total_cmp(&(a.0 * a.1 as f64)));
+            sizes.extend(clearest.iter().take(self.marks).map(|(_, size)| *size as f64));
+        }
         median(&mut sizes)
     }
 

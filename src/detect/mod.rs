@@ -45,6 +45,8 @@ pub struct Hue {
     pub level: u32,
     /// Usual area of a mark, where it is known.
     pub area_px2: Option<f64>,
+    /// Only round spots count, and of that area: what the marks stand on may have their hue.
+    pub round: bool,
 }
 
 impl Default for Hue {
@@ -57,6 +59,7 @@ impl Default for Hue {
             angle_rad: None,
             level: 0,
             area_px2: None,
+            round: false,
         }
     }
 }
@@ -133,7 +136,8 @@ impl Detector {
         let axis = hue.axis(picture.layout.matrix);
         let samples = |area_px2: f64| least_samples(picture, area_px2) >> (2 * hue.level);
         // a mark that is partly hidden is smaller, one that is blurred or merged with another larger
-        let [smaller, larger] = if axis.is_luma() { ROUND_SPOT } else { COLOURED_SPOT };
+        let round = hue.round || axis.is_luma();
+        let [smaller, larger] = if round { ROUND_SPOT } else { COLOURED_SPOT };
         let least = hue.area_px2.map_or(0.0, |a| a / smaller).max(self.least_area_px2);
         Target {
             hue: index as u8,
@@ -141,6 +145,7 @@ impl Detector {
             threshold: from_255(hue.threshold),
             thin: hue.thin,
             level: hue.level,
+            round,
             samples: [samples(least).max(3), hue.area_px2.map_or(usize::MAX, |a| samples(larger * a))],
         }
     }

@@ -198,10 +198,18 @@ impl Album {
                 samples.iter().map(|(n, at)| f64::from(self.pictures[*n].channels()[channel][*at])).collect();
             median(&mut codes)
         };
+        Some(self.rgb_of([code(0)?, code(1)?, code(2)?]))
+    }
+
+    /// Codes of luma, C_b and C_r → red, green, blue, 0 to 255.
+    pub fn rgb(&self, codes: [u8; 3]) -> [u8; 3] {
+        self.rgb_of(codes.map(f64::from))
+    }
+
+    fn rgb_of(&self, [y, cb, cr]: [f64; 3]) -> [u8; 3] {
         let (black, luma_span, chroma_span) = if self.full_range { (0.0, 255.0, 255.0) } else { (16.0, 219.0, 224.0) };
-        let ycbcr =
-            [(code(0)? - black) / luma_span, (code(1)? - 128.0) / chroma_span, (code(2)? - 128.0) / chroma_span];
-        Some(self.matrix.rgb(ycbcr).map(|c| (255.0 * c).round().clamp(0.0, 255.0) as u8))
+        let ycbcr = [(y - black) / luma_span, (cb - 128.0) / chroma_span, (cr - 128.0) / chroma_span];
+        self.matrix.rgb(ycbcr).map(|c| (255.0 * c).round().clamp(0.0, 255.0) as u8)
     }
 }
 

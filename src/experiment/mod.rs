@@ -51,13 +51,18 @@ impl Experiment {
     }
 
     /// Reads a file for what only the camera needs: what is still to be measured of the specimen is left at its
-    /// default.
+    /// default, and link lengths that it does not state are left out.
     ///
     /// # Errors
     /// As [`Experiment::read`].
     pub fn read_rig(path: &Path) -> Result<Self> {
         let text = std::fs::read_to_string(path).map_err(|e| Error::unreadable(path, e))?;
-        Self::parse(&unmeasured::without(&text), path)
+        let text = unmeasured::without(&text);
+        let mut experiment = Self::parse(&text, path)?;
+        if !unmeasured::states(&text, "link_lengths_m") {
+            experiment.specimen.link_lengths_m.clear();
+        }
+        Ok(experiment)
     }
 
     /// The same for work that needs the specimen.

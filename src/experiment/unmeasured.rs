@@ -39,6 +39,11 @@ pub fn without(text: &str) -> String {
         .fold(String::new(), |text, line| text + line + "\n")
 }
 
+/// A line of the text states this key.
+pub fn states(text: &str, key: &str) -> bool {
+    text.lines().filter_map(|line| line.split_once('=')).any(|(name, _)| name.trim() == key)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

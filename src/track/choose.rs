@@ -6,9 +6,9 @@
 
 use std::cmp::Ordering;
 
-use super::tracklet::Tracklet;
+use super::tracklet::{Tracklet, link};
 use super::{FrameBlobs, MarkSlot, Sighting};
-use crate::statistics::median;
+use crate::statistics::{median, median_step_s};
 
 /// Which tracklet is which mark.
 #[derive(Debug, Clone, Default, PartialEq)]
@@ -258,10 +258,13 @@ fn motion(path: &[Option<[f64; 2]>]) -> (f64, f64) {
 /// How much the distance of two candidates changes, as a share of how they move against each other; 1 where they
 /// do not, or are never seen together.
 fn stretch(a: &Candidate, b: &Candidate) -> f64 {
+    stretch_of(&a.path, &b.path, a.travel_px.max(b.travel_px))
+}
+
+fn stretch_of(a: &[Option<[f64; 2]>], b: &[Option<[f64; 2]>], travel_px: f64) -> f64 {
     let between: Vec<[f64; 2]> = a
-        .path
         .iter()
-        .zip(&b.path)
+        .zip(b)
         .filter_map(|(p, q)| {
             let (p, q) = (p.as_ref()?, q.as_ref()?);
             Some([q[0] - p[0], q[1] - p[1]])
@@ -273,6 +276,63 @@ fn stretch(a: &Candidate, b: &Candidate) -> f64 {
     let mean = [0, 1].map(|axis| between.iter().map(|d| d[axis]).sum::<f64>() / n);
     let motion = between.iter().map(|d| (d[0] - mean[0]).hypot(d[1] - mean[1])).sum::<f64>() / n;
     let change = lengths.iter().map(|l| (l - usual).abs()).sum::<f64>() / n;
-    let moved_px = motion.max(a.travel_px.max(b.travel_px) * 0.05);
+    let moved_px = motion.max(travel_px * 0.05);
     if moved_px <= 0.0 { 1.0 } else { (change / moved_px).max(change / usual).min(1.0) }
+}
+
+/// A lasting thing in a recording, whatever it is.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Thing {
+    /// Index of its hue.
+    pub hue: u8,
+    /// Share of the frames that show it.
+    pub presence: f64,
+    /// Usual area.
+    pub area_px2: f64,
+    /// Half the range of its motion.
+    pub travel_px: f64,
+    /// It swings.
+    pub moves: bool,
+    /// Position by frame.
+    pub path: Vec<Option<[f64; 2]>>,
+}
+
+impl Thing {
+    /// How much its distance from another changes, as a share of how they move against each other; 1 where they do
+    /// not, or are never seen together.
+    pub fn stretch(&self, other: &Self) -> f64 {
+        stretch_of(&self.path, &other.path, self.travel_px.max(other.travel_px))
+    }
+
+    /// Usual distance from another; `None` where they are never seen together.
+    pub fn distance_px(&self, other: &Self) -> Option<f64> {
+        let apart = |(p, q): (&Option<[f64; 2]>, &Option<[f64; 2]>)| {
+            let (p, q) = (p.as_ref()?, q.as_ref()?);
+            Some((p[0] - q[0]).hypot(p[1] - q[1]))
+        };
+        median(&mut self.path.iter().zip(&other.path).filter_map(apart).collect::<Vec<_>>())
+    }
+
+    /// Usual place.
+    pub fn place_px(&self) -> [f64; 2] {
+        [0, 1].map(|axis| median(&mut self.path.iter().flatten().map(|p| p[axis]).collect::<Vec<_>>()).unwrap_or(0.0))
+    }
+}
+
+/// Everything that lasts in these frames.
+pub fn things(window: &[FrameBlobs]) -> Vec<Thing> {
+    let stamps: Vec<f64> = window.iter().map(|frame| frame.t_s).collect();
+    let Some(step_s) = median_step_s(&stamps) else { return Vec::new() };
+    let tracklets = link(window, step_s);
+    candidates(&tracklets, window, None)
+        .into_iter()
+        .map(|c| Thing {
+            hue: c.hue,
+            presence: c.presence,
+            area_px2: c.ln_area.exp(),
+            travel_px: c.travel_px,
+            moves: c.moves,
+            path: c.path,
+        })
+        .collect()
 }

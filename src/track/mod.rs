@@ -13,7 +13,7 @@ mod tracker;
 mod tracklet;
 mod tracks;
 
-pub use choose::Spare;
+pub use choose::{Spare, Thing, things};
 pub use kalman::{Belief, Measurement, Motion};
 pub use noise::Scatter;
 pub use sighting::{FrameBlobs, Sighting};

@@ -1,0 +1,202 @@
+//! Which of the things that last are the marks, and in which order.
+
+use super::arc::Arc;
+use crate::track::Thing;
+
+/// Change of a distance over the motion beyond which two things are not on one link.
+const MOST_STRETCH: f64 = 0.15;
+/// Distance of a path from its circle, over half its range, beyond which it is no arc.
+const MOST_OFF_ARC: f64 = 0.12;
+/// ln of the ratio of areas beyond which two marks of one look are unlike.
+const MOST_UNLIKE: f64 = 1.0;
+/// What a thing of the marks' look that swings, and is none, takes from it.
+const STRAY: f64 = 0.2;
+/// Change of the distance from a still thing, over the motion, up to which it is the hinge though the arc's centre is
+/// elsewhere: the plane of the swing is turned, and the arc an ellipse. And how far it may lie off the line towards
+/// that centre, rad.
+const HINGE_STRETCH: f64 = 0.1;
+const HINGE_OFF_LINE_RAD: f64 = 0.1;
+/// Share of the frames in which a mark is seen, at least.
+const LEAST_PRESENCE: f64 = 0.4;
+/// How much farther a lower mark swings than an upper one, from which on that decides which is which.
+const CLEARLY_FARTHER: f64 = 1.25;
+/// Standard deviations of the arc's centre within which a still thing is the hinge, and what a hinge may be off, px
+/// and as a share of the radius.
+const HINGE_DEVIATIONS: f64 = 4.0;
+const HINGE_OFF_PX: f64 = 4.0;
+const HINGE_OFF: f64 = 0.03;
+
+/// The marks, from the hinge down.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Chain {
+    pub marks: Vec<usize>,
+    pub arc: Option<Arc>,
+    pub hinge_marked: bool,
+    worth: f64,
+}
+
+/// The best chain that any look shows, filled up with what other looks add to it.
+pub fn longest(things: &[Thing], names: &[String]) -> Option<Chain> {
+    let hued = |hue: u8| names[usize::from(hue)].starts_with('#');
+    let best = (0..names.len() as u8)
+        .filter_map(|hue| of_look(things, &|t| t.hue == hue, hued(hue)))
+        .max_by(|a, b| a.worth.total_cmp(&b.worth))?;
+    // marks of several colours: what swings with the chain and is like its marks
+    let coloured = of_look(things, &|t| hued(t.hue), true);
+    let wins = |c: &Chain| (c.marks.len(), c.worth) > (best.marks.len(), best.worth);
+    Some(coloured.filter(wins).unwrap_or(best))
+}
+
+fn of_look(things: &[Thing], belongs: &dyn Fn(&Thing) -> bool, hued: bool) -> Option<Chain> {
+    let mut movers: Vec<usize> = (0..things.len())
+        .filter(|i| belongs(&things[*i]) && things[*i].moves && things[*i].presence > LEAST_PRESENCE)
+        .collect();
+    movers.sort_by(|a, b| things[*b].presence.total_cmp(&things[*a].presence));
+    let movers = distinct(things, &movers);
+    let crowd = movers.len();
+    // every mover may be the one that the others are like; the largest set counts
+    let sets = movers.iter().map(|first| rigid_set(things, &movers, *first));
+    let mut marks = sets.max_by(|a, b| value(things, a).total_cmp(&value(things, b)))?;
+    order(things, &mut marks);
+    let path = |i: usize| things[i].path.iter().flatten().copied().collect::<Vec<_>>();
+    let on_arc = |arc: &Arc, i: usize| arc.residual_px < MOST_OFF_ARC * things[i].travel_px;
+    let arc = Arc::of(&path(marks[0])).filter(|arc| on_arc(arc, marks[0]));
+    if marks.len() == 1 && arc.is_none() {
+        return None;
+    }
+    let mut hinge_marked = false;
+    if let Some(arc) = arc
+        && let Some(hinge) = hinge(things, belongs, &arc, marks[0])
+    {
+        marks.insert(0, hinge);
+        hinge_marked = true;
+    }
+    // a hue tells a mark from what is printed on it or shines on it
+    let strays = crowd.saturating_sub(marks.len()) as f64;
+    let worth = value(things, &marks) + if hued { 0.5 } else { 0.0 } - STRAY * strays;
+    Some(Chain { marks, arc, hinge_marked, worth })
+}
+
+/// More marks are better, seen in every frame.
+fn value(things: &[Thing], marks: &[usize]) -> f64 {
+    marks.iter().map(|i| things[*i].presence).sum()
+}
+
+/// Of things in one place, such as one mark seen by two looks, the first.
+fn distinct(things: &[Thing], movers: &[usize]) -> Vec<usize> {
+    let mut kept: Vec<usize> = Vec::new();
+    for i in movers {
+        let width = things[*i].area_px2.sqrt();
+        let doubled = |k: &usize| {
+            let other = things[*k].area_px2.sqrt();
+            things[*i].distance_px(&things[*k]).is_none_or(|d| d < 0.6 * width.max(other))
+        };
+        if !kept.iter().any(doubled) {
+            kept.push(*i);
+        }
+    }
+    kept
+}
+
+/// The things that are like one of them, each keeping its distance from another.
+fn rigid_set(things: &[Thing], movers: &[usize], first: usize) -> Vec<usize> {
+    let mut set = vec![first];
+    let like = |i: usize| (things[i].area_px2 / things[first].area_px2).ln().abs() < MOST_UNLIKE;
+    loop {
+        let next = movers
+            .iter()
+            .copied()
+            .filter(|i| !set.contains(i) && like(*i))
+            .find(|i| set.iter().any(|k| things[*i].stretch(&things[*k]) < MOST_STRETCH));
+        match next {
+            Some(next) if set.len() < super::MOST_MARKS => set.push(next),
+            _ => return set,
+        }
+    }
+}
+
+/// From the hinge down: what swings farther is lower, and what is lower in the picture where both swing alike.
+fn order(things: &[Thing], marks: &mut [usize]) {
+    let lowest = |i: usize| {
+        let mut y: Vec<f64> = things[i].path.iter().flatten().map(|p| p[1]).collect();
+        y.sort_unstable_by(f64::total_cmp);
+        y.get(y.len() * 19 / 20).copied().unwrap_or(0.0)
+    };
+    marks.sort_by(|a, b| lowest(*a).total_cmp(&lowest(*b)));
+    // insertion, so that pairs that swing alike keep their order in the picture
+    for i in 1..marks.len() {
+        for k in (1..=i).rev() {
+            if things[marks[k - 1]].travel_px > CLEARLY_FARTHER * things[marks[k]].travel_px {
+                marks.swap(k - 1, k);
+            }
+        }
+    }
+}
+
+/// The still thing at the centre of the first mark's arc.
+fn hinge(things: &[Thing], belongs: &dyn Fn(&Thing) -> bool, arc: &Arc, first: usize) -> Option<usize> {
+    let off = |t: &Thing| {
+        let place = t.place_px();
+        let limit = |axis: usize| HINGE_DEVIATIONS * arc.sd_px[axis] + HINGE_OFF_PX + HINGE_OFF * arc.radius_px;
+        let parts = [0, 1].map(|axis| (place[axis] - arc.centre_px[axis]).abs() / limit(axis));
+        parts[0].max(parts[1])
+    };
+    let like = |t: &Thing| (t.area_px2 / things[first].area_px2).ln().abs() < MOST_UNLIKE;
+    let still = |t: &Thing| t.travel_px < 0.1 * things[first].travel_px;
+    let stays = |t: &Thing| t.stretch(&things[first]) < MOST_STRETCH;
+    let middle = things[first].place_px();
+    let towards = |p: [f64; 2]| (p[1] - middle[1]).atan2(p[0] - middle[0]);
+    let on_line = |t: &Thing| {
+        let turn = towards(t.place_px()) - towards(arc.centre_px);
+        turn.sin().abs() < HINGE_OFF_LINE_RAD && turn.cos() > 0.0 && t.stretch(&things[first]) < HINGE_STRETCH
+    };
+    let fits = |t: &Thing| belongs(t) && t.presence > LEAST_PRESENCE && still(t) && like(t) && stays(t);
+    (0..things.len())
+        .filter(|i| *i != first && fits(&things[*i]) && (off(&things[*i]) < 1.0 || on_line(&things[*i])))
+        .min_by(|a, b| off(&things[*a]).total_cmp(&off(&things[*b])))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn thing(hue: u8, path: impl Fn(f64) -> [f64; 2], moves: bool) -> Thing {
+        let path: Vec<Option<[f64; 2]>> = (0..300).map(|i| Some(path(0.05 * f64::from(i)))).collect();
+        let x: Vec<f64> = path.iter().flatten().map(|p| p[0]).collect();
+        let travel_px = 0.5 * (x.iter().copied().fold(f64::MIN, f64::max) - x.iter().copied().fold(f64::MAX, f64::min));
+        Thing { hue, presence: 1.0, area_px2: 300.0, travel_px, moves, path }
+    }
+
+    fn joint(t: f64) -> [f64; 2] {
+        let theta: f64 = 0.4 * (3.0 * t).sin();
+        [400.0 + 200.0 * theta.sin(), 50.0 + 200.0 * theta.cos()]
+    }
+
+    fn tip(t: f64) -> [f64; 2] {
+        let theta: f64 = 0.5 * (3.0 * t).sin() + 0.1 * (8.0 * t).cos();
+        [joint(t)[0] + 180.0 * theta.sin(), joint(t)[1] + 180.0 * theta.cos()]
+    }
+
+    #[test]
+    fn the_chain_runs_from_the_hinge_down_and_leaves_the_knob() {
+        let knob = thing(0, |_| [700.0, 90.0], false);
+        let things = [thing(0, tip, true), knob, thing(0, joint, true), thing(0, |_| [400.0, 50.0], false)];
+        let chain = longest(&things, &["#c01010".to_owned()]).unwrap();
+        assert_eq!((chain.marks, chain.hinge_marked), (vec![3, 2, 0], true));
+    }
+
+    #[test]
+    fn marks_of_two_colours_make_one_chain_and_an_unmarked_hinge_is_the_centre() {
+        let things = [thing(0, tip, true), thing(1, joint, true)];
+        let chain = longest(&things, &["#c01010".to_owned(), "#10c010".to_owned()]).unwrap();
+        assert_eq!((chain.marks.clone(), chain.hinge_marked), (vec![1, 0], false));
+        let centre = chain.arc.unwrap().centre_px;
+        assert!((centre[0] - 400.0).abs() < 0.1 && (centre[1] - 50.0).abs() < 0.1, "{centre:?}");
+    }
+
+    #[test]
+    fn what_only_drifts_is_no_mark() {
+        let things = [thing(0, |t| [100.0 + 7.0 * (t * 1.7).sin() * t, 80.0 + 9.0 * (t * 2.9).cos()], true)];
+        assert!(longest(&things, &["dark".to_owned()]).is_none());
+    }
+}

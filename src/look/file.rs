@@ -1,0 +1,135 @@
+//! What was found, as a commented `experiment.toml`.
+
+use std::fmt::Write as _;
+
+use super::Finding;
+
+/// Standard deviation of the pivot, over the radius, beyond which it is only a remark.
+const MOST_PIVOT_SD: f64 = 0.15;
+
+impl Finding {
+    /// The pivot is known well enough to measure angles from it, and no mark shows it.
+    pub fn states_pivot(&self) -> bool {
+        !self.hinge_marked && self.arc.is_some_and(|arc| arc.sd_px[0].max(arc.sd_px[1]) < MOST_PIVOT_SD * arc.radius_px)
+    }
+
+    /// Links that will have an angle.
+    fn links(&self) -> usize {
+        self.marks.len() - usize::from(!self.states_pivot())
+    }
+}
+
+/// The text of the file for a recording named `video`.
+pub fn to_toml(finding: &Finding, video: &str) -> String {
+    let mut text = format!(
+        "# Written by `freeswing init {video}`: what the recording shows, and what only a ruler and a scale can tell.\n\
+         # Measure what is marked \"MEASURE\" and put the number there. `freeswing track` works without it.\n\n"
+    );
+    specimen(&mut text, finding);
+    rig(&mut text, finding);
+    text
+}
+
+fn specimen(text: &mut String, finding: &Finding) {
+    let links = finding.links();
+    text.push_str("[specimen]\n");
+    text.push_str("name = \"unnamed\"              # for reports\n");
+    let _ = writeln!(
+        text,
+        "link_lengths_m = \"MEASURE\"    # {links} number{}, from the hinge down: [{}]",
+        if links == 1 { "" } else { "s" },
+        vec!["0.1"; links].join(", ")
+    );
+    text.push_str("length_m = \"MEASURE\"          # of the whole strip, or of the pendulum\n");
+    text.push_str("mass_kg = \"MEASURE\"           # of the whole strip, or of the bob\n");
+    text.push_str("# width_m = 0.05              # a strip's width, for air and light\n");
+    text.push_str(
+        "# for rigid arms or a bob give [[specimen.links]] with length_m, mass_kg, com_m, inertia_kg_m2 instead\n\n",
+    );
+}
+
+fn rig(text: &mut String, finding: &Finding) {
+    text.push_str("[rig]\n");
+    let colours: Vec<String> = finding.marks.iter().map(|m| format!("\"{}\"", m.colour)).collect();
+    let _ = writeln!(text, "# {}", found_in_words(finding));
+    let _ = writeln!(text, "marks = [{}]  # from the hinge down", colours.join(", "));
+    for (k, length) in finding.links_px.iter().enumerate() {
+        let _ = writeln!(text, "# marks {} and {} are {length:.1} px apart", k + 1, k + 2);
+    }
+    pivot(text, finding);
+    rate(text, finding);
+    if !finding.still.is_empty() {
+        let places: Vec<String> =
+            finding.still.iter().take(4).map(|t| t.place_px()).map(|[x, y]| format!("({x:.0}, {y:.0})")).collect();
+        let _ = writeln!(text, "# of the same look but standing still, and not taken for marks: {}", places.join(", "));
+    }
+    if finding.camera.taken_out {
+        let _ = writeln!(
+            text,
+            "# the camera moves by up to {:.1} px; that is taken out with the standing background",
+            finding.camera.greatest_shift_px
+        );
+    }
+    text.push_str("gravity_m_s2 = 9.80665\n");
+    text.push_str("# mirrored = true             # if the camera looks into a mirror\n");
+    text.push_str(
+        "# plumb_px = [[x, y], [x, y]] # two points of a plumb line, upper first, if the camera hangs askew\n",
+    );
+    text.push_str("# roi_px = [x, y, w, h]       # seek marks only in this part of the picture\n");
+    text.push_str("# from_s = 0.0                # leave out what comes before, until_s what comes after\n");
+}
+
+fn found_in_words(finding: &Finding) -> String {
+    let n = finding.marks.len();
+    let first = &finding.marks[usize::from(finding.hinge_marked)];
+    let width_px = 2.0 * (first.thing.area_px2 / std::f64::consts::PI).sqrt();
+    let turns = finding.frequency_hz.map_or(String::new(), |f| format!(", about {f:.3} times a second of the file"));
+    format!(
+        "{n} mark{} about {width_px:.0} px wide; the {} swings by ± {:.0} px{turns}",
+        if n == 1 { "" } else { "s" },
+        if n == 1 {
+            "mark"
+        } else if finding.hinge_marked {
+            "first stands still at the hinge, the next"
+        } else {
+            "first"
+        },
+        first.thing.travel_px
+    )
+}
+
+fn pivot(text: &mut String, finding: &Finding) {
+    let Some(arc) = &finding.arc else {
+        text.push_str(
+            "# the first mark swings on no clear arc: where it hangs is not known, so angles are between marks\n",
+        );
+        return;
+    };
+    let ([x, y], [sx, sy]) = (arc.centre_px, arc.sd_px);
+    let (width, height) = finding.stream.orientation.size(finding.stream.stored_size_px);
+    let inside = (0.0..width as f64).contains(&x) && (0.0..height as f64).contains(&y);
+    let beside = if inside { "" } else { ", outside the picture" };
+    let what = format!("centre of the first arc{beside}: ± {sx:.1}, ± {sy:.1} px (standard deviation)");
+    if finding.hinge_marked {
+        let _ = writeln!(
+            text,
+            "# the first mark is the hinge; the next one's arc has its centre at {x:.1}, {y:.1} ({what})"
+        );
+    } else if finding.states_pivot() {
+        let _ = writeln!(text, "pivot_px = [{x:.2}, {y:.2}]    # {what}");
+        let _ = writeln!(text, "# the first mark is {:.1} px below it", arc.radius_px);
+    } else {
+        let _ = writeln!(
+            text,
+            "# pivot_px = [{x:.1}, {y:.1}]  # {what}: too little is swung to use it; set it by hand if it is known"
+        );
+    }
+}
+
+fn rate(text: &mut String, finding: &Finding) {
+    let timing = &finding.timing;
+    let stated = timing.nominal_rate_hz.map_or("no rate".to_owned(), |r| format!("{r:.3} frames a second"));
+    let real = timing.real_rate_hz.map_or("unknown".to_owned(), |r| format!("{r:.3}"));
+    let _ = writeln!(text, "# the file states {stated}, its time stamps say {real}; the stamps are used");
+    text.push_str("# true_rate_hz = 240          # if this is slow motion: the rate at which the camera ran\n");
+}

@@ -1,0 +1,203 @@
+//! A recording of which nothing is known → what moves, the marks in order, the pivot, the links.
+//!
+//! Every hue that moves, and dark and light spots, are looked for at once. Of what lasts and swings, the things that
+//! keep their distances form a chain; the look whose chain is longest is that of the marks. The hinge is a still thing
+//! of their look at the centre of the first arc, or else that centre itself.
+
+mod arc;
+mod chain;
+mod file;
+mod preview;
+
+pub use arc::Arc;
+pub use file::to_toml;
+pub use preview::preview;
+
+use std::path::Path;
+
+use crate::detect::{Album, Hue, Trial};
+use crate::error::{Error, Result};
+use crate::experiment::MarkColour;
+use crate::measure::{Camera, Options, Session};
+use crate::progress::Progress;
+use crate::track::{FrameBlobs, Thing, things};
+use crate::video::{StreamInfo, Timing};
+
+/// Hues that are followed, strongest first.
+const MOST_HUES: usize = 6;
+/// Hues weaker than this share of the strongest are noise, or too small to be marks.
+const LEAST_WEIGHT: f64 = 2e-3;
+/// Numbers of marks for which threshold and scale are chosen: how many there are is not known yet.
+const COUNTS: [usize; 3] = [1, 2, 3];
+/// Marks that are looked for at most.
+pub const MOST_MARKS: usize = 12;
+
+/// One mark of the chain.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Mark {
+    /// What to call its colour: `#rrggbb`, `dark` or `light`.
+    pub colour: String,
+    /// What it does.
+    pub thing: Thing,
+}
+
+/// What a recording shows.
+#[derive(Debug, Clone)]
+pub struct Finding {
+    /// From the hinge down.
+    pub marks: Vec<Mark>,
+    /// The circle of the first mark that swings.
+    pub arc: Option<Arc>,
+    /// The first mark stands still and is the hinge.
+    pub hinge_marked: bool,
+    /// Lengths of the links between marks.
+    pub links_px: Vec<f64>,
+    /// Things of the marks' look that stand still and are none.
+    pub still: Vec<Thing>,
+    /// Turns a second of the first mark that swings.
+    pub frequency_hz: Option<f64>,
+    /// Time stamps.
+    pub timing: Timing,
+    /// The stream.
+    pub stream: StreamInfo,
+    /// The camera's motion.
+    pub camera: Camera,
+    /// One picture, stored as red, green, blue at chroma resolution.
+    pub background: Background,
+}
+
+/// A small picture for the preview.
+#[derive(Debug, Clone)]
+pub struct Background {
+    /// Columns.
+    pub width: usize,
+    /// Red, green, blue, row by row.
+    pub rgb: Vec<[u8; 3]>,
+    /// log₂ of luma columns and rows in a sample.
+    pub shifts: [u32; 2],
+}
+
+/// Looks at a recording. `options` gives the part and the span that are looked at; its marks are not used.
+///
+/// # Errors
+/// Whatever makes the recording unusable, and [`Error::NothingSwings`].
+pub fn look(path: &Path, options: &Options, folder: &Path, progress: &dyn Progress) -> Result<Finding> {
+    let options = Options { marks: Vec::new(), ..options.clone() };
+    let mut session = Session::open(path, &options, folder)?;
+    let looks = looks(session.album())?;
+    let frames = session.gather(looks.iter().map(|l| l.0.clone()).collect(), progress)?;
+    let all = things(&frames);
+    let names: Vec<String> = looks.into_iter().map(|(_, name)| name).collect();
+    let Some(chain) = chain::longest(&all, &names) else {
+        return Err(nothing_swings(path, &all, &names, &frames));
+    };
+    let t_s: Vec<f64> = frames.iter().map(|f| f.t_s).collect();
+    let marks: Vec<Mark> = chain
+        .marks
+        .iter()
+        .map(|i| Mark { colour: names[usize::from(all[*i].hue)].clone(), thing: all[*i].clone() })
+        .collect();
+    let links_px = marks.windows(2).filter_map(|w| w[0].thing.distance_px(&w[1].thing)).collect();
+    let swinging = usize::from(chain.hinge_marked);
+    let beside = |t: &Thing, m: &Mark| {
+        m.thing.distance_px(t).is_some_and(|d| d > m.thing.area_px2.sqrt().max(t.area_px2.sqrt()))
+    };
+    let still = all.iter().filter(|t| !t.moves && marks.iter().any(|m| m.thing.hue == t.hue));
+    let still = still.filter(|t| marks.iter().all(|m| beside(t, m)));
+    Ok(Finding {
+        frequency_hz: marks.get(swinging).and_then(|m| turns_per_second(&m.thing, &t_s)),
+        still: still.cloned().collect(),
+        links_px,
+        marks,
+        arc: chain.arc,
+        hinge_marked: chain.hinge_marked,
+        timing: Timing::audit(&t_s, session.stream().nominal_rate_hz, session.stream().tick_s),
+        stream: session.stream().clone(),
+        camera: session.camera(),
+        background: background(session.album()),
+    })
+}
+
+/// What is worth following: every hue that moves, dark spots, light spots; each with its name.
+fn looks(album: &Album) -> Result<Vec<(Hue, String)>> {
+    let mut looks = Vec::new();
+    let peaks = album.hues(0.0, std::f64::consts::PI);
+    let least = LEAST_WEIGHT * peaks.first().map_or(0.0, |p| p.weight);
+    let hues = peaks.iter().filter(|p| p.weight >= least).take(MOST_HUES);
+    let mut trials: Vec<(Trial, Option<&str>)> = Vec::new();
+    for peak in hues {
+        for marks in COUNTS {
+            let known = |t: &Trial| trials.iter().any(|(o, _)| is_alike(o, t));
+            let trial = album.try_hue(peak.angle_rad, marks, None)?.filter(|t| !known(t));
+            trials.extend(trial.map(|t| (t, None)));
+        }
+    }
+    for (dark, name) in [(true, "dark"), (false, "light")] {
+        for marks in COUNTS {
+            let known = |t: &Trial| trials.iter().any(|(o, n)| *n == Some(name) && is_alike(o, t));
+            let trial = album.try_luma(dark, marks)?.filter(|t| !known(t));
+            trials.extend(trial.map(|t| (t, Some(name))));
+        }
+    }
+    // what shows more spots than there can be marks is a wall or a shadow
+    let few = |t: &Trial| t.likely().count() <= MOST_MARKS * t.spots.len();
+    for (trial, name) in trials.into_iter().filter(|(t, _)| few(t)) {
+        let Some(name) = name.map(str::to_owned).or_else(|| album.colour_name(&trial)) else { continue };
+        let Ok(colour) = name.parse::<MarkColour>() else { continue };
+        let mut hue = Hue { colour, marks: trial.marks, round: true, ..Hue::default() };
+        hue.adopt(&trial, album.sample_px2());
+        looks.push((hue, name));
+    }
+    Ok(looks)
+}
+
+/// Two trials would find the same.
+fn is_alike(a: &Trial, b: &Trial) -> bool {
+    let sizes = a.usual_samples().zip(b.usual_samples());
+    a.angle_rad == b.angle_rad
+        && (a.level, a.thin) == (b.level, b.thin)
+        && (a.threshold / b.threshold).ln().abs() < 0.2
+        && sizes.is_none_or(|(a, b)| (a / b).ln().abs() < 0.4)
+}
+
+fn nothing_swings(path: &Path, all: &[Thing], names: &[String], frames: &[FrameBlobs]) -> Error {
+    let moving = all.iter().filter(|t| t.moves).count();
+    let still = all.len() - moving;
+    let found = if names.is_empty() {
+        "nothing coloured, dark or light stands out from its surroundings".to_owned()
+    } else {
+        format!(
+            "of {} lasting spots ({}) {moving} move and {still} stand still, but none swings on an arc like a mark",
+            all.len(),
+            names.join(", ")
+        )
+    };
+    Error::NothingSwings { path: path.to_owned(), frames: frames.len(), found }
+}
+
+/// Full turns a second of a thing's motion along its longer axis.
+fn turns_per_second(thing: &Thing, t_s: &[f64]) -> Option<f64> {
+    let middle = thing.place_px();
+    let range = |axis: usize| {
+        let values = thing.path.iter().flatten().map(|p| p[axis]);
+        values.clone().fold(f64::MIN, f64::max) - values.fold(f64::MAX, f64::min)
+    };
+    let axis = usize::from(range(1) > range(0));
+    let rows: Vec<(f64, f64)> =
+        thing.path.iter().zip(t_s).filter_map(|(p, t)| p.map(|p| (*t, p[axis] - middle[axis]))).collect();
+    let rises: Vec<f64> = rows
+        .windows(2)
+        .filter(|w| w[0].1 < 0.0 && w[1].1 >= 0.0)
+        .map(|w| w[0].0 + (w[1].0 - w[0].0) * w[0].1 / (w[0].1 - w[1].1))
+        .collect();
+    let (first, last) = (rises.first()?, rises.last()?);
+    (rises.len() >= 3 && last > first).then(|| (rises.len() - 1) as f64 / (last - first))
+}
+
+fn background(album: &Album) -> Background {
+    let width = album.pictures.first().map_or(0, |p| p.width);
+    let rgb = album.pictures.first().map_or_else(Vec::new, |p| {
+        p.luma.iter().zip(&p.cb).zip(&p.cr).map(|((y, b), r)| album.rgb([*y, *b, *r])).collect()
+    });
+    Background { width, rgb, shifts: album.shifts }
+}

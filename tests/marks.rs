@@ -1,0 +1,132 @@
+//! Marks as laboratories have them, and what is said of what is none: the commands as a user types them.
+
+use std::path::{Path, PathBuf};
+use std::process::{Command, Output};
+
+use assert_cmd::cargo::CommandCargoExt;
+use freeswing::experiment::{Experiment, Rgb};
+use freeswing::synth::Recording;
+use tempfile::TempDir;
+
+fn scene() -> Experiment {
+    let text = include_str!("../fixtures/render/small.toml");
+    let mut experiment = Experiment::parse(text, Path::new("small.toml")).unwrap();
+    experiment.render.duration_s = 4.0;
+    experiment.render.codec.gop = 24;
+    experiment
+}
+
+/// A folder with one recording.
+struct Bench {
+    folder: TempDir,
+}
+
+impl Bench {
+    fn of(experiment: &Experiment) -> Self {
+        let folder = tempfile::tempdir().unwrap();
+        Recording::of(experiment).unwrap().write(&folder.path().join("swing.mp4"), None, &mut |_| Ok(())).unwrap();
+        Self { folder }
+    }
+
+    fn path(&self, name: &str) -> PathBuf {
+        self.folder.path().join(name)
+    }
+
+    fn freeswing(&self, arguments: &[&str]) -> Output {
+        let mut command = Command::cargo_bin("freeswing").unwrap();
+        command.current_dir(self.folder.path()).args(arguments).output().unwrap()
+    }
+
+    fn track(&self, more: &[&str]) -> Output {
+        self.freeswing(&[&["track", "swing.mp4", "--out", "angles.csv"], more].concat())
+    }
+
+    fn table(&self) -> String {
+        std::fs::read_to_string(self.path("angles.csv")).unwrap()
+    }
+}
+
+fn said(output: &Output) -> String {
+    String::from_utf8_lossy(&output.stderr).into_owned()
+}
+
+fn done(output: &Output) -> String {
+    assert!(output.status.success(), "{}", said(output));
+    said(output)
+}
+
+fn refused(output: &Output) -> String {
+    assert_eq!(output.status.code(), Some(2), "{}", said(output));
+    assert_eq!(said(output).trim().lines().count(), 1, "{}", said(output));
+    said(output)
+}
+
+/// A column of a table, empty fields left out.
+fn column(table: &str, name: &str) -> Vec<f64> {
+    let index = table.lines().next().unwrap().split(',').position(|c| c == name).unwrap();
+    table.lines().skip(1).filter_map(|row| row.split(',').nth(index)?.parse().ok()).collect()
+}
+
+#[test]
+fn fewer_marks_than_swing_are_said_and_more_are_refused() {
+    let bench = Bench::of(&scene());
+    assert!(done(&bench.track(&["--markers", "2"])).contains("more thing of the marks' colour moves"));
+    let words = refused(&bench.track(&["--markers", "4"]));
+    assert!(words.contains("found 3 red marks where 4 are needed") && words.contains("--markers 3"), "{words}");
+}
+
+#[test]
+fn a_colour_that_is_not_there_is_answered_with_the_one_that_moves_and_with_pictures() {
+    let mut plain = scene();
+    plain.render.strip_rgb = Rgb([90, 90, 94]);
+    let bench = Bench::of(&plain);
+    let words = refused(&bench.track(&["--color", "green", "--debug-frames", "steps", "--debug-count", "2"]));
+    assert!(words.contains("no green mark") && words.contains("try --color '#"), "{words}");
+    assert!(!bench.path("angles.csv").exists());
+    assert!(std::fs::read_dir(bench.path("steps")).unwrap().count() >= 8);
+}
+
+#[test]
+fn a_span_and_a_region_are_all_that_is_measured() {
+    let bench = Bench::of(&scene());
+    done(&bench.track(&["--from", "1", "--until", "2.5"]));
+    let stamps = column(&bench.table(), "t_s");
+    assert!(stamps[0] >= 1.0 && *stamps.last().unwrap() <= 2.5 && stamps.len() > 20, "{}", stamps.len());
+    let words = refused(&bench.track(&["--roi", "0,0,12,12"]));
+    assert!(words.contains("no red mark"), "{words}");
+    assert!(refused(&bench.track(&["--roi", "9000,0,12,12"])).contains("lies beside the picture"));
+}
+
+#[test]
+fn slow_motion_is_measured_in_its_own_time() {
+    let bench = Bench::of(&scene());
+    done(&bench.track(&[]));
+    let played = column(&bench.table(), "t_s");
+    let rate_hz = (played.len() - 1) as f64 / (played[played.len() - 1] - played[0]);
+    done(&bench.track(&["--true-rate", &format!("{}", 4.0 * rate_hz)]));
+    let own = column(&bench.table(), "t_s");
+    assert!((own[own.len() - 1] * 4.0 / played[played.len() - 1] - 1.0).abs() < 1e-3);
+}
+
+#[test]
+fn what_init_writes_is_enough_to_track_and_says_what_is_still_to_be_measured() {
+    let bench = Bench::of(&scene());
+    let words = done(&bench.freeswing(&["init", "swing.mp4", "--preview", "seen.png"]));
+    assert!(words.contains("3 marks"), "{words}");
+    assert!(image::open(bench.path("seen.png")).is_ok());
+    let file = std::fs::read_to_string(bench.path("experiment.toml")).unwrap();
+    assert!(file.contains("link_lengths_m = \"MEASURE\"") && file.contains("centre of the first arc"), "{file}");
+    done(&bench.track(&["--config", "experiment.toml"]));
+    assert_eq!(column(&bench.table(), "theta2_rad").len(), column(&bench.table(), "t_s").len());
+    let words = refused(&bench.freeswing(&["fit", "angles.csv", "--config", "experiment.toml"]));
+    assert!(words.contains("specimen.link_lengths_m is still to be measured"), "{words}");
+    assert!(refused(&bench.freeswing(&["init", "swing.mp4"])).contains("exists already"));
+}
+
+#[test]
+fn one_mark_alone_gives_its_displacement() {
+    let bench = Bench::of(&scene());
+    done(&bench.track(&["--markers", "1", "--overlay", "seen.mp4"]));
+    let table = bench.table();
+    assert!(!column(&table, "displacement_px").is_empty() && !table.contains("theta1_rad"));
+}
