@@ -54,7 +54,7 @@ pub fn best_end<'a>(
     progress: &dyn Progress,
 ) -> Result<End<'a>> {
     let search = Search { records, free, noise_rad };
-    let Modes { begun, rings } = search.from_modes(experiment);
+    let Modes { begun, rings } = search.modes(experiment);
     let mut order = vec![experiment];
     order.extend(&begun);
     let springs = order.iter().map(|begun| begin::spring_of(begun, free)).collect::<Option<Vec<_>>>();
@@ -137,7 +137,7 @@ impl<'a> Search<'a, '_> {
     }
 
     /// The experiment as the modes of the longest recording have it, where a spring or a damper is free.
-    fn from_modes(&self, experiment: &Experiment) -> Modes {
+    fn modes(&self, experiment: &Experiment) -> Modes {
         let begun_with = |p: &Parameter| {
             p.is_spring() || matches!(p, Parameter::JointDamping | Parameter::HingeViscous | Parameter::AirLinear)
         };
