@@ -112,6 +112,10 @@ const SAMPLE_PICTURES: usize = 8;
 /// Shift between two pictures from which the camera is taken to move, px: ten times what a patch's error is.
 const CAMERA_MOVES_PX: f64 = 0.3;
 
+/// Standard deviations beyond which a shift is one, and pictures that must show it.
+const SURE_SHIFT: f64 = 5.0;
+const FEWEST_PICTURES: usize = 3;
+
 /// Measures a recording. Paths in the rig are relative to `folder`.
 ///
 /// # Errors
@@ -312,21 +316,28 @@ struct Lookout {
     background: Option<Background>,
     greatest_px: f64,
     agreed: Vec<Vec<bool>>,
+    /// Pictures that do not say where the camera looks.
+    silent: usize,
 }
 
 impl Lookout {
     fn new(options: &Options, stream: &StreamInfo) -> Self {
         let stored = |p: &[f64; 2]| stream.orientation.stored_point(*p, stream.stored_size_px);
         let points_px = options.rig.reference_marks.iter().map(stored).collect();
-        Self { points_px, background: None, greatest_px: 0.0, agreed: Vec::new() }
+        Self { points_px, background: None, greatest_px: 0.0, agreed: Vec::new(), silent: 0 }
     }
 
     fn see(&mut self, frame: &Frame<'_>) {
         match &self.background {
             None => self.background = Some(Background::of(&frame.picture, &self.points_px)),
             Some(background) => {
-                if let Some(camera) = background.locate(&frame.picture) {
-                    self.greatest_px = self.greatest_px.max(camera.size_px());
+                let located = background.locate(&frame.picture);
+                self.silent += usize::from(located.is_none());
+                if let Some(camera) = located {
+                    // a shift that its own patches leave open is none
+                    if camera.size_px() > SURE_SHIFT * camera.sd_px {
+                        self.greatest_px = self.greatest_px.max(camera.size_px());
+                    }
                     self.agreed.push(background.agreeing(&frame.picture, &camera));
                 }
             }
@@ -337,11 +348,17 @@ impl Lookout {
         let taken_out = match steadying {
             Steadying::Always => true,
             Steadying::Never => false,
-            Steadying::WhereNeeded => !self.points_px.is_empty() || self.greatest_px > CAMERA_MOVES_PX,
+            // where some picture does not show the background well, no frame is risked for it
+            Steadying::WhereNeeded => {
+                let moves = self.greatest_px > CAMERA_MOVES_PX && self.agreed.len() >= FEWEST_PICTURES;
+                !self.points_px.is_empty() || (moves && self.silent == 0)
+            }
         };
-        let camera = Camera { greatest_shift_px: self.greatest_px, taken_out, ..Camera::default() };
         let mut background = self.background.filter(|_| taken_out);
         background.iter_mut().for_each(|b| b.keep_steady(&self.agreed));
+        let background = background.filter(Background::is_usable);
+        let greatest_shift_px = if self.silent == 0 { self.greatest_px } else { 0.0 };
+        let camera = Camera { greatest_shift_px, taken_out: background.is_some(), ..Camera::default() };
         (background, camera)
     }
 }

@@ -14,18 +14,18 @@ use crate::video::Picture;
 /// Half the side of a patch.
 const HALF: i64 = 15;
 /// Farthest that a patch is sought, px.
-const REACH_PX: i64 = 20;
+const REACH_PX: i64 = 21;
 /// Columns and rows of cells, each with one patch.
 const CELLS: [usize; 2] = [8, 6];
 /// Mean square of the weaker gradient, codes², below which a patch is too plain to be found again.
 const LEAST_GRADIENT: f64 = 2.0;
 /// Fewest patches of the background that must agree, and as a share of those that are found again.
 const FEWEST_AGREEING: usize = 6;
-const AGREEING_SHARE: f64 = 0.35;
-/// Correlation of a patch with what it is found as, at least: three quarters of the variance in common.
-const LEAST_CORRELATION: f32 = 0.85;
+const AGREEING_SHARE: f64 = 0.5;
+/// Share of the picture's width that they span, at least: what swings is a smaller thing.
+const LEAST_SPAN: f64 = 0.4;
 /// First shifts within which two patches say the same, px.
-const SAME_PX: f64 = 2.5;
+const SAME_PX: f64 = 3.5;
 /// Residual within which a patch agrees, px, at least.
 const AGREEMENT_PX: f64 = 0.25;
 
@@ -158,7 +158,7 @@ impl Background {
             // a turn, and parts of a pixel, are not known yet in the first round
             let limit = if round == 0 { 3.0 } else { (3.0 * usual).clamp(AGREEMENT_PX, 1.0) };
             let kept: Vec<_> = found.iter().filter(|f| rest(f) <= limit).collect();
-            if kept.len() < fewest || !(self.named || self.is_spread(&kept)) {
+            if kept.len() < fewest || !(self.named || self.is_wide(&kept)) {
                 return None;
             }
             let next = self.least_squares(&kept)?;
@@ -172,13 +172,16 @@ impl Background {
         Some(camera)
     }
 
-    /// The patches reach over half of the picture's width and height. A rigid strip that swings shifts and turns like a
-    /// camera, but it is no background.
-    fn is_spread(&self, kept: &[&([f64; 2], [f64; 2])]) -> bool {
-        (0..2).all(|axis| {
-            let at = kept.iter().map(|k| k.0[axis]);
-            at.clone().fold(f64::MIN, f64::max) - at.fold(f64::MAX, f64::min) >= self.centre_px[axis]
-        })
+    /// The patches lie all over the picture.
+    fn is_wide(&self, kept: &[&([f64; 2], [f64; 2])]) -> bool {
+        let x = || kept.iter().map(|f| f.0[0]);
+        let span = x().fold(f64::MIN, f64::max) - x().fold(f64::MAX, f64::min);
+        span > LEAST_SPAN * 2.0 * self.centre_px[0]
+    }
+
+    /// There are patches enough to say where the camera looks.
+    pub fn is_usable(&self) -> bool {
+        self.named && !self.patches.is_empty() || self.patches.len() >= FEWEST_AGREEING
     }
 
     fn least_squares(&self, kept: &[&([f64; 2], [f64; 2])]) -> Option<CameraShift> {
@@ -271,7 +274,7 @@ impl Patch {
         })
     }
 
-    /// The shift in whole pixels with the least difference, every third pixel compared.
+    /// The shift with the least difference, to two pixels, every fourth pixel compared: near enough to go on from.
     fn search(&self, luma: &Luma<'_>) -> Option<[f64; 2]> {
         let mut best: Option<(f32, [i64; 2])> = None;
         let side = 2 * HALF + 1;
@@ -280,8 +283,8 @@ impl Patch {
                 return;
             }
             let (mut sum, mut squares, mut count) = (0.0f32, 0.0f32, 0.0f32);
-            for j in (0..side).step_by(3) {
-                for i in (0..side).step_by(3) {
+            for j in (1..side).step_by(4) {
+                for i in (1..side).step_by(4) {
                     let value = luma.code(self.x + dx + i - HALF, self.y + dy + j - HALF);
                     let difference = value - self.values[(j * side + i) as usize];
                     (sum, squares, count) = (sum + difference, squares + difference * difference, count + 1.0);
@@ -292,22 +295,12 @@ impl Patch {
                 best = Some((variance, [dx, dy]));
             }
         };
-        for dy in (-REACH_PX..=REACH_PX).step_by(2) {
-            for dx in (-REACH_PX..=REACH_PX).step_by(2) {
+        for dy in (-REACH_PX..=REACH_PX).step_by(3) {
+            for dx in (-REACH_PX..=REACH_PX).step_by(3) {
                 consider(dx, dy);
             }
         }
         best.map(|(_, shift)| shift.map(|s| s as f64))
-    }
-
-    /// The values found correlate with the patch's own; a patch that holds only noise finds something everywhere.
-    fn resembles(&self, values: &[f32], mean: f32) -> bool {
-        let (mut both, mut own, mut other) = (0.0f32, 0.0f32, 0.0f32);
-        for (a, b) in self.values.iter().zip(values) {
-            let b = b - mean;
-            (both, own, other) = (both + a * b, own + a * a, other + b * b);
-        }
-        both > LEAST_CORRELATION * (own * other).sqrt()
     }
 
     /// The shift to a fraction of a pixel, from a first one.
@@ -330,7 +323,7 @@ impl Patch {
                 return None;
             }
             if step[0].hypot(step[1]) < 3e-3 {
-                return self.resembles(&values, mean).then_some(shift);
+                return Some(shift);
             }
         }
         None
