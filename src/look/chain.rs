@@ -196,7 +196,7 @@ mod tests {
 
     #[test]
     fn what_only_drifts_is_no_mark() {
-        let things = [thing(0, |t| [100.0 + 7.0 * (t * 1.7).sin() * t, 80.0 + 9.0 * (t * 2.9).cos()], true)];
+        let things = [thing(0, |t| [100.0 + 7.0 * (t * 1.7).sin() * t, 80.0 + 60.0 * (t * 2.9).cos()], true)];
         assert!(longest(&things, &["dark".to_owned()]).is_none());
     }
 }
