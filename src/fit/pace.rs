@@ -1,6 +1,6 @@
 //! How fast the recording swings beside how fast the specimen would: a wrong length, time base or unit, in words.
 
-use std::f64::consts::PI;
+use std::f64::consts::{FRAC_PI_2, PI};
 
 use super::begin::{slow_mode_hz, undamped};
 use super::{Record, Seen};
@@ -40,6 +40,8 @@ pub struct Pace {
     gravity_m_s2: f64,
     /// What the angles themselves say.
     pub shape: Option<String>,
+    /// The angles reach beyond 90°: the frequency of a small swing says nothing about the specimen.
+    beyond_small: bool,
 }
 
 impl Pace {
@@ -55,6 +57,7 @@ impl Pace {
             links: experiment.specimen.lengths_m().len(),
             gravity_m_s2: experiment.rig.gravity_m_s2,
             shape: shape(seen, experiment),
+            beyond_small: seen.slow.amplitude_rad > FRAC_PI_2,
         })
     }
 
@@ -65,7 +68,7 @@ impl Pace {
 
     /// Whether the two differ by more than the recording leaves open.
     pub fn differs(&self) -> bool {
-        (self.ratio() - 1.0).abs() > SMALL.max(2.0 * self.half)
+        !self.beyond_small && (self.ratio() - 1.0).abs() > SMALL.max(2.0 * self.half)
     }
 
     /// What differs and what would explain it; `None` where nothing does.
@@ -118,7 +121,7 @@ impl Pace {
 pub fn refuse_another_pace(record: &Record, seen: &Seen, experiment: &Experiment) -> Result<()> {
     let Some(pace) = Pace::of(seen, experiment) else { return Ok(()) };
     let is_near = |hz: f64| (hz / pace.model_hz).ln().abs() < HOPELESS.ln();
-    if is_near(pace.seen_hz) || seen.peaks_hz.iter().any(|hz| is_near(*hz)) {
+    if pace.beyond_small || is_near(pace.seen_hz) || seen.peaks_hz.iter().any(|hz| is_near(*hz)) {
         return Ok(());
     }
     let message = format!("cannot be fitted. {}", pace.explained());
@@ -134,6 +137,9 @@ fn shape(seen: &Seen, experiment: &Experiment) -> Option<String> {
         let modelled: Vec<f64> =
             model.shape.iter().map(|c| c.amplitude / first.amplitude * (c.phase_rad - first.phase_rad).cos()).collect();
         if experiment.model.effects.distributed_flexibility.is_some() || modelled.len() != seen.slow.shape.len() {
+            return None;
+        }
+        if seen.slow.amplitude_rad > FRAC_PI_2 {
             return None;
         }
         (1..modelled.len()).find_map(|link| {

@@ -1,5 +1,7 @@
 //! What a recording shows without the model: how fast it swings, and how fast that dies away.
 
+use std::f64::consts::FRAC_PI_2;
+
 use nalgebra::Complex;
 
 use super::Record;
@@ -62,7 +64,10 @@ impl Seen {
             warnings: Vec::new(),
         };
         let found = identify(&series.slice(0..record.len().min(ENOUGH_ROWS)), None).ok()?;
-        let modes = clear_modes(&found);
+        let mut modes = clear_modes(&found);
+        if modes.is_empty() {
+            modes = modes_of_degrees(&series);
+        }
         let largest_rad = modes.iter().map(|m| m.amplitude_rad).fold(0.0, f64::max);
         let slow = modes.iter().find(|m| m.amplitude_rad >= WEAK * largest_rad)?.clone();
         let second = |modes: Vec<SeenMode>| modes.into_iter().find(|m| m.frequency_hz > FASTER * slow.frequency_hz);
@@ -74,6 +79,19 @@ impl Seen {
         let peaks_hz = found.spectrum.significant().map(|p| p.frequency_hz.value).collect();
         Some(Self { fast: second(modes).or_else(early), slow, nyquist_hz: series.nyquist_hz(), peaks_hz })
     }
+}
+
+/// The modes of angles beyond 90°, taken for degrees, of which they are a small swing; their amplitudes as in the table.
+fn modes_of_degrees(series: &AngleSeries) -> Vec<SeenMode> {
+    let mut series = series.slice(0..series.t_s.len().min(ENOUGH_ROWS));
+    let angles = || series.theta_rad.iter().flatten().flatten();
+    if !angles().any(|a| a.abs() > FRAC_PI_2) {
+        return Vec::new();
+    }
+    series.theta_rad.iter_mut().flatten().flatten().for_each(|a| *a = a.to_radians());
+    let mut modes = identify(&series, None).map_or_else(|_| Vec::new(), |found| clear_modes(&found));
+    modes.iter_mut().for_each(|m| m.amplitude_rad = m.amplitude_rad.to_degrees());
+    modes
 }
 
 /// The modes of a known frequency, slowest first.
