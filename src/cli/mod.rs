@@ -36,7 +36,7 @@ pub struct Cli {
 #[derive(Debug, Subcommand)]
 enum Command {
     Init(init::InitArgs),
-    Track(track::TrackArgs),
+    Track(Box<track::TrackArgs>),
     Identify(identify::IdentifyArgs),
     Fit(fit::FitArgs),
     Diagnose(diagnose::DiagnoseArgs),
