@@ -11,7 +11,7 @@
 //! | [`problem`] | what is fitted to what |
 //! | [`begin`] | where a fit begins: with the seen modes |
 //! | [`shooting`] | multiple shooting: start values that cannot be out of step |
-//! | [`search`] | several beginnings, the best end |
+//! | `search` | several beginnings, the best end |
 //! | [`descent`] | Levenberg–Marquardt with bounds |
 //! | [`straight`] | the variables in which a hysteresis is fitted |
 //! | [`interval`] | standard deviations and 95 % intervals |
