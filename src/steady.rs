@@ -396,7 +396,7 @@ mod tests {
             for x in 0..320 {
                 let (u, v) = (x as f64 - shift[0], y as f64 - shift[1]);
                 let mut value = 120.0 + 30.0 * (0.21 * u + 0.05 * v).sin() + 30.0 * (0.17 * v - 0.04 * u).cos();
-                value += 20.0 * (0.013 * u * v).sin();
+                value += 20.0 * (0.0013 * u * v).sin();
                 // what swings, and must not count
                 if (140..200).contains(&x) {
                     value = 120.0 + 60.0 * (0.3 * (u - 3.0 * shift[0])).sin();
