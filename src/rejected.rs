@@ -106,10 +106,10 @@ impl Rejected<'_> {
             }
         };
         for peak in self.album.hues(0.0, std::f64::consts::PI).iter().take(4) {
-            consider(self.album.try_hue(peak.angle_rad, hue.marks, None)?, None, self.album);
+            consider(self.album.try_hue(peak.angle_rad, &[hue.marks], None)?.pop().flatten(), None, self.album);
         }
         for (dark, name) in [(true, "dark"), (false, "light")] {
-            consider(self.album.try_luma(dark, hue.marks)?, Some(name), self.album);
+            consider(self.album.try_luma(dark, &[hue.marks], None)?.pop().flatten(), Some(name), self.album);
         }
         Ok(best.filter(|(quality, name)| *quality > LEAST_QUALITY && *name != hue.colour.name).map(|(_, name)| name))
     }

@@ -21,6 +21,8 @@ const MOST_HUES: usize = 3;
 const OFF_NAME: f64 = 0.3;
 /// A mark more samples wide than this is looked for at a coarser scale.
 const MOST_SAMPLES_WIDE: f64 = 40.0;
+/// A mark this many samples wide shows its shape.
+const WIDE_ENOUGH: f64 = 6.0;
 /// Coarsest scale: 2^4 chroma samples.
 const LAST_LEVEL: u32 = 4;
 /// Contrast at which a spot counts half, 0 to 255.
@@ -60,15 +62,6 @@ pub struct Trial {
     pub quality: f64,
 }
 
-/// What to look for, and how.
-#[derive(Debug, Clone, Copy)]
-struct Ask {
-    axis: HueAxis,
-    level: u32,
-    marks: usize,
-    threshold: Option<f64>,
-}
-
 impl Album {
     /// Learns hue, scale and threshold of every hue; `fixed` is a threshold that the user gave. Returns what each
     /// trial showed.
@@ -95,8 +88,8 @@ impl Album {
 
     fn best_trial(&self, hue: &Hue, angle: Option<f64>, others: &[f64], fixed: Option<f64>) -> Result<Option<Trial>> {
         let Some(named_rad) = angle else {
-            let axis = HueAxis::new(&hue.colour, self.matrix);
-            return self.try_all_levels(Ask { axis, level: 0, marks: hue.marks, threshold: fixed });
+            let dark = hue.colour.look() == Look::Dark;
+            return Ok(self.try_luma(dark, &[hue.marks], fixed)?.pop().flatten());
         };
         // two colours of marks share what lies between them
         let nearest = others.iter().map(|o| 0.5 * turn(o - named_rad).abs()).fold(f64::MAX, f64::min);
@@ -105,7 +98,7 @@ impl Album {
         peaks.truncate(MOST_HUES);
         let mut best: Option<(f64, Trial)> = None;
         for angle_rad in peaks.iter().map(|p| p.angle_rad).chain([named_rad]) {
-            let Some(trial) = self.try_hue(angle_rad, hue.marks, fixed)? else { continue };
+            let Some(trial) = self.try_hue(angle_rad, &[hue.marks], fixed)?.pop().flatten() else { continue };
             let worth = trial.quality - OFF_NAME * turn(angle_rad - named_rad).abs() / half_width;
             if best.as_ref().is_none_or(|(most, _)| worth > *most) {
                 best = Some((worth, trial));
@@ -114,58 +107,54 @@ impl Album {
         Ok(best.map(|(_, trial)| trial))
     }
 
-    /// Tries a hue at the scale that its spots ask for.
+    /// Tries a hue at the scale that its spots ask for, for every number of marks: the best trial of each.
     ///
     /// # Errors
     /// [`crate::Error::OpenCv`].
-    pub fn try_hue(&self, angle_rad: f64, marks: usize, fixed: Option<f64>) -> Result<Option<Trial>> {
-        let axis = HueAxis::at_angle(angle_rad);
-        let mut best: Option<Trial> = None;
+    pub fn try_hue(&self, angle_rad: f64, counts: &[usize], fixed: Option<f64>) -> Result<Vec<Option<Trial>>> {
+        let mut best: Vec<Option<Trial>> = vec![None; counts.len()];
         for level in 0..=LAST_LEVEL {
-            let trial = self.try_once(Ask { axis, level, marks, threshold: fixed })?;
-            let Some(mut trial) = trial else { break };
-            trial.angle_rad = Some(angle_rad);
-            let wide = trial.diameter_samples();
-            if best.as_ref().is_none_or(|b| trial.quality > b.quality) {
-                best = Some(trial);
+            let scale = self.at_scale(HueAxis::at_angle(angle_rad), level)?;
+            let mut widest = 0.0f64;
+            for (best, marks) in best.iter_mut().zip(counts) {
+                let Some(mut trial) = scale.try_for(*marks, fixed)? else { continue };
+                trial.angle_rad = Some(angle_rad);
+                widest = widest.max(trial.diameter_samples());
+                keep_better(best, trial);
             }
-            if wide <= MOST_SAMPLES_WIDE {
+            if widest <= MOST_SAMPLES_WIDE {
                 break;
             }
         }
         Ok(best)
     }
 
-    fn try_all_levels(&self, ask: Ask) -> Result<Option<Trial>> {
-        let mut best: Option<Trial> = None;
+    /// Dark marks, or light ones, at whatever scale shows them best, for every number of marks.
+    ///
+    /// # Errors
+    /// [`crate::Error::OpenCv`].
+    pub fn try_luma(&self, dark: bool, counts: &[usize], fixed: Option<f64>) -> Result<Vec<Option<Trial>>> {
+        let mut best: Vec<Option<Trial>> = vec![None; counts.len()];
         for level in 0..=LAST_LEVEL {
-            let Some(trial) = self.try_once(Ask { level, ..ask })? else { continue };
-            if best.as_ref().is_none_or(|b| trial.quality > b.quality) {
-                best = Some(trial);
+            let scale = self.at_scale(HueAxis::of_luma_sign(dark), level)?;
+            for (best, marks) in best.iter_mut().zip(counts) {
+                if let Some(trial) = scale.try_for(*marks, fixed)? {
+                    keep_better(best, trial);
+                }
             }
         }
         Ok(best)
     }
 
-    /// Dark marks, or light ones, at whatever scale shows them best.
-    ///
-    /// # Errors
-    /// [`crate::Error::OpenCv`].
-    pub fn try_luma(&self, dark: bool, marks: usize) -> Result<Option<Trial>> {
-        let name = if dark { "dark" } else { "light" };
-        let Ok(colour) = name.parse::<crate::experiment::MarkColour>() else { return Ok(None) };
-        let axis = HueAxis::new(&colour, self.matrix);
-        self.try_all_levels(Ask { axis, level: 0, marks, threshold: None })
-    }
-
-    fn try_once(&self, ask: Ask) -> Result<Option<Trial>> {
-        let floor = if ask.axis.is_luma() { LEAST_CONTRAST } else { LEAST_COMPONENT };
-        let least = ((LEAST_AREA_PX2 / self.sample_px2()) as usize >> (2 * ask.level)).max(3);
-        let moved: Vec<Vec<bool>> = self.moved.iter().map(|m| self.coarse(m, ask.level)).collect();
+    /// What every picture shows along an axis at one scale.
+    fn at_scale(&self, axis: HueAxis, level: u32) -> Result<Scale> {
+        let floor = if axis.is_luma() { LEAST_CONTRAST } else { LEAST_COMPONENT };
+        let least = ((LEAST_AREA_PX2 / self.sample_px2()) as usize >> (2 * level)).max(3);
+        let moved: Vec<Vec<bool>> = self.moved.iter().map(|m| self.coarse(m, level)).collect();
         let mut planes = Vec::new();
         let mut summits: [Vec<Vec<Summit>>; 2] = [Vec::new(), Vec::new()];
         for (n, picture) in self.pictures.iter().enumerate() {
-            let plane = self.plane(picture, ask.axis, ask.level)?;
+            let plane = self.plane(picture, axis, level)?;
             let mut relief = Relief::new(&plane, moved.get(n).map(Vec::as_slice));
             summits[1].push(relief.summits(least, floor));
             relief.open();
@@ -177,18 +166,7 @@ impl Album {
         if moves {
             summits.iter_mut().flatten().for_each(|s| s.retain(Summit::moves));
         }
-        let chosen = [false, true].into_iter().find_map(|thin| {
-            threshold::choose(&summits[usize::from(thin)], ask.marks, floor).map(|threshold| (threshold, thin))
-        });
-        let Some((threshold, thin)) = chosen.map(|(t, thin)| (ask.threshold.unwrap_or(t), thin)) else {
-            return Ok(None);
-        };
-        let mut spots = Vec::new();
-        for (n, plane) in planes.iter().enumerate() {
-            spots.push(spots_of(plane, threshold, thin, least, moved.get(n).map(Vec::as_slice))?);
-        }
-        let quality = quality(&spots, ask.marks, moves, ask.axis.is_luma());
-        Ok(Some(Trial { angle_rad: None, level: ask.level, threshold, thin, marks: ask.marks, spots, quality }))
+        Ok(Scale { luma: axis.is_luma(), level, floor, least, moved, planes, summits, moves })
     }
 
     /// What moves, at a coarser scale: where a quarter of the samples do.
@@ -257,6 +235,45 @@ impl Album {
             top = plane.values.iter().copied().fold(top, i16::max);
         }
         Ok(to_255(f64::from(top)))
+    }
+}
+
+/// What every picture shows along one axis at one scale.
+struct Scale {
+    luma: bool,
+    level: u32,
+    floor: f64,
+    least: usize,
+    moved: Vec<Vec<bool>>,
+    planes: Vec<Plane>,
+    /// Without thin lines, and with them; by picture.
+    summits: [Vec<Vec<Summit>>; 2],
+    moves: bool,
+}
+
+impl Scale {
+    fn try_for(&self, marks: usize, fixed: Option<f64>) -> Result<Option<Trial>> {
+        let chosen = [false, true].into_iter().find_map(|thin| {
+            let threshold = threshold::choose(&self.summits[usize::from(thin)], marks, self.floor);
+            threshold.map(|t| (fixed.unwrap_or(t), thin))
+        });
+        let Some((threshold, thin)) = chosen else { return Ok(None) };
+        let mut spots = Vec::new();
+        for (n, plane) in self.planes.iter().enumerate() {
+            spots.push(spots_of(plane, threshold, thin, self.least, self.moved.get(n).map(Vec::as_slice))?);
+        }
+        let quality = quality(&spots, marks, self.moves, self.luma);
+        let mut trial = Trial { angle_rad: None, level: self.level, threshold, thin, marks, spots, quality };
+        // a spot of few samples is round by chance, and beside its surroundings by little
+        let wide = trial.usual_samples().map_or(0.0, |n| (n * 4.0 / std::f64::consts::PI).sqrt());
+        trial.quality *= (wide / WIDE_ENOUGH).min(1.0);
+        Ok(Some(trial))
+    }
+}
+
+fn keep_better(best: &mut Option<Trial>, trial: Trial) {
+    if best.as_ref().is_none_or(|b| trial.quality > b.quality) {
+        *best = Some(trial);
     }
 }
 

@@ -32,8 +32,8 @@ impl HueAxis {
     /// The hue of `colour` as `matrix` codes it.
     pub fn new(colour: &MarkColour, matrix: Matrix) -> Self {
         match colour.look() {
-            Look::Dark => Self { u: 0, v: 0, luma: -(ONE as i16) },
-            Look::Light => Self { u: 0, v: 0, luma: ONE as i16 },
+            Look::Dark => Self::of_luma_sign(true),
+            Look::Light => Self::of_luma_sign(false),
             Look::Hue => Self::at_angle(hue_angle_rad(colour, matrix)),
         }
     }
@@ -42,6 +42,11 @@ impl HueAxis {
     pub fn at_angle(angle_rad: f64) -> Self {
         let (sin, cos) = angle_rad.sin_cos();
         Self { u: (ONE * cos).round() as i16, v: (ONE * sin).round() as i16, luma: 0 }
+    }
+
+    /// Of a mark without a hue, darker than its surroundings or lighter.
+    pub fn of_luma_sign(dark: bool) -> Self {
+        Self { u: 0, v: 0, luma: if dark { -(ONE as i16) } else { ONE as i16 } }
     }
 
     /// The mark is dark or light and has no hue.

@@ -10,7 +10,9 @@
 //! ```
 //! A spot smaller than B keeps its contrast; a dark chamber or a bright wall, however large, is nothing.
 
-use opencv::core::{BORDER_CONSTANT, Mat, MatTraitConstManual, Point, Size};
+use opencv::core::{
+    BORDER_CONSTANT, BORDER_REPLICATE, Mat, MatTraitConstManual, Point, Scalar, Size, copy_make_border,
+};
 use opencv::imgproc;
 
 use super::component::HueAxis;
@@ -76,14 +78,18 @@ impl Plane {
         Ok(self)
     }
 
+    /// Beyond the edge the picture goes on as it ends there: what lies between a thing and the edge is no spot.
     fn top_hat(&self) -> opencv::Result<Vec<i16>> {
         let picture = Mat::new_rows_cols_with_data(self.height as i32, self.width as i32, &self.values)?;
-        let mut hat = Mat::default();
-        let side = 2 * HALF_HAT + 1;
+        let (mut wide, mut hat) = (Mat::default(), Mat::default());
+        let (half, side) = (HALF_HAT, 2 * HALF_HAT + 1);
+        copy_make_border(&picture, &mut wide, half, half, half, half, BORDER_REPLICATE, Scalar::default())?;
         let kernel = imgproc::get_structuring_element(imgproc::MORPH_RECT, Size::new(side, side), Point::new(-1, -1))?;
         let border = imgproc::morphology_default_border_value()?;
         let (kind, anchor) = (imgproc::MORPH_TOPHAT, Point::new(-1, -1));
-        imgproc::morphology_ex(&picture, &mut hat, kind, &kernel, anchor, 1, BORDER_CONSTANT, border)?;
-        Ok(hat.data_typed::<i16>()?.to_vec())
+        imgproc::morphology_ex(&wide, &mut hat, kind, &kernel, anchor, 1, BORDER_CONSTANT, border)?;
+        let (row, margin) = (self.width + 2 * half as usize, half as usize);
+        let rows = hat.data_typed::<i16>()?.chunks_exact(row).skip(margin).take(self.height);
+        Ok(rows.flat_map(|r| &r[margin..margin + self.width]).copied().collect())
     }
 }

@@ -6,7 +6,7 @@ use crate::track::Thing;
 /// Change of a distance over the motion beyond which two things are not on one link.
 const MOST_STRETCH: f64 = 0.15;
 /// Distance of a path from its circle, over half its range, beyond which it is no arc.
-const MOST_OFF_ARC: f64 = 0.12;
+const MOST_OFF_ARC: f64 = 0.04;
 /// ln of the ratio of areas beyond which two marks of one look are unlike.
 const MOST_UNLIKE: f64 = 1.0;
 /// What a thing of the marks' look that swings, and is none, takes from it.

@@ -124,20 +124,19 @@ fn looks(album: &Album) -> Result<Vec<(Hue, String)>> {
     let peaks = album.hues(0.0, std::f64::consts::PI);
     let least = LEAST_WEIGHT * peaks.first().map_or(0.0, |p| p.weight);
     let hues = peaks.iter().filter(|p| p.weight >= least).take(MOST_HUES);
-    let mut trials: Vec<(Trial, Option<&str>)> = Vec::new();
-    for peak in hues {
-        for marks in COUNTS {
-            let known = |t: &Trial| trials.iter().any(|(o, _)| is_alike(o, t));
-            let trial = album.try_hue(peak.angle_rad, marks, None)?.filter(|t| !known(t));
-            trials.extend(trial.map(|t| (t, None)));
+    let mut trials: Vec<(Trial, Option<&'static str>)> = Vec::new();
+    let mut add = |found: Vec<Option<Trial>>, name: Option<&'static str>| {
+        for trial in found.into_iter().flatten() {
+            if !trials.iter().any(|(known, n)| *n == name && is_alike(known, &trial)) {
+                trials.push((trial, name));
+            }
         }
+    };
+    for peak in hues {
+        add(album.try_hue(peak.angle_rad, &COUNTS, None)?, None);
     }
     for (dark, name) in [(true, "dark"), (false, "light")] {
-        for marks in COUNTS {
-            let known = |t: &Trial| trials.iter().any(|(o, n)| *n == Some(name) && is_alike(o, t));
-            let trial = album.try_luma(dark, marks)?.filter(|t| !known(t));
-            trials.extend(trial.map(|t| (t, Some(name))));
-        }
+        add(album.try_luma(dark, &COUNTS, None)?, Some(name));
     }
     // what shows more spots than there can be marks is a wall or a shadow
     let few = |t: &Trial| t.likely().count() <= MOST_MARKS * t.spots.len();
