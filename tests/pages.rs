@@ -133,11 +133,6 @@ fn the_page_on_diagnosis_runs() {
 }
 
 #[test]
-fn the_page_on_figures_runs() {
-    run("docs/figures.md");
-}
-
-#[test]
 fn the_page_on_outputs_names_what_is_in_them() {
     let folder = run("docs/outputs.md");
     let text = page("docs/outputs.md");
@@ -234,6 +229,16 @@ fn every_option_that_a_page_names_exists() {
         for option in spans.filter_map(|span| span.split([' ', '=', '\n']).next()) {
             assert!(help.contains(&format!("{option} ")) || help.contains(&format!("{option}\n")), "{name}: {option}");
         }
+    }
+}
+
+#[test]
+fn no_page_has_examples_that_are_not_run() {
+    let run = ["README", "first-recording", "filming", "experiment-file", "outputs", "troubleshooting", "diagnosis"];
+    for name in pages() {
+        let has_examples = blocks(&page(&name)).iter().any(|(mark, _)| *mark == "sh");
+        let stem = Path::new(&name).file_stem().unwrap().to_str().unwrap();
+        assert!(!has_examples || run.contains(&stem), "{name} has examples that no test here runs");
     }
 }
 
