@@ -243,15 +243,29 @@ fn no_page_has_examples_that_are_not_run() {
 }
 
 #[test]
-fn no_page_names_a_missing_file() {
+fn no_page_names_a_missing_file_or_heading() {
     for name in pages() {
         let text = page(&name);
         let folder = root().join(&name).parent().unwrap().to_owned();
-        let links = text.split("](").skip(1).filter_map(|after| after.split([')', '#']).next());
-        for link in links.filter(|l| !l.starts_with("http") && !l.is_empty()) {
-            assert!(folder.join(link).exists(), "{name}: {link}");
+        let links = text.split("](").skip(1).filter_map(|after| after.split(')').next());
+        for link in links.filter(|l| !l.starts_with("http")) {
+            let (file, heading) = link.split_once('#').unwrap_or((link, ""));
+            let target = if file.is_empty() { root().join(&name) } else { folder.join(file) };
+            assert!(target.exists(), "{name}: {link}");
+            if !heading.is_empty() {
+                let headings = std::fs::read_to_string(&target).unwrap();
+                let mut headings = headings.lines().filter(|l| l.starts_with('#')).map(anchor);
+                assert!(headings.any(|h| h == heading), "{name}: {link}");
+            }
         }
     }
+}
+
+/// The anchor that a heading gets on the web: letters and digits in lower case, hyphens for spaces, nothing else.
+fn anchor(heading: &str) -> String {
+    let text = heading.trim_start_matches('#').trim().to_lowercase();
+    let kept = text.chars().filter(|c| c.is_alphanumeric() || matches!(c, ' ' | '-' | '_'));
+    kept.map(|c| if c == ' ' { '-' } else { c }).collect()
 }
 
 #[test]
