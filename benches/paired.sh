@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
-# Wall time of `track` against `ffmpeg -f null` and a plain OpenCV pipeline, on the same 60 s clips, run in turn so that
-# each round meets the same machine; then the memory of `track` on a minute and on half an hour.
+# Wall time of `track` against `ffmpeg -f null` and a plain OpenCV pipeline, on the same 60 s clips of 0.2, 2 and 20
+# Mbit/s, run in turn so that each round meets the same machine; then the memory of `track` on a minute and on half an hour.
 #
 #   benches/paired.sh [ROUNDS]        5 by default; clips stay in target/bench-videos
 set -euo pipefail
@@ -25,6 +25,12 @@ render() {
     [ -s "$clip" ] && return
     echo "rendering $clip (once)"
     cat >"$clips/$1.toml" <<TOML
+[specimen]
+mass_kg = 0.3606e-3
+length_m = 0.20
+width_m = 0.05
+link_lengths_m = [0.10, 0.10]
+
 [render]
 duration_s = 60.0
 width_px = $2
@@ -38,6 +44,23 @@ TOML
 }
 render 720p 1280 720 2600 640 96 22 48
 render 1080p 1920 1080 3900 960 144 33 72
+
+# The same as cameras and programs write them, from 0.2 to 20 Mbit/s; a camera's noise takes up the higher rates.
+encode() {
+    local clip=$clips/$1-$2M.mp4
+    [ -s "$clip" ] && return
+    echo "encoding $clip (once)"
+    ffmpeg -v error -y -i "$clips/$1.mp4" -vf "noise=alls=$3:allf=t" -c:v libx264 -preset medium -pix_fmt yuv420p \
+        -b:v "$2M" -maxrate "$2M" -bufsize "$2M" "$clips/part.mp4"
+    mv "$clips/part.mp4" "$clip"
+}
+names=()
+for size in 720p 1080p; do
+    encode $size 0.2 0
+    encode $size 2 2
+    encode $size 20 12
+    names+=("$size-0.2M" "$size-2M" "$size-20M")
+done
 
 # Wall seconds and processor seconds of one run.
 seconds() {
@@ -57,7 +80,7 @@ echo "$(nproc) cores, load $(cut -d ' ' -f 1 /proc/loadavg), $(ffmpeg -version |
 echo "medians of $rounds rounds after a warm-up; the ratios are medians of each round's own"
 printf '%-16s %9s %9s %9s %14s %14s\n' clip track ffmpeg opencv track/ffmpeg track/opencv
 row() { printf '%-16s %7.2f s %7.2f s %7.2f s %14.3f %14.3f\n' "$@"; }
-for name in 720p 1080p; do
+for name in "${names[@]}"; do
     clip=$clips/$name.mp4
     table=$clips/$name.times
     for what in track ffmpeg opencv; do "run_$what" "$clip" >/dev/null; done

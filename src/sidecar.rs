@@ -81,6 +81,17 @@ struct Video {
     height_px: usize,
     rotation_deg: i32,
     pixel_aspect: f64,
+    chroma_siting: Option<ChromaSiting>,
+}
+
+/// Where chroma sample (0, 0) lies, luma pixels from the centre of luma sample (0, 0).
+#[derive(Debug, Serialize)]
+struct ChromaSiting {
+    stated_px: [f64; 2],
+    used_px: [f64; 2],
+    sd_px: [f64; 2],
+    /// What the marks showed, with its standard deviation.
+    seen_px: [Option<[f64; 2]>; 2],
 }
 
 #[derive(Debug, Serialize)]
@@ -148,6 +159,12 @@ impl Sidecar {
                 height_px,
                 rotation_deg: m.stream.orientation.degrees(),
                 pixel_aspect: m.stream.pixel_aspect,
+                chroma_siting: m.siting.map(|s| ChromaSiting {
+                    stated_px: s.stated_px,
+                    used_px: s.used_px,
+                    sd_px: s.sd_px,
+                    seen_px: s.seen_px,
+                }),
             },
             time_stamps: m.timing.clone(),
             marks: (0..options.marks.len()).map(|i| Mark::new(options, m, i)).collect(),

@@ -3,6 +3,8 @@
 //! A colour's name stands for a family of hues. Which of them the marks have, at which scale they are looked for and
 //! above which threshold is what shows most round, moving spots, as many as there are marks.
 
+use rayon::iter::{IndexedParallelIterator, IntoParallelRefIterator, ParallelIterator};
+
 use super::component::{HueAxis, from_255, hue_angle_rad, to_255};
 use super::mask::{Mask, Part};
 use super::plane::Plane;
@@ -151,15 +153,21 @@ impl Album {
         let floor = if axis.is_luma() { LEAST_CONTRAST } else { LEAST_COMPONENT };
         let least = ((LEAST_AREA_PX2 / self.sample_px2()) as usize >> (2 * level)).max(3);
         let moved: Vec<Vec<bool>> = self.moved.iter().map(|m| self.coarse(m, level)).collect();
-        let mut planes = Vec::new();
-        let mut summits: [Vec<Vec<Summit>>; 2] = [Vec::new(), Vec::new()];
-        for (n, picture) in self.pictures.iter().enumerate() {
+        let survey = |(n, picture): (usize, &Samples)| -> Result<(Plane, [Vec<Summit>; 2])> {
             let plane = self.plane(picture, axis, level)?;
             let mut relief = Relief::new(&plane, moved.get(n).map(Vec::as_slice));
-            summits[1].push(relief.summits(least, floor));
+            let with_lines = relief.summits(least, floor);
             relief.open();
-            summits[0].push(relief.summits(least, floor));
+            let without_lines = relief.summits(least, floor);
+            Ok((plane, [without_lines, with_lines]))
+        };
+        let surveys = self.pictures.par_iter().enumerate().map(survey).collect::<Result<Vec<_>>>()?;
+        let mut planes = Vec::new();
+        let mut summits: [Vec<Vec<Summit>>; 2] = [Vec::new(), Vec::new()];
+        for (plane, [without_lines, with_lines]) in surveys {
             planes.push(plane);
+            summits[0].push(without_lines);
+            summits[1].push(with_lines);
         }
         // what moves is a mark rather than furniture; where it moves in no picture, all is still in the running
         let moves = summits[1].iter().filter(|s| s.iter().any(Summit::moves)).count() * 2 >= planes.len();
@@ -258,10 +266,10 @@ impl Scale {
             threshold.map(|t| (fixed.unwrap_or(t), thin))
         });
         let Some((threshold, thin)) = chosen else { return Ok(None) };
-        let mut spots = Vec::new();
-        for (n, plane) in self.planes.iter().enumerate() {
-            spots.push(spots_of(plane, threshold, thin, self.least, self.moved.get(n).map(Vec::as_slice))?);
-        }
+        let of_picture = |(n, plane): (usize, &Plane)| {
+            spots_of(plane, threshold, thin, self.least, self.moved.get(n).map(Vec::as_slice))
+        };
+        let spots = self.planes.par_iter().enumerate().map(of_picture).collect::<Result<Vec<_>>>()?;
         let quality = quality(&spots, marks, self.moves, self.luma);
         let mut trial = Trial { angle_rad: None, level: self.level, threshold, thin, marks, spots, quality };
         // a spot of few samples is round by chance, and beside its surroundings by little

@@ -3,8 +3,7 @@
 //! What a file states about its chroma siting is often not what its converter did: swscale averages pairs of pixels,
 //! which sites them in between, and writes "left". Luma has no siting. So marks are measured by luma alone and by the
 //! colour differences alone; the difference of the two is the error of the stated site. Sites lie at a luma sample or
-//! midway between two, so the result is rounded to the nearer one. Where the marks do not tell, the stated site is
-//! kept and the possible half pixel stands in the standard deviation.
+//! midway between two: each has a probability, and mean and standard deviation over them are what is used.
 
 use super::centroid::Channels;
 use super::{Blob, Detector};
@@ -32,13 +31,11 @@ pub struct SitingSurvey {
     differences: [Vec<[f64; 2]>; 2],
 }
 
-/// Sites are half a pixel apart: decided where this many standard deviations fit into the quarter between them.
-const DECISIVE_SD: f64 = 3.0;
 /// Error of a coded edge that all marks share, px: luma and colour agree to this where the site is right (measured on foreign
 /// renderings).
 const COMMON_ERROR_PX: f64 = 0.04;
-/// Standard deviation of a site that may be one of two, half a pixel apart.
-const UNDECIDED_SD_PX: f64 = 0.25;
+/// Prior weight of a site that is neither stated nor the middle of the pair that a converter averages.
+const RARE_SITE: f64 = 0.1;
 /// Fewest marks that tell a site.
 const LEAST_MARKS: usize = 4;
 
@@ -66,6 +63,15 @@ impl SitingSurvey {
         Ok(())
     }
 
+    /// Both together.
+    pub fn with(mut self, mut other: Self) -> Self {
+        self.layout = self.layout.or(other.layout);
+        for (own, more) in self.differences.iter_mut().zip(&mut other.differences) {
+            own.append(more);
+        }
+        self
+    }
+
     /// What the pictures show; `None` where there were none.
     pub fn conclude(self) -> Option<Siting> {
         let layout = self.layout?;
@@ -79,20 +85,33 @@ impl SitingSurvey {
             if shift == 0 {
                 continue;
             }
-            siting.sd_px[axis] = UNDECIDED_SD_PX;
-            let Some([difference, sd]) = robust_mean(&self.differences[axis]) else { continue };
-            let seen = siting.stated_px[axis] + difference;
-            siting.seen_px[axis] = Some([seen, sd]);
-            // of two samples a pair's middle, of four (4:1:1) the nearest half
-            let step = 0.5;
-            let site = (seen / step).round() * step;
-            let in_pair = (0.0..=f64::from((1u32 << shift) - 1)).contains(&site);
-            if in_pair && DECISIVE_SD * sd <= 0.5 * step - (seen - site).abs().min(0.5 * step - 0.1) {
-                (siting.used_px[axis], siting.sd_px[axis]) = (site, 0.0);
-            }
+            let seen = robust_mean(&self.differences[axis]).map(|[d, sd]| [siting.stated_px[axis] + d, sd]);
+            siting.seen_px[axis] = seen;
+            [siting.used_px[axis], siting.sd_px[axis]] = posterior(siting.stated_px[axis], shift, seen);
         }
         Some(siting)
     }
+}
+
+/// Mean and standard deviation over the sites that a pair (or four, with 4:1:1) of luma samples allows, each with its
+/// probability after what was `seen`: position and standard deviation.
+fn posterior(stated_px: f64, shift: u32, seen: Option<[f64; 2]>) -> [f64; 2] {
+    let last = (1u32 << shift) - 1;
+    let middle = 0.5 * f64::from(last);
+    let probable = |site: f64| {
+        let usual = (site - stated_px).abs() < 0.1 || (site - middle).abs() < 0.1;
+        let misfit = seen.map_or(0.0, |[at, sd]| 0.5 * ((site - at) / sd).powi(2));
+        (if usual { 1.0 } else { RARE_SITE } * (-misfit).exp(), site)
+    };
+    let sites: Vec<(f64, f64)> = (0..=2 * last).map(|k| probable(0.5 * f64::from(k))).collect();
+    let total: f64 = sites.iter().map(|(p, _)| p).sum();
+    if !(total > 1e-12) {
+        // what was seen lies far from every site: the marks do not tell
+        return posterior(stated_px, shift, None);
+    }
+    let mean = sites.iter().map(|(p, site)| p * site).sum::<f64>() / total;
+    let variance = sites.iter().map(|(p, site)| p * (site - mean).powi(2)).sum::<f64>() / total;
+    [mean, variance.sqrt()]
 }
 
 /// Weighted mean with outlying values left out (Tukey's biweight), and its standard deviation from the values' own
@@ -149,13 +168,16 @@ mod tests {
         let x = [0.47, 0.55, 0.52, 0.44, 0.58, 0.49];
         let y = [0.03, -0.04, 0.01, 0.0, 0.05, -0.02];
         let siting = survey([&x, &y], [0.0, 0.5]);
-        assert_eq!((siting.used_px, siting.sd_px), ([0.5, 0.5], [0.0, 0.0]));
+        for axis in 0..2 {
+            assert!((siting.used_px[axis] - 0.5).abs() < 1e-3 && siting.sd_px[axis] < 0.01, "{siting:?}");
+        }
     }
 
     #[test]
-    fn where_the_marks_do_not_tell_the_stated_site_stands_with_its_doubt() {
+    fn where_the_marks_do_not_tell_the_site_stands_with_its_doubt() {
         let scattered = [0.9, -0.6, 0.3, -0.2, 0.7, -0.9];
         let siting = survey([&scattered, &[]], [0.0, 0.5]);
-        assert_eq!((siting.used_px, siting.sd_px), ([0.0, 0.5], [0.25, 0.25]));
+        assert!((0.1..0.4).contains(&siting.used_px[0]) && siting.sd_px[0] > 0.2, "{siting:?}");
+        assert!((siting.used_px[1] - 0.5).abs() < 1e-3 && siting.sd_px[1] > 0.1, "{siting:?}");
     }
 }

@@ -74,10 +74,10 @@ impl<'a> Relief<'a> {
         let mut order: Vec<(i16, u32)> =
             self.heights.iter().enumerate().filter(|(_, h)| **h > floor).map(|(i, h)| (*h, i as u32)).collect();
         order.sort_unstable_by(|a, b| b.cmp(a));
-        let mut forest = Forest::new(width * height);
+        let mut forest = Forest::new(width * height, order.len());
         let mut found = Vec::new();
         for &(level, at) in &order {
-            forest.add(at, level, self.moved.is_some_and(|m| m[at as usize]));
+            let tree = forest.add(at, level, self.moved.is_some_and(|m| m[at as usize]));
             let (x, y) = (at as usize % width, at as usize / width);
             let neighbours = [
                 (x > 0).then(|| at - 1),
@@ -86,8 +86,8 @@ impl<'a> Relief<'a> {
                 (y + 1 < height).then(|| at + width as u32),
             ];
             for neighbour in neighbours.into_iter().flatten() {
-                if let Some(tree) = forest.join(at, neighbour) {
-                    found.push((tree, level));
+                if let Some(ended) = forest.join(tree, neighbour) {
+                    found.push((ended, level));
                 }
             }
         }
@@ -126,10 +126,12 @@ pub fn choose(pictures: &[Vec<Summit>], marks: usize, floor: f64) -> Option<f64>
     thresholds.get(thresholds.len().checked_sub(1)? / 4).map(|t| t.max(floor))
 }
 
-/// Union–find over samples, each tree knowing its summit.
+/// Union–find over the samples above the floor in the order of their heights, each tree knowing its summit.
 struct Forest {
+    /// Place of a sample in that order.
+    place: Vec<u32>,
     parent: Vec<u32>,
-    trees: std::collections::HashMap<u32, Tree>,
+    trees: Vec<Tree>,
 }
 
 /// One summit while its region grows.
@@ -143,45 +145,51 @@ struct Tree {
 const ABSENT: u32 = u32::MAX;
 
 impl Forest {
-    fn new(samples: usize) -> Self {
-        Self { parent: vec![ABSENT; samples], trees: std::collections::HashMap::new() }
-    }
-
-    fn add(&mut self, at: u32, top: i16, moved: bool) {
-        self.parent[at as usize] = at;
-        self.trees.insert(at, Tree { top, samples: 1, moved: usize::from(moved) });
-    }
-
-    fn root(&mut self, mut at: u32) -> u32 {
-        while self.parent[at as usize] != at {
-            let up = self.parent[at as usize];
-            self.parent[at as usize] = self.parent[up as usize];
-            at = up;
+    fn new(samples: usize, above_floor: usize) -> Self {
+        Self {
+            place: vec![ABSENT; samples],
+            parent: Vec::with_capacity(above_floor),
+            trees: Vec::with_capacity(above_floor),
         }
-        at
     }
 
-    /// Joins two trees; returns the lower one, which ends here.
-    fn join(&mut self, a: u32, b: u32) -> Option<Tree> {
-        if self.parent[b as usize] == ABSENT {
+    fn add(&mut self, at: u32, top: i16, moved: bool) -> u32 {
+        let place = self.parent.len() as u32;
+        self.place[at as usize] = place;
+        self.parent.push(place);
+        self.trees.push(Tree { top, samples: 1, moved: usize::from(moved) });
+        place
+    }
+
+    fn root(&mut self, mut place: u32) -> u32 {
+        while self.parent[place as usize] != place {
+            let up = self.parent[place as usize];
+            self.parent[place as usize] = self.parent[up as usize];
+            place = up;
+        }
+        place
+    }
+
+    /// Joins a tree with that of a neighbouring sample; returns the lower one, which ends here.
+    fn join(&mut self, tree: u32, neighbour: u32) -> Option<Tree> {
+        let other = self.place[neighbour as usize];
+        if other == ABSENT {
             return None;
         }
-        let (ra, rb) = (self.root(a), self.root(b));
+        let (ra, rb) = (self.root(tree), self.root(other));
         if ra == rb {
             return None;
         }
-        let (ta, tb) = (*self.trees.get(&ra)?, *self.trees.get(&rb)?);
-        let (high, low) = if ta.top >= tb.top { (ra, rb) } else { (rb, ra) };
-        let ended = self.trees.remove(&low)?;
+        let (ta, tb) = (self.trees[ra as usize], self.trees[rb as usize]);
+        let (high, low, ended) = if ta.top >= tb.top { (ra, rb, tb) } else { (rb, ra, ta) };
         self.parent[low as usize] = high;
-        if let Some(tree) = self.trees.get_mut(&high) {
-            tree.samples += ended.samples;
-            tree.moved += ended.moved;
-        }
+        self.trees[high as usize].samples += ended.samples;
+        self.trees[high as usize].moved += ended.moved;
         Some(ended)
     }
 
     fn survivors(&self) -> impl Iterator<Item = Tree> + '_ {
-        self.trees.values().copied()
+        let roots = self.parent.iter().enumerate().filter(|(place, parent)| *place == **parent as usize);
+        roots.map(|(place, _)| self.trees[place])
     }
 }

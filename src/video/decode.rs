@@ -5,9 +5,10 @@
 //!                      worker 2 (decoder)
 //! ```
 //! The caller's `measure` runs in the worker, on the decoder's own samples while they are warm; only what it
-//! returns travels on. A recording with one entry point is decoded by one decoder with threads of its own.
+//! returns travels on. A recording with one entry point is decoded by one decoder with threads of its own, and so are
+//! the last segments, for which there would be cores without work.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, VecDeque};
 use std::ops::ControlFlow;
 
 use crossbeam_channel::{Receiver, Sender, bounded};
@@ -274,7 +275,7 @@ fn split<T: Send>(
         .collect::<std::result::Result<Vec<_>, _>>()
         .map_err(|e| cannot_open(container, &e))?;
     std::thread::scope(|scope| {
-        let (todo, work) = bounded::<(u64, Segment)>(1);
+        let (todo, work) = bounded::<Task>(1);
         let (done, finished) = bounded::<Done<T>>(workers);
         // a segment starts only against a permit, and its permit returns when its values have reached the sink
         let permits = 2 * workers;
@@ -286,8 +287,16 @@ fn split<T: Send>(
         let container = &mut *container;
         let reader = scope.spawn(move || {
             let mut sent = 0;
-            while let (Ok(()), Some(segment)) = (take.recv(), segmenter.next(container)) {
-                if todo.send((sent, segment)).is_err() {
+            let mut ahead = VecDeque::new();
+            while take.recv().is_ok() {
+                while ahead.len() <= workers
+                    && let Some(segment) = segmenter.next(container)
+                {
+                    ahead.push_back(segment);
+                }
+                let is_late = ahead.len() <= workers;
+                let Some(segment) = ahead.pop_front() else { break };
+                if todo.send(Task { index: sent, segment, is_late }).is_err() {
                     break;
                 }
                 sent += 1;
@@ -297,7 +306,7 @@ fn split<T: Send>(
         });
         for decoder in decoders {
             let (work, done) = (work.clone(), done.clone());
-            scope.spawn(move || decode_segments(decoder, &work, &done, measure));
+            scope.spawn(move || decode_segments(decoder, workers, &work, &done, measure));
         }
         drop((work, done));
         let mut order = InOrder { next: 0, early: BTreeMap::new(), total: Decoded::default() };
@@ -319,22 +328,47 @@ fn split<T: Send>(
     })
 }
 
+/// A segment, its place in the order, and whether cores will soon be without work.
+struct Task {
+    index: u64,
+    segment: Segment,
+    is_late: bool,
+}
+
 fn decode_segments<T>(
     mut decoder: StreamDecoder,
-    work: &Receiver<(u64, Segment)>,
+    threads: usize,
+    work: &Receiver<Task>,
     done: &Sender<Done<T>>,
     measure: &(dyn Fn(Frame<'_>) -> T + Sync),
 ) {
-    while let Ok((index, mut segment)) = work.recv() {
-        let mut values = Vec::with_capacity(segment.packets.len());
-        let (decoded, _) = decoder.decode(&mut || segment.packets.pop_front(), &mut |frame| {
-            values.push(measure(frame));
-            ControlFlow::Continue(())
-        });
+    while let Ok(Task { index, segment, is_late }) = work.recv() {
+        let late = if is_late && threads > 1 { decoder.recipe.decoder(threads).ok() } else { None };
+        // with threads of its own a decoder reports damage some frames later: what is damaged is decoded again alone
+        let is_whole = |result: &(Vec<T>, Decoded, bool)| result.1.damaged_packets == 0 && !result.2;
+        let quickly =
+            late.map(|mut quick| decode_segment(&mut quick, segment.packets.clone(), measure)).filter(is_whole);
+        let (values, decoded, _) = quickly.unwrap_or_else(|| decode_segment(&mut decoder, segment.packets, measure));
         if done.send(Done { index, values, decoded }).is_err() {
             break;
         }
     }
+}
+
+/// The values of a segment's frames, what decoding met, and whether a frame is damaged.
+fn decode_segment<T>(
+    decoder: &mut StreamDecoder,
+    mut packets: VecDeque<Packet>,
+    measure: &(dyn Fn(Frame<'_>) -> T + Sync),
+) -> (Vec<T>, Decoded, bool) {
+    let mut values = Vec::with_capacity(packets.len());
+    let mut damaged = false;
+    let (decoded, _) = decoder.decode(&mut || packets.pop_front(), &mut |frame| {
+        damaged |= frame.damaged;
+        values.push(measure(frame));
+        ControlFlow::Continue(())
+    });
+    (values, decoded, damaged)
 }
 
 /// Puts results back in order.

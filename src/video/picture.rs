@@ -118,6 +118,21 @@ impl Plane<'_> {
         let i = y * self.stride + x * self.step;
         if wide { u16::from_le_bytes([self.bytes[i], self.bytes[i + 1]]) } else { u16::from(self.bytes[i]) }
     }
+
+    /// The samples row after row, without padding.
+    fn packed(&self, wide: bool, width: usize, height: usize) -> Vec<u8> {
+        let size = if wide { 2 } else { 1 };
+        let mut packed = Vec::with_capacity(width * height * size);
+        for y in 0..height {
+            let row = &self.bytes[y * self.stride..];
+            if self.step == size {
+                packed.extend_from_slice(&row[..width * size]);
+            } else {
+                (0..width).for_each(|x| packed.extend_from_slice(&row[x * self.step..][..size]));
+            }
+        }
+        packed
+    }
 }
 
 /// A picture whose samples belong to a decoder or to an [`OwnedPicture`].
@@ -137,6 +152,17 @@ impl Picture<'_> {
     /// Samples take two bytes.
     pub fn wide(&self) -> bool {
         self.layout.bits > 8
+    }
+
+    /// A copy of all its samples.
+    pub fn to_owned(&self) -> OwnedPicture {
+        let (cw, ch) = self.layout.chroma_size();
+        let planes = [
+            self.luma.packed(self.wide(), self.layout.width_px, self.layout.height_px),
+            self.cb.packed(self.wide(), cw, ch),
+            self.cr.packed(self.wide(), cw, ch),
+        ];
+        OwnedPicture { layout: self.layout, planes }
     }
 
     /// Y′ in 0..1 at a luma pixel.

@@ -6,8 +6,9 @@
 //! other along v.
 
 use super::disc::Disc;
-use super::outline::{Outline, Zone};
+use super::outline::Outline;
 use super::patch::{CHANNELS, Levels, Patch};
+use super::zones::Zones;
 
 /// The background across a direction.
 #[derive(Debug, Clone)]
@@ -33,15 +34,14 @@ const LEAST_ANISOTROPY: f32 = 4.0;
 
 impl Extrusion {
     /// From what lies outside a mark; `None` where it has no direction.
-    pub fn of(patch: &Patch, outline: &Outline, disc: &Disc) -> Option<Self> {
-        let outside = |s: &&super::patch::Sample| matches!(outline.zone(s), Zone::Ring | Zone::Beyond);
-        let across = direction(patch, outline)?;
+    pub fn of(patch: &Patch, zones: &Zones<'_>, outline: &Outline, disc: &Disc) -> Option<Self> {
+        let across = direction(patch, zones)?;
         let reach = outline.reach_px() + 6.0;
         let count = (2.0 * reach) as usize + 2;
         let mut extrusion =
             Self { across, from_px: -reach, sides: [vec![Bin::default(); count], vec![Bin::default(); count]] };
         let middle_px = extrusion.along(disc.centre_px[0], disc.centre_px[1]);
-        for sample in patch.samples.iter().filter(outside) {
+        for sample in zones.ring.iter().chain(&zones.beyond) {
             let v = extrusion.along(sample.dx_px, sample.dy_px);
             let (i, t) = extrusion.bin(sample.dx_px, sample.dy_px);
             let side = &mut extrusion.sides[usize::from(v > middle_px)];
@@ -112,13 +112,11 @@ fn mix(a: Levels, b: Levels, share: f32) -> Levels {
 }
 
 /// The direction of the strongest gradients outside the mark (structure tensor), where there is one.
-fn direction(patch: &Patch, outline: &Outline) -> Option<[f32; 2]> {
+fn direction(patch: &Patch, zones: &Zones<'_>) -> Option<[f32; 2]> {
     let (mut xx, mut yy, mut xy) = (0.0f32, 0.0f32, 0.0f32);
-    for (sample, gradients) in patch.samples.iter().zip(&patch.gradients) {
-        if matches!(outline.zone(sample), Zone::Ring | Zone::Beyond) {
-            for [gx, gy] in gradients {
-                (xx, yy, xy) = (xx + gx * gx, yy + gy * gy, xy + gx * gy);
-            }
+    for sample in zones.ring.iter().chain(&zones.beyond) {
+        for [gx, gy] in patch.gradients(sample) {
+            (xx, yy, xy) = (xx + gx * gx, yy + gy * gy, xy + gx * gy);
         }
     }
     let (middle, half) = (0.5 * (xx + yy), (0.5 * (xx - yy)).hypot(xy));

@@ -2,19 +2,39 @@
 
 use nalgebra::{Matrix4, Vector4};
 
-use super::disc::Disc;
+use super::disc::{Disc, Evaluator, LANES, Lanes};
 
-/// One pixel of the boundary band.
-#[derive(Debug, Clone, Copy)]
-pub struct Pixel {
-    /// From the outline's centre.
-    pub x_px: f32,
-    /// Downwards.
-    pub y_px: f32,
-    /// Share of mark.
-    pub share: f32,
-    /// Its variance.
-    pub variance: f32,
+/// Pixels of the boundary band that are evaluated together.
+#[derive(Debug, Clone, Copy, Default)]
+struct Pack {
+    x_px: Lanes,
+    y_px: Lanes,
+    share: Lanes,
+    /// 1 / variance of the share; 0 where there is no pixel.
+    weight: Lanes,
+}
+
+/// The pixels of the boundary band that are mixtures of mark and background.
+#[derive(Debug, Clone, Default)]
+pub struct Band {
+    packs: Vec<Pack>,
+    count: usize,
+}
+
+impl Band {
+    /// Adds a pixel, from the outline's centre, with its share of mark and the share's variance.
+    #[inline]
+    pub fn push(&mut self, at_px: [f32; 2], share: f32, variance: f32) {
+        let lane = self.count % LANES;
+        if lane == 0 {
+            self.packs.push(Pack::default());
+        }
+        self.count += 1;
+        if let Some(pack) = self.packs.last_mut() {
+            [pack.x_px[lane], pack.y_px[lane]] = at_px;
+            (pack.share[lane], pack.weight[lane]) = (share, 1.0 / variance);
+        }
+    }
 }
 
 /// A disc that fits.
@@ -28,9 +48,6 @@ pub struct Fit {
 
 /// Most steps of Gauss and Newton.
 const MOST_STEPS: usize = 12;
-/// A step this small ends it, px.
-const SMALL_STEP_PX: f64 = 1e-3;
-/// The longest step, px.
 /// Least square of a sweep over that of its first guess.
 const SHORTEST_SWEEP: f64 = 1e-3;
 /// Steps after which the residuals' scale stays, so that the weights settle.
@@ -42,8 +59,9 @@ const SWEEP_SD_PX: f64 = 3.0;
 /// Scales at which Tukey's biweight ends: 95 % efficiency for normal errors (Huber, Robust Statistics, 1981).
 const TUKEY: f32 = 4.685;
 
-/// Fits centre, radius and length of the sweep. `None` where it does not settle near where it began.
-pub fn fit(start: Disc, pixels: &[Pixel]) -> Option<Fit> {
+/// Fits centre, radius and length of the sweep, until a step is smaller than `small_step_px`. `None` where it does not
+/// settle near where it began.
+pub fn fit(start: Disc, band: &Band, small_step_px: f64) -> Option<Fit> {
     let sweep_px = start.sweep_length_px();
     // the fourth is λ² where the sweep is λ s: α goes with the square of a short sweep, so that its slope by λ vanishes
     let mut parameters =
@@ -58,31 +76,15 @@ pub fn fit(start: Disc, pixels: &[Pixel]) -> Option<Fit> {
     // as many throughout: with another number α would jump
     let positions = start.positions();
     let mut scale = f32::INFINITY;
-    let mut residuals = Vec::with_capacity(pixels.len());
+    let mut squares = Vec::with_capacity(band.count);
     for step in 0..MOST_STEPS {
-        let shape = disc_of(&parameters).evaluator(positions);
-        let mut normal = Matrix4::<f64>::zeros();
-        let mut right = Vector4::<f64>::zeros();
-        normal[(3, 3)] = prior;
-        right[3] = prior * (1.0 - parameters[3]);
-        residuals.clear();
-        for pixel in pixels {
-            let value = shape.at(pixel.x_px, pixel.y_px);
-            let residual = pixel.share - value.share;
-            let standard = residual * residual / pixel.variance;
-            residuals.push(standard);
-            let outlying = standard / (TUKEY * scale).powi(2);
-            if outlying >= 1.0 {
-                continue;
-            }
-            let weight = f64::from((1.0 - outlying).powi(2) / pixel.variance);
-            let mut slope = Vector4::from(value.slope.map(f64::from));
-            slope[3] *= 0.5 / parameters[3];
-            normal += weight * slope * slope.transpose();
-            right += weight * f64::from(residual) * slope;
-        }
+        squares.clear();
+        let sums = Sums::of(band, &disc_of(&parameters).evaluator(positions), scale, &mut squares);
+        let (mut normal, mut right) = sums.equations(0.5 / parameters[3]);
+        normal[(3, 3)] += prior;
+        right[3] += prior * (1.0 - parameters[3]);
         if step < SCALE_STEPS {
-            scale = scale_of(&mut residuals);
+            scale = scale_of(&mut squares);
         }
         if parameters[3] <= SHORTEST_SWEEP && right[3] < 0.0 {
             // as short as it can be
@@ -102,7 +104,7 @@ pub fn fit(start: Disc, pixels: &[Pixel]) -> Option<Fit> {
         if !parameters.iter().all(|p| p.is_finite()) {
             return None;
         }
-        if step >= 2 && longest < SMALL_STEP_PX {
+        if step >= 2 && longest < small_step_px {
             let inverse = cholesky.inverse();
             // the residuals' own scale where it is larger than the stated one
             let misfit = f64::from(scale * scale).max(1.0);
@@ -111,6 +113,68 @@ pub fn fit(start: Disc, pixels: &[Pixel]) -> Option<Fit> {
         }
     }
     None
+}
+
+/// The upper triangle of Σ w ∇α ∇αᵀ row by row, and Σ w (share − α) ∇α.
+#[derive(Default)]
+struct Sums {
+    products: [Lanes; 10],
+    right: [Lanes; 4],
+}
+
+impl Sums {
+    /// Over all pixels, those beyond Tukey's bound left out; the squares of the normalised residuals go to `squares`.
+    fn of(band: &Band, shape: &Evaluator, scale: f32, squares: &mut Vec<f32>) -> Self {
+        let mut sums = Self::default();
+        let bound = 1.0 / (TUKEY * scale).powi(2);
+        for pack in &band.packs {
+            let value = shape.at(&pack.x_px, &pack.y_px);
+            let mut square = Lanes::default();
+            let mut weight = Lanes::default();
+            let mut pull = Lanes::default();
+            for i in 0..LANES {
+                let residual = pack.share[i] - value.share[i];
+                square[i] = residual * residual * pack.weight[i];
+                let inlying = (1.0 - square[i] * bound).max(0.0);
+                weight[i] = inlying * inlying * pack.weight[i];
+                pull[i] = weight[i] * residual;
+            }
+            let mut at = 0;
+            for a in 0..4 {
+                for i in 0..LANES {
+                    sums.right[a][i] += pull[i] * value.slope[a][i];
+                }
+                for b in a..4 {
+                    for i in 0..LANES {
+                        sums.products[at][i] += weight[i] * value.slope[a][i] * value.slope[b][i];
+                    }
+                    at += 1;
+                }
+            }
+            squares.extend_from_slice(&square);
+        }
+        squares.truncate(band.count);
+        sums
+    }
+
+    /// Normal equations, the fourth parameter's slope times `factor`.
+    fn equations(&self, factor: f64) -> (Matrix4<f64>, Vector4<f64>) {
+        let total = |lanes: &Lanes| lanes.iter().map(|v| f64::from(*v)).sum::<f64>();
+        let mut normal = Matrix4::<f64>::zeros();
+        let mut right = Vector4::<f64>::zeros();
+        let mut at = 0;
+        for a in 0..4 {
+            let of_a = if a == 3 { factor } else { 1.0 };
+            right[a] = of_a * total(&self.right[a]);
+            for b in a..4 {
+                let of_b = if b == 3 { factor } else { 1.0 };
+                normal[(a, b)] = of_a * of_b * total(&self.products[at]);
+                normal[(b, a)] = normal[(a, b)];
+                at += 1;
+            }
+        }
+        (normal, right)
+    }
 }
 
 /// Standard deviation of normalised residuals, from the median of their squares.

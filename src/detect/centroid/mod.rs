@@ -23,18 +23,22 @@ mod fit;
 mod outline;
 mod patch;
 mod profile;
+mod rim;
 mod share;
 mod surroundings;
+mod zones;
 
 use super::component::HueAxis;
 use crate::video::Picture;
 use disc::Disc;
-use fit::{Fit, Pixel};
-use outline::{Outline, Zone};
+use fit::{Band, Fit};
+use outline::Outline;
 use patch::Patch;
 use profile::Profile;
+use rim::Rim;
 use share::Share;
 use surroundings::Surroundings;
+use zones::Zones;
 
 /// Which channels a mark is measured by.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -80,96 +84,86 @@ const PIXELS_SHARING: f64 = 4.0;
 /// Standard deviation of the blur of lens, subsampling and codec, px, with and without subsampled chroma.
 const BLUR_PX: [f32; 2] = [1.3, 0.9];
 
+/// The last step of the first fit, which only says where to look, and of the second, px.
+const ROUGHLY_PX: f64 = 0.05;
+const EXACTLY_PX: f64 = 2e-3;
+
 /// Measures the mark under `silhouette`. `None` where the mark has no contrast or fills the picture.
 pub fn measure(picture: &Picture<'_>, axis: HueAxis, silhouette: &Silhouette, channels: Channels) -> Option<Centroid> {
     let mut outline = Outline::of(picture, axis, silhouette);
     let patch = Patch::read(picture, &outline);
-    let surroundings = Surroundings::survey(&patch, &outline, channels)?;
+    let zones = Zones::of(&patch, &outline);
+    let surroundings = Surroundings::survey(&zones, &outline, channels)?;
     let shares = surroundings.shares(&outline)?;
     // the mask's outline is a staircase of chroma samples: the shares of mark give a finer one
-    outline.refine(&sector_areas(&patch, &outline, &surroundings, &shares));
+    outline.refine(&sector_areas(&zones, &outline, &surroundings, &shares));
+    let zones = Zones::of(&patch, &outline);
     let mut shares = surroundings.shares(&outline)?;
     let mut moments = Moments::default();
-    for_each_share(&patch, &outline, &surroundings, &shares, |sample, share, variance| {
-        moments.add(share, variance, sample.dx_px, sample.dy_px);
+    for_each_share(&zones, &outline, &surroundings, &shares, |sample, share, variance| {
+        moments.add(zones.pixels_each, share, variance, [sample.dx_px, sample.dy_px]);
     });
     let mut centroid = moments.centroid()?;
     let blur_px = BLUR_PX[usize::from(picture.layout.chroma_shift_x == 0)];
-    let mut fitted = fit::fit(moments.disc(blur_px), &band(&patch, &outline, &surroundings, &shares));
+    let rim = Rim { samples: &zones.band };
+    let band = rim.mixtures(&shares, &rim.backgrounds(&surroundings));
+    let mut fitted = fit::fit(moments.disc(blur_px), &band, ROUGHLY_PX);
+    let reread;
+    let mut last = &zones;
     if let Some(first) = &fitted {
         // mask and moments know the outline to a pixel, the disc to a tenth: the ring is read again
         outline = outline.of_disc(&first.disc);
-        if let Some((surroundings, again)) = resurvey(&patch, &outline, &first.disc, channels) {
-            fitted = fit::fit(first.disc, &band(&patch, &outline, &surroundings, &again)).or(fitted);
+        reread = Zones::of(&patch, &outline);
+        last = &reread;
+        if let Some((band, again)) = resurvey(&patch, &reread, &outline, &first.disc, channels) {
+            fitted = fit::fit(first.disc, &band, EXACTLY_PX).or(fitted);
             shares = again;
         }
     }
     if let Some(Fit { disc, covariance_px2, .. }) = fitted {
         (centroid.x_px, centroid.y_px) = (f64::from(disc.centre_px[0]), f64::from(disc.centre_px[1]));
-        centroid.variance_px2 = covariance_px2.map(|v| PIXELS_SHARING * v);
+        let samples_sharing = PIXELS_SHARING / f64::from(last.pixels_each);
+        centroid.variance_px2 = covariance_px2.map(|v| samples_sharing * v);
     }
     centroid.chroma_share = share::of_chroma(&shares);
     let reach = patch.reach_px();
     let inside = centroid.x_px.abs() < reach && centroid.y_px.abs() < reach;
     centroid.x_px += outline.centre_px[0];
     centroid.y_px += outline.centre_px[1];
-    centroid.cut = outline.is_cut(&patch, picture);
+    centroid.cut = last.are_cut(&outline, picture);
     inside.then_some(centroid)
 }
 
-/// The pixels of the band that are mixtures of mark and background.
-fn band(patch: &Patch, outline: &Outline, surroundings: &Surroundings, shares: &[Share]) -> Vec<Pixel> {
-    let pixel = |sample: &patch::Sample| {
-        let sector = usize::from(sample.sector);
-        if outline.zone(sample) != Zone::Band || !shares[sector].variance.is_finite() {
-            return None;
-        }
-        let share = shares[sector].of(sample.levels, surroundings.background_at(sector, sample))?;
-        Some(Pixel { x_px: sample.dx_px, y_px: sample.dy_px, share, variance: shares[sector].variance })
-    };
-    patch.samples.iter().filter_map(pixel).collect()
-}
-
-/// The surroundings of a disc, with what every sector's band holds beside it and the background.
-fn resurvey(patch: &Patch, outline: &Outline, disc: &Disc, channels: Channels) -> Option<(Surroundings, Vec<Share>)> {
-    let plain = Surroundings::survey(patch, outline, channels)?;
-    let rests = rests_of(patch, outline, disc, &plain)?;
-    let (mut surroundings, mut rests) = (plain, rests);
-    if let Some(extruded) = surroundings.extruded(patch, outline, disc) {
-        let others = rests_of(patch, outline, disc, &extruded)?;
-        if extruded.misfit(&others) < surroundings.misfit(&rests) {
-            (surroundings, rests) = (extruded, others);
-        }
-    }
-    surroundings.learn_scatter(patch, &rests);
-    let shares = surroundings.shares(outline)?;
-    Some((surroundings, shares))
-}
-
-/// What every pixel of the band holds beside the disc and the background.
-fn rests_of(
+/// The surroundings of a disc, with what every sector's band holds beside it and the background, and the band itself.
+fn resurvey(
     patch: &Patch,
+    zones: &Zones<'_>,
     outline: &Outline,
     disc: &Disc,
-    surroundings: &Surroundings,
-) -> Option<Vec<Option<nalgebra::Vector3<f32>>>> {
+    channels: Channels,
+) -> Option<(Band, Vec<Share>)> {
+    let mut surroundings = Surroundings::survey(zones, outline, channels)?;
+    let rim = Rim { samples: &zones.band };
+    let of_disc = rim.of_disc(disc);
+    let mut backgrounds = rim.backgrounds(&surroundings);
+    let mut rests = rim.rests(&of_disc, &surroundings.shares(outline)?, &backgrounds);
+    if let Some(extruded) = surroundings.extruded(patch, zones, outline, disc) {
+        let behind = rim.backgrounds(&extruded);
+        let others = rim.rests(&of_disc, &extruded.shares(outline)?, &behind);
+        if extruded.misfit(&others) < surroundings.misfit(&rests) {
+            (surroundings, rests, backgrounds) = (extruded, others, behind);
+        }
+    }
+    surroundings.learn_scatter(rim.samples.iter().map(|s| s.sector).zip(&rests));
     let shares = surroundings.shares(outline)?;
-    let shape = disc.evaluator(disc.positions());
-    let rest = |sample: &patch::Sample| {
-        let sector = usize::from(sample.sector);
-        (outline.zone(sample) == Zone::Band).then(|| {
-            let share = shape.at(sample.dx_px, sample.dy_px).share;
-            shares[sector].rest(sample.levels, surroundings.background_at(sector, sample), share)
-        })
-    };
-    Some(patch.samples.iter().map(rest).collect())
+    Some((rim.mixtures(&shares, &backgrounds), shares))
 }
 
 /// Area of mark in every sector.
-fn sector_areas(patch: &Patch, outline: &Outline, surroundings: &Surroundings, shares: &[Share]) -> Vec<f32> {
+fn sector_areas(zones: &Zones<'_>, outline: &Outline, surroundings: &Surroundings, shares: &[Share]) -> Vec<f32> {
     let mut areas = vec![0.0; outline.count()];
-    for_each_share(patch, outline, surroundings, shares, |sample, share, _| {
-        areas[usize::from(sample.sector)] += share;
+    for_each_share(zones, outline, surroundings, shares, |sample, share, _| {
+        areas[usize::from(sample.sector)] += zones.pixels_each * share;
     });
     areas
 }
@@ -177,31 +171,27 @@ fn sector_areas(patch: &Patch, outline: &Outline, surroundings: &Surroundings, s
 /// Visits every pixel of core and band with its share of mark and the share's variance. A foreign pixel in the band
 /// takes the mean share of its depth.
 fn for_each_share(
-    patch: &Patch,
+    zones: &Zones<'_>,
     outline: &Outline,
     surroundings: &Surroundings,
     shares: &[Share],
     mut visit: impl FnMut(&patch::Sample, f32, f32),
 ) {
+    zones.core.iter().for_each(|sample| visit(sample, 1.0, 0.0));
     let mut foreign = Vec::new();
-    for sample in &patch.samples {
+    for sample in &zones.band {
         let sector = usize::from(sample.sector);
-        let depth = outline.depth_px(sample);
-        match outline.zone(sample) {
-            Zone::Core => visit(sample, 1.0, 0.0),
-            Zone::Band => match shares[sector].of(sample.levels, surroundings.background_at(sector, sample)) {
-                Some(share) => visit(sample, share, shares[sector].variance),
-                None => foreign.push((sample, depth)),
-            },
-            Zone::Ring | Zone::Beyond => {}
+        match shares[sector].of(sample.levels, surroundings.background_at(sector, sample)) {
+            Some(share) => visit(sample, share, shares[sector].variance),
+            None => foreign.push(sample),
         }
     }
     if foreign.is_empty() {
         return;
     }
-    let profile = Profile::of(patch, outline, surroundings, shares);
-    for (sample, depth) in foreign {
-        visit(sample, profile.at(depth), shares[usize::from(sample.sector)].variance);
+    let profile = Profile::of(zones, outline, surroundings, shares);
+    for sample in foreign {
+        visit(sample, profile.at(outline.depth_px(sample)), shares[usize::from(sample.sector)].variance);
     }
 }
 
@@ -218,8 +208,10 @@ struct Moments {
 }
 
 impl Moments {
-    fn add(&mut self, share: f32, variance: f32, dx: f32, dy: f32) {
-        let (x, y, share, v) = (f64::from(dx), f64::from(dy), f64::from(share), f64::from(variance));
+    /// Adds a pixel that stands for some.
+    fn add(&mut self, pixels: f32, share: f32, variance: f32, at_px: [f32; 2]) {
+        let [x, y] = at_px.map(f64::from);
+        let (share, v) = (f64::from(pixels * share), f64::from(pixels * pixels * variance));
         self.area += share;
         self.mx += share * x;
         self.my += share * y;

@@ -5,7 +5,7 @@ use std::f32::consts::TAU;
 use super::super::component::HueAxis;
 use super::Silhouette;
 use super::disc::Disc;
-use super::patch::{Patch, Sample};
+use super::patch::Sample;
 use crate::video::Picture;
 
 /// The narrowest half width of the boundary band: codecs and chroma interpolation soften every edge this much.
@@ -175,15 +175,6 @@ impl Outline {
                 .clamp(old - self.bands_px[sector], old + self.bands_px[sector])
                 .max(1.0);
         }
-    }
-
-    /// The boundary band reaches over the picture's edge.
-    pub fn is_cut(&self, patch: &Patch, picture: &Picture<'_>) -> bool {
-        let (right, bottom) = (picture.layout.width_px as f32 - 1.0, picture.layout.height_px as f32 - 1.0);
-        patch.samples.iter().any(|s| {
-            let (x, y) = (self.centre_px[0] as f32 + s.dx_px, self.centre_px[1] as f32 + s.dy_px);
-            (x <= 0.0 || y <= 0.0 || x >= right || y >= bottom) && matches!(self.zone(s), Zone::Core | Zone::Band)
-        })
     }
 }
 

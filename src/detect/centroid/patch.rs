@@ -19,8 +19,18 @@ pub struct Sample {
     pub distance_px: f32,
     /// Sector of the outline.
     pub sector: u16,
+    /// Place in the planes of the patch.
+    place: u32,
     /// The pixel's codes.
     pub levels: Levels,
+}
+
+impl Sample {
+    /// A white field, were the pixels a chessboard.
+    #[inline]
+    pub fn is_white(&self) -> bool {
+        (self.dx_px as i32 + self.dy_px as i32) & 1 == 0
+    }
 }
 
 /// How much farther a refined outline may reach.
@@ -32,10 +42,10 @@ pub struct Patch {
     top: usize,
     width: usize,
     height: usize,
+    soft: bool,
+    planes: [Vec<f32>; CHANNELS],
     /// Core, band and ring; the corners beyond are left out.
     pub samples: Vec<Sample>,
-    /// Gradient of every channel at every sample.
-    pub gradients: Vec<[[f32; 2]; CHANNELS]>,
 }
 
 impl Patch {
@@ -48,12 +58,19 @@ impl Patch {
         let [cx, cy] = outline.centre_px;
         let (left, top) = (from(cx, layout.width_px), from(cy, layout.height_px));
         let (width, height) = (to(cx, layout.width_px) - left, to(cy, layout.height_px) - top);
-        let mut patch = Self { left, top, width, height, samples: Vec::new(), gradients: Vec::new() };
+        let soft = layout.chroma_shift_x > 0 && layout.chroma_shift_y > 0;
+        let mut patch = Self { left, top, width, height, soft, planes: Default::default(), samples: Vec::new() };
         if width > 0 && height > 0 {
-            let planes = [patch.luma(picture), patch.chroma(picture, &picture.cb), patch.chroma(picture, &picture.cr)];
-            patch.gather(outline, reach, &planes);
+            patch.planes =
+                [patch.luma(picture), patch.chroma(picture, &picture.cb), patch.chroma(picture, &picture.cr)];
+            patch.gather(outline, reach);
         }
         patch
+    }
+
+    /// Luma is softened along both axes.
+    pub fn is_soft(&self) -> bool {
+        self.soft
     }
 
     /// How far from the centre a centroid can be.
@@ -61,9 +78,21 @@ impl Patch {
         self.width.max(self.height) as f64
     }
 
-    fn gather(&mut self, outline: &Outline, reach: f32, planes: &[Vec<f32>; CHANNELS]) {
+    /// Gradients of all channels at a sample, codes in two pixels.
+    pub fn gradients(&self, sample: &Sample) -> [[f32; 2]; CHANNELS] {
+        let place = sample.place as usize;
+        let (i, row) = (place % self.width, place - place % self.width);
+        let (left, right) = (row + i.max(1) - 1, row + (i + 1).min(self.width - 1));
+        let above = if row > 0 { place - self.width } else { place };
+        let below = if row + self.width < self.planes[0].len() { place + self.width } else { place };
+        [0, 1, 2].map(|k: usize| {
+            let plane = &self.planes[k];
+            [plane[right] - plane[left], plane[below] - plane[above]]
+        })
+    }
+
+    fn gather(&mut self, outline: &Outline, reach: f32) {
         self.samples.reserve(self.width * self.height);
-        self.gradients.reserve(self.width * self.height);
         // whole rows first, in loops that the compiler can turn into vector instructions
         let dx: Vec<f32> = (0..self.width).map(|i| ((self.left + i) as f64 - outline.centre_px[0]) as f32).collect();
         let (mut squares, mut sectors) = (vec![0.0; self.width], vec![0u16; self.width]);
@@ -74,20 +103,10 @@ impl Patch {
                 *sector = outline.sector(*dx, dy) as u16;
             }
             for i in (0..self.width).filter(|i| squares[*i] <= reach * reach) {
-                let at = j * self.width + i;
-                let levels = [planes[0][at], planes[1][at], planes[2][at]];
-                let (distance_px, sector) = (squares[i].sqrt(), sectors[i]);
-                let (left, right) = (i.max(1) - 1, (i + 1).min(self.width - 1));
-                let (above, below) = (j.max(1) - 1, (j + 1).min(self.height - 1));
-                let row = j * self.width;
-                self.gradients.push([0, 1, 2].map(|k: usize| {
-                    let plane = &planes[k];
-                    [
-                        plane[row + right] - plane[row + left],
-                        plane[below * self.width + i] - plane[above * self.width + i],
-                    ]
-                }));
-                self.samples.push(Sample { dx_px: dx[i], dy_px: dy, distance_px, sector, levels });
+                let place = j * self.width + i;
+                let levels = [0, 1, 2].map(|k: usize| self.planes[k][place]);
+                let (distance_px, sector, place) = (squares[i].sqrt(), sectors[i], place as u32);
+                self.samples.push(Sample { dx_px: dx[i], dy_px: dy, distance_px, sector, place, levels });
             }
         }
     }

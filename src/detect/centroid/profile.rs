@@ -1,9 +1,9 @@
 //! The mean share of mark at every depth of the boundary band.
 
-use super::outline::{Outline, Zone};
-use super::patch::Patch;
+use super::outline::Outline;
 use super::share::Share;
 use super::surroundings::Surroundings;
+use super::zones::Zones;
 
 /// Mean share of mark in half-pixel steps of depth.
 pub struct Profile {
@@ -13,15 +13,13 @@ pub struct Profile {
 
 impl Profile {
     /// Over the band's pixels that can be such a mixture.
-    pub fn of(patch: &Patch, outline: &Outline, surroundings: &Surroundings, shares: &[Share]) -> Self {
+    pub fn of(zones: &Zones<'_>, outline: &Outline, surroundings: &Surroundings, shares: &[Share]) -> Self {
         let band_px = outline.bands_px.iter().copied().fold(0.0, f32::max);
         let mut profile = Self { band_px, bins: vec![(0.0, 0); (4.0 * band_px) as usize + 2] };
-        for sample in &patch.samples {
+        for sample in &zones.band {
             let sector = usize::from(sample.sector);
             let depth = outline.depth_px(sample);
-            if outline.zone(sample) == Zone::Band
-                && let Some(share) = shares[sector].of(sample.levels, surroundings.background_at(sector, sample))
-            {
+            if let Some(share) = shares[sector].of(sample.levels, surroundings.background_at(sector, sample)) {
                 profile.add(depth, share);
             }
         }

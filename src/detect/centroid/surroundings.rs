@@ -5,9 +5,10 @@ use nalgebra::{Matrix3, Vector3};
 use super::Channels;
 use super::disc::Disc;
 use super::extrusion::Extrusion;
-use super::outline::{Outline, RING_PX, Zone};
+use super::outline::{Outline, RING_PX};
 use super::patch::{CHANNELS, Levels, Patch, Sample};
 use super::share::Share;
+use super::zones::Zones;
 use crate::statistics::median;
 
 /// A luma sample's rounding error, 8-bit codes (1/√12), and a little more for the codec.
@@ -51,23 +52,15 @@ const UNUSED: f32 = 1e6;
 
 impl Surroundings {
     /// Reads ring and core. `None` where most of the ring lies outside the picture.
-    pub fn survey(patch: &Patch, outline: &Outline, channels: Channels) -> Option<Self> {
-        let mut ring: Vec<(u16, Levels)> = Vec::with_capacity(patch.samples.len() / 2);
-        let mut core: [Vec<f32>; CHANNELS] = Default::default();
-        let mut deepest = (f32::MAX, Levels::default());
-        for sample in &patch.samples {
-            match outline.zone(sample) {
-                Zone::Ring => ring.push((sample.sector, sample.levels)),
-                Zone::Core => core.iter_mut().zip(sample.levels).for_each(|(c, level)| c.push(level)),
-                Zone::Band | Zone::Beyond => {}
-            }
-            let depth = outline.depth_px(sample);
-            if depth < deepest.0 {
-                deepest = (depth, sample.levels);
-            }
-        }
+    pub fn survey(zones: &Zones<'_>, outline: &Outline, channels: Channels) -> Option<Self> {
+        let ring: Vec<(u16, Levels)> = zones.ring.iter().map(|s| (s.sector, s.levels)).collect();
         // a mark narrower than its band has no core: its deepest pixel stands for it
-        let mark = if core[0].len() >= 4 { core.map(|mut c| median(&mut c).unwrap_or(0.0)) } else { deepest.1 };
+        let mark = if zones.core.len() >= 4 {
+            [0, 1, 2].map(|k| median(&mut zones.core.iter().map(|s| s.levels[k]).collect::<Vec<_>>()).unwrap_or(0.0))
+        } else {
+            let inside = zones.core.iter().chain(&zones.band);
+            inside.min_by(|a, b| outline.depth_px(a).total_cmp(&outline.depth_px(b)))?.levels
+        };
         let scatter = vec![scatter_of(ring.iter().map(|(_, levels)| *levels)); outline.count()];
         let mut surroundings = Self {
             sectors: vec![Sector::default(); outline.count()],
@@ -162,29 +155,26 @@ impl Surroundings {
     }
 
     /// The same, with a background that continues along one direction; `None` where it has none.
-    pub fn extruded(&self, patch: &Patch, outline: &Outline, disc: &Disc) -> Option<Self> {
-        let extrusion = Extrusion::of(patch, outline, disc)?;
+    pub fn extruded(&self, patch: &Patch, zones: &Zones<'_>, outline: &Outline, disc: &Disc) -> Option<Self> {
+        let extrusion = Extrusion::of(patch, zones, outline, disc)?;
         Some(Self { extrusion: Some((extrusion, *disc)), ..self.clone() })
     }
 
     /// Mean square of what the band holds beside background and mark, in the channels' noise, single pixels bounded.
-    pub fn misfit(&self, rests: &[Option<Vector3<f32>>]) -> f32 {
+    pub fn misfit(&self, rests: &[Vector3<f32>]) -> f32 {
         let size = |rest: &Vector3<f32>| (0..CHANNELS).map(|k| (rest[k] / self.noise[k]).powi(2)).sum::<f32>();
-        let sizes = rests.iter().flatten().map(|r| size(r).min(MOST_MISFIT));
-        sizes.clone().sum::<f32>() / sizes.count().max(1) as f32
+        rests.iter().map(|r| size(r).min(MOST_MISFIT)).sum::<f32>() / rests.len().max(1) as f32
     }
 
     /// Learns what scatters in every sector from what the pixels of its band hold beside background and mark. Five
     /// sectors together: one has too few pixels.
-    pub fn learn_scatter(&mut self, patch: &Patch, rests: &[Option<Vector3<f32>>]) {
+    pub fn learn_scatter<'a>(&mut self, rests: impl Iterator<Item = (u16, &'a Vector3<f32>)>) {
         let count = self.sectors.len();
         let mut sums = vec![(Matrix3::<f32>::zeros(), 0.0f32); count];
-        for (sample, rest) in patch.samples.iter().zip(rests) {
-            if let Some(rest) = rest {
-                let sum = &mut sums[usize::from(sample.sector)];
-                sum.0 += rest * rest.transpose();
-                sum.1 += 1.0;
-            }
+        for (sector, rest) in rests {
+            let sum = &mut sums[usize::from(sector)];
+            sum.0 += rest * rest.transpose();
+            sum.1 += 1.0;
         }
         for (sector, scatter) in self.scatter.iter_mut().enumerate() {
             let near = [count - 2, count - 1, 0, 1, 2].map(|k| sums[(sector + k) % count]);

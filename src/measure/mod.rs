@@ -1,18 +1,22 @@
 //! A recording → tracks and angles, with everything a reader of the table should know beside it.
 
+mod survey;
+mod view;
+
 use std::path::{Path, PathBuf};
 
 use crate::angles::{AngleSource, Angles, angles_from_tracks};
 use crate::area::Area;
 use crate::calibrate::Calibration;
-use crate::detect::{Album, Blob, Detector, Hue, Siting, SitingSurvey};
+use crate::detect::{Album, Detector, Hue, Siting};
 use crate::error::{Error, Result};
 use crate::experiment::{MarkColour, Rig};
 use crate::progress::Progress;
 use crate::rejected::Rejected;
-use crate::steady::{Background, CameraShift};
-use crate::track::{FrameBlobs, MarkSlot, Measured, Sighting, Tracker, Tracks};
-use crate::video::{DamageSpread, Decoded, Frame, Orientation, Outcome, Recording, StillTimes, StreamInfo, Timing};
+use crate::steady::Background;
+use crate::track::{FrameBlobs, MarkSlot, Tracker, Tracks};
+use crate::video::{DamageSpread, Decoded, Outcome, Recording, StillTimes, StreamInfo, Timing};
+use view::{Seen, View, frame_blobs};
 
 /// Whether the camera's own motion is taken out.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
@@ -83,6 +87,8 @@ pub struct Measurement {
     pub time_scale: f64,
     /// How far the camera moved.
     pub camera: Camera,
+    /// Where the chroma samples lie.
+    pub siting: Option<Siting>,
 }
 
 /// What is known of the camera's own motion.
@@ -106,15 +112,6 @@ impl Measurement {
         self.tracks.t_s.get(frame).copied().unwrap_or(self.timing.last_s)
     }
 }
-
-/// Pictures from which hue, scale and threshold are learnt.
-const SAMPLE_PICTURES: usize = 8;
-/// Shift between two pictures from which the camera is taken to move, px: ten times what a patch's error is.
-const CAMERA_MOVES_PX: f64 = 0.3;
-
-/// Standard deviations beyond which a shift is one, and pictures that must show it.
-const SURE_SHIFT: f64 = 5.0;
-const FEWEST_PICTURES: usize = 3;
 
 /// Measures a recording. Paths in the rig are relative to `folder`.
 ///
@@ -152,17 +149,11 @@ impl<'a> Session<'a> {
         let calibration = Calibration::new(&options.rig, stream.pixel_aspect, folder)?;
         let area = Area::new(&options.rig, folder, stream.orientation.size(stream.stored_size_px))?;
         let (mut hues, slots) = hues_of(&options.marks);
-        let mut album = Album::default();
-        let mut look = Lookout::new(options, &stream);
-        recording.sample(SAMPLE_PICTURES, &mut |frame| {
-            album.allow(area.samples(&frame.picture.layout, stream.orientation));
-            album.see(&frame.picture);
-            look.see(frame);
-        })?;
-        album.compare();
+        let pictures = survey::pictures(&recording)?;
+        let album = survey::album(&pictures, &area, stream.orientation);
         album.calibrate(&mut hues, options.threshold)?;
-        let (background, camera) = look.finish(options.steadying);
-        let siting = siting_of(&recording, &hues)?;
+        let (background, camera) = survey::camera(&pictures, options, &stream);
+        let siting = survey::siting(&pictures, &hues)?;
         let (path, stamps_s) = (path.to_owned(), Vec::new());
         Ok(Self {
             path,
@@ -214,6 +205,7 @@ impl<'a> Session<'a> {
         let mut tracker = Tracker::new(self.slots.clone(), self.options.rig.pivot_px);
         let detector = Detector::new(self.hues.clone()).with_siting(self.siting);
         let decoded = self.each_frame(&detector, progress, &mut |frame| tracker.push(frame))?;
+        progress.begin("angles", None);
         self.conclude(decoded, tracker)
     }
 
@@ -293,73 +285,8 @@ impl<'a> Session<'a> {
         let angles = angles_from_tracks(&tracks, &self.calibration, rig.pivot_px, self.options.angle_source)?;
         self.camera.finish(self.stamps_s.len());
         let (stream, hues, camera) = (self.stream.clone(), self.hues.clone(), self.camera);
-        Ok(Measurement { stream, decoded, timing, hues, tracks, angles, file_t_s, time_scale, camera })
-    }
-}
-
-/// Where the chroma samples lie, from marks in pictures spread over the recording.
-fn siting_of(recording: &Recording, hues: &[Hue]) -> Result<Option<Siting>> {
-    let detector = Detector::new(hues.to_vec());
-    let mut survey = SitingSurvey::default();
-    let mut seen = Ok(());
-    recording.sample(SAMPLE_PICTURES, &mut |frame| {
-        if seen.is_ok() {
-            seen = survey.see(&frame.picture, &detector);
-        }
-    })?;
-    seen.map(|()| survey.conclude())
-}
-
-/// Watches for a camera that moves, in pictures spread over the recording.
-struct Lookout {
-    points_px: Vec<[f64; 2]>,
-    background: Option<Background>,
-    greatest_px: f64,
-    agreed: Vec<Vec<bool>>,
-    /// Pictures that do not say where the camera looks.
-    silent: usize,
-}
-
-impl Lookout {
-    fn new(options: &Options, stream: &StreamInfo) -> Self {
-        let stored = |p: &[f64; 2]| stream.orientation.stored_point(*p, stream.stored_size_px);
-        let points_px = options.rig.reference_marks.iter().map(stored).collect();
-        Self { points_px, background: None, greatest_px: 0.0, agreed: Vec::new(), silent: 0 }
-    }
-
-    fn see(&mut self, frame: &Frame<'_>) {
-        match &self.background {
-            None => self.background = Some(Background::of(&frame.picture, &self.points_px)),
-            Some(background) => {
-                let located = background.locate(&frame.picture);
-                self.silent += usize::from(located.is_none());
-                if let Some(camera) = located {
-                    // a shift that its own patches leave open is none
-                    if camera.size_px() > SURE_SHIFT * camera.sd_px {
-                        self.greatest_px = self.greatest_px.max(camera.size_px());
-                    }
-                    self.agreed.push(background.agreeing(&frame.picture, &camera));
-                }
-            }
-        }
-    }
-
-    fn finish(self, steadying: Steadying) -> (Option<Background>, Camera) {
-        let taken_out = match steadying {
-            Steadying::Always => true,
-            Steadying::Never => false,
-            // where some picture does not show the background well, no frame is risked for it
-            Steadying::WhereNeeded => {
-                let moves = self.greatest_px > CAMERA_MOVES_PX && self.agreed.len() >= FEWEST_PICTURES;
-                !self.points_px.is_empty() || (moves && self.silent == 0)
-            }
-        };
-        let mut background = self.background.filter(|_| taken_out);
-        background.iter_mut().for_each(|b| b.keep_steady(&self.agreed));
-        let background = background.filter(Background::is_usable);
-        let greatest_shift_px = if self.silent == 0 { self.greatest_px } else { 0.0 };
-        let camera = Camera { greatest_shift_px, taken_out: background.is_some(), ..Camera::default() };
-        (background, camera)
+        let siting = self.siting;
+        Ok(Measurement { stream, decoded, timing, hues, tracks, angles, file_t_s, time_scale, camera, siting })
     }
 }
 
@@ -384,12 +311,6 @@ impl Camera {
     }
 }
 
-/// What was seen in a frame and when; nothing is measured in a damaged one.
-fn frame_blobs(frame: Outcome<Seen>) -> FrameBlobs {
-    let Seen { t_s, sightings, .. } = frame.value;
-    FrameBlobs { t_s, damaged: frame.damaged, sightings: if frame.damaged { Vec::new() } else { sightings } }
-}
-
 /// One hue for each distinct colour, and each mark's hue.
 fn hues_of(marks: &[MarkColour]) -> (Vec<Hue>, Vec<MarkSlot>) {
     let mut hues: Vec<Hue> = Vec::new();
@@ -403,71 +324,4 @@ fn hues_of(marks: &[MarkColour]) -> (Vec<Hue>, Vec<MarkSlot>) {
         slots.push(MarkSlot { hue: index as u8 });
     }
     (hues, slots)
-}
-
-/// One frame, looked at.
-struct Seen {
-    t_s: f64,
-    /// Before --from or after --until.
-    outside: bool,
-    sightings: Vec<Sighting>,
-    camera: Option<CameraShift>,
-}
-
-/// From stored to displayed pixels.
-struct View<'a> {
-    orientation: Orientation,
-    size: (usize, usize),
-    binary: bool,
-    area: &'a Area,
-    background: Option<&'a Background>,
-    span_s: [f64; 2],
-}
-
-impl View<'_> {
-    /// Time stamp and blobs of a frame, as displayed, the camera's motion taken out.
-    fn look(&self, detector: &Detector, frame: &Frame<'_>) -> Result<Outcome<Seen>> {
-        let outside = !(self.span_s[0]..=self.span_s[1]).contains(&frame.t_s);
-        let mut seen = Seen { t_s: frame.t_s, outside, sightings: Vec::new(), camera: None };
-        if !frame.damaged && !outside {
-            seen.camera = self.background.and_then(|b| b.locate(&frame.picture));
-            if self.background.is_none() || seen.camera.is_some() {
-                let mut blobs = detector.detect(&frame.picture)?;
-                if let Some(camera) = seen.camera {
-                    blobs.iter_mut().for_each(|b| undo(b, &camera));
-                }
-                let sightings = blobs.iter().map(|b| self.sighting(b));
-                seen.sightings = sightings.filter(|s| self.area.holds(s.measured.position_px)).collect();
-            }
-        }
-        Ok(Outcome { key: frame.key, damaged: frame.damaged, value: seen })
-    }
-
-    fn sighting(&self, blob: &Blob) -> Sighting {
-        let c = &blob.centroid;
-        let stored = if self.binary { blob.binary_px } else { [c.x_px, c.y_px] };
-        let [xx, yy, xy] = c.variance_px2;
-        let (right, down) = (self.orientation.turn([1.0, 0.0]), self.orientation.turn([0.0, 1.0]));
-        let covariance = |i: usize, j: usize| {
-            right[i] * right[j] * xx + down[i] * down[j] * yy + (right[i] * down[j] + down[i] * right[j]) * xy
-        };
-        Sighting {
-            hue: blob.hue,
-            measured: Measured {
-                position_px: self.orientation.point(stored, self.size),
-                covariance_px2: [covariance(0, 0), covariance(1, 1), covariance(0, 1)],
-                area_px2: c.area_px2 as f32,
-            },
-            cut: c.cut,
-        }
-    }
-}
-
-/// Puts a blob where it would be had the camera not moved.
-fn undo(blob: &mut Blob, camera: &CameraShift) {
-    [blob.centroid.x_px, blob.centroid.y_px] = camera.undo([blob.centroid.x_px, blob.centroid.y_px]);
-    blob.binary_px = camera.undo(blob.binary_px);
-    let variance = camera.sd_px.powi(2);
-    blob.centroid.variance_px2[0] += variance;
-    blob.centroid.variance_px2[1] += variance;
 }

@@ -1,0 +1,82 @@
+//! What pictures spread over a recording show before it is measured: what moves, whether the camera does, where the
+//! chroma samples lie.
+
+use rayon::iter::{IntoParallelRefIterator, ParallelIterator};
+
+use super::{Camera, Options, Steadying};
+use crate::area::Area;
+use crate::detect::{Album, Detector, Hue, Siting, SitingSurvey};
+use crate::error::Result;
+use crate::steady::Background;
+use crate::video::{Orientation, OwnedPicture, Recording, StreamInfo};
+
+/// Pictures from which hue, scale, threshold and siting are learnt.
+const SAMPLE_PICTURES: usize = 8;
+/// Shift between two pictures from which the camera is taken to move, px: ten times what a patch's error is.
+const CAMERA_MOVES_PX: f64 = 0.3;
+/// Standard deviations beyond which a shift is one, and pictures that must show it.
+const SURE_SHIFT: f64 = 5.0;
+const FEWEST_PICTURES: usize = 3;
+
+/// The pictures.
+pub fn pictures(recording: &Recording) -> Result<Vec<OwnedPicture>> {
+    let mut pictures = Vec::new();
+    recording.sample(SAMPLE_PICTURES, &mut |frame| pictures.push(frame.picture.to_owned()))?;
+    Ok(pictures)
+}
+
+/// Their colours, and what moves.
+pub fn album(pictures: &[OwnedPicture], area: &Area, orientation: Orientation) -> Album {
+    let mut album = Album::default();
+    for picture in pictures {
+        album.allow(area.samples(&picture.layout, orientation));
+        album.see(&picture.view());
+    }
+    album.compare();
+    album
+}
+
+/// Where the chroma samples lie, from the marks.
+pub fn siting(pictures: &[OwnedPicture], hues: &[Hue]) -> Result<Option<Siting>> {
+    let detector = Detector::new(hues.to_vec());
+    let see = |picture: &OwnedPicture| {
+        let mut survey = SitingSurvey::default();
+        survey.see(&picture.view(), &detector).map(|()| survey)
+    };
+    let surveys = pictures.par_iter().map(see).collect::<Result<Vec<_>>>()?;
+    Ok(surveys.into_iter().reduce(SitingSurvey::with).and_then(SitingSurvey::conclude))
+}
+
+/// How far the camera moves, and against what it is taken out, where it is.
+pub fn camera(pictures: &[OwnedPicture], options: &Options, stream: &StreamInfo) -> (Option<Background>, Camera) {
+    let Some((first, others)) = pictures.split_first() else { return (None, Camera::default()) };
+    let stored = |p: &[f64; 2]| stream.orientation.stored_point(*p, stream.stored_size_px);
+    let points_px: Vec<[f64; 2]> = options.rig.reference_marks.iter().map(stored).collect();
+    let mut background = Background::of(&first.view(), &points_px);
+    let locate = |picture: &OwnedPicture| {
+        let camera = background.locate(&picture.view())?;
+        Some((camera, background.agreeing(&picture.view(), &camera)))
+    };
+    let located: Vec<_> = others.par_iter().map(locate).collect();
+    // a shift that its own patches leave open is none
+    let shifts = located.iter().flatten().map(|(camera, _)| camera);
+    let sure = shifts.filter(|c| c.size_px() > SURE_SHIFT * c.sd_px);
+    let greatest_px = sure.map(|c| c.size_px()).fold(0.0, f64::max);
+    // pictures that do not show where the camera looks
+    let silent = located.iter().any(Option::is_none);
+    let agreed: Vec<Vec<bool>> = located.into_iter().flatten().map(|(_, agreed)| agreed).collect();
+    let taken_out = match options.steadying {
+        Steadying::Always => true,
+        Steadying::Never => false,
+        // where some picture does not show the background well, no frame is risked for it
+        Steadying::WhereNeeded => {
+            let moves = greatest_px > CAMERA_MOVES_PX && agreed.len() >= FEWEST_PICTURES;
+            !points_px.is_empty() || (moves && !silent)
+        }
+    };
+    background.keep_steady(&agreed);
+    let taken_out = taken_out && background.is_usable();
+    let greatest_shift_px = if silent { 0.0 } else { greatest_px };
+    let camera = Camera { greatest_shift_px, taken_out, ..Camera::default() };
+    (taken_out.then_some(background), camera)
+}

@@ -1,0 +1,168 @@
+//! Accuracy on pictures that another program drew, `fixtures/foreign/render.py`, with other anti-aliasing, exposures,
+//! converters and encoders than freeswing's own.
+//!
+//! `cargo test` takes two short ones; `make accuracy` all of them, and prints the figures.
+
+use std::collections::HashMap;
+use std::path::Path;
+use std::process::Command;
+
+use freeswing::measure::{Measurement, Options, measure};
+use freeswing::progress::Silent;
+
+/// Limits on the error: root mean square over all marks and axes, mean of one mark and axis, px.
+#[derive(Clone, Copy)]
+struct Limits {
+    rms_px: f64,
+    bias_px: f64,
+}
+
+/// What the codec leaves, from near-lossless to x264's default.
+const LOSSLESS: Limits = Limits { rms_px: 0.015, bias_px: 0.02 };
+const CRF_18: Limits = Limits { rms_px: 0.045, bias_px: 0.02 };
+const CRF_23: Limits = Limits { rms_px: 0.065, bias_px: 0.02 };
+
+/// Python with numpy: Debian's packages are for its own, which need not be the first on the path.
+fn python() -> &'static str {
+    let has_numpy = |python: &str| {
+        Command::new(python).args(["-c", "import numpy"]).output().is_ok_and(|output| output.status.success())
+    };
+    ["python3", "/usr/bin/python3"].into_iter().find(|p| has_numpy(p)).expect("no numpy: run scripts/setup")
+}
+
+/// Renders variants of the bank into a folder.
+fn render(folder: &Path, seconds: f64, names: &[&str]) {
+    let script = Path::new(env!("CARGO_MANIFEST_DIR")).join("fixtures/foreign/render.py");
+    let mut command = Command::new(python());
+    command.arg(script).arg("--out").arg(folder).args(["--seconds", &seconds.to_string()]);
+    if !names.is_empty() {
+        command.args(["--only", &names.join(",")]);
+    }
+    assert!(command.status().unwrap().success());
+}
+
+/// The columns of a table.
+fn columns(path: &Path) -> HashMap<String, Vec<f64>> {
+    let text = std::fs::read_to_string(path).unwrap();
+    let mut lines = text.lines().map(|line| line.split(','));
+    let names: Vec<String> = lines.next().unwrap().map(str::to_owned).collect();
+    let mut columns: HashMap<String, Vec<f64>> = names.iter().map(|n| (n.clone(), Vec::new())).collect();
+    for row in lines {
+        for (name, field) in names.iter().zip(row) {
+            columns.get_mut(name).unwrap().push(field.parse().unwrap_or(f64::NAN));
+        }
+    }
+    columns
+}
+
+/// How well a recording was measured.
+struct Score {
+    rms_px: f64,
+    /// Of the mark and axis where it is largest.
+    bias_px: f64,
+    /// Share of the 95 % intervals that hold the truth.
+    cover: f64,
+    lost: usize,
+}
+
+impl Score {
+    fn of(measured: &Measurement, truth: &HashMap<String, Vec<f64>>) -> Self {
+        let (mut squares, mut held, mut count, mut lost, mut bias_px) = (0.0, 0usize, 0usize, 0usize, 0.0f64);
+        for (mark, points) in measured.tracks.marks.iter().enumerate() {
+            for (axis, name) in ["x", "y"].into_iter().enumerate() {
+                let true_px = &truth[&format!("m{}_{name}_px", mark + 1)];
+                let (mut sum, mut seen) = (0.0, 0usize);
+                for (point, true_px) in points.iter().zip(true_px) {
+                    let Some(measured) = point.measured else {
+                        lost += 1;
+                        continue;
+                    };
+                    let error = measured.position_px[axis] - true_px;
+                    let sd = measured.covariance_px2[axis].sqrt();
+                    (squares, held, count) =
+                        (squares + error * error, held + usize::from(error.abs() <= 1.96 * sd), count + 1);
+                    (sum, seen) = (sum + error, seen + 1);
+                }
+                bias_px = bias_px.max((sum / seen.max(1) as f64).abs());
+            }
+        }
+        let n = count.max(1) as f64;
+        Self { rms_px: (squares / n).sqrt(), bias_px, cover: held as f64 / n, lost }
+    }
+}
+
+/// Tracks a rendering of the bank as a newcomer would.
+fn score(folder: &Path, name: &str) -> Score {
+    let colour = ["green", "blue", "orange", "magenta"].into_iter().find(|c| name.contains(c)).unwrap_or("red");
+    let colour = if name == "crf0_no_strip" { "green" } else { colour };
+    let video = ["mp4", "avi"].map(|suffix| folder.join(format!("{name}.{suffix}")));
+    let video = video.iter().find(|v| v.exists()).unwrap();
+    let options = Options { marks: vec![colour.parse().unwrap(); 3], ..Options::default() };
+    let measured = measure(video, &options, Path::new(""), &Silent).unwrap();
+    Score::of(&measured, &columns(&folder.join(format!("{name}.truth.csv"))))
+}
+
+/// Says what was measured, and what of it is beyond the limits.
+fn judge(name: &str, score: &Score, limits: Limits) -> Vec<String> {
+    println!(
+        "{name:28} {:.4} px rms, bias {:.3} px, {:.1} % of the intervals hold, {} lost",
+        score.rms_px,
+        score.bias_px,
+        100.0 * score.cover,
+        score.lost
+    );
+    let mut beyond = Vec::new();
+    if score.rms_px > limits.rms_px {
+        beyond.push(format!("{name}: {:.4} px rms", score.rms_px));
+    }
+    if score.bias_px > limits.bias_px {
+        beyond.push(format!("{name}: bias {:.3} px", score.bias_px));
+    }
+    // errors smaller than stated are no fault of a near-lossless recording
+    if score.cover < 0.90 {
+        beyond.push(format!("{name}: {:.1} % of the intervals hold", 100.0 * score.cover));
+    }
+    if score.lost > 0 {
+        beyond.push(format!("{name}: {} marks lost", score.lost));
+    }
+    beyond
+}
+
+#[test]
+fn marks_in_a_strangers_picture_are_measured_to_the_limit_of_the_codec() {
+    let folder = tempfile::tempdir().unwrap();
+    render(folder.path(), 1.2, &["base", "crf0"]);
+    // one mark's bias over so few frames is not known to a hundredth
+    let wider = |limits: Limits| Limits { bias_px: 0.05, ..limits };
+    let mut beyond = judge("base", &score(folder.path(), "base"), wider(CRF_23));
+    beyond.extend(judge("crf0", &score(folder.path(), "crf0"), LOSSLESS));
+    assert!(beyond.is_empty(), "{beyond:#?}");
+}
+
+#[test]
+#[ignore = "many minutes; run by `make accuracy`"]
+fn every_foreign_rendering_is_measured_within_its_limits() {
+    let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join("foreign");
+    std::fs::create_dir_all(&folder).unwrap();
+    let mut beyond = Vec::new();
+    for name in variants() {
+        if !folder.join(format!("{name}.truth.csv")).exists() {
+            render(&folder, 4.0, &[&name]);
+        }
+        let limits = match name.as_str() {
+            n if n.contains("crf0") || n.contains("mjpeg") => LOSSLESS,
+            n if n.contains("crf18") || n.contains("crf10") || n == "radius8" || n == "magenta" => CRF_18,
+            _ => CRF_23,
+        };
+        beyond.extend(judge(&name, &score(&folder, &name), limits));
+    }
+    println!("beyond the limits: {beyond:#?}");
+    assert!(beyond.len() <= KNOWN_BEYOND, "{beyond:#?}");
+}
+
+/// Names of the bank's variants.
+fn variants() -> Vec<String> {
+    let script = Path::new(env!("CARGO_MANIFEST_DIR")).join("fixtures/foreign/render.py");
+    let output = Command::new(python()).arg(script).args(["--out", ".", "--list"]).output().unwrap();
+    String::from_utf8(output.stdout).unwrap().split_whitespace().map(str::to_owned).collect()
+}
