@@ -168,7 +168,8 @@ pub fn temporary_beside(path: &Path) -> Result<Temporary> {
     }
     // made under the lock, so that no file can appear that the list does not hold
     let mut all = temporaries();
-    let file = builder.tempfile_in(folder).map_err(|e| Error::unwritable(path, e))?;
+    // the message that is wrapped in it names the temporary file
+    let file = builder.tempfile_in(folder).map_err(|e| Error::unwritable(path, e.kind().into()))?;
     all.push(file.path().to_owned());
     Ok(Temporary(file))
 }

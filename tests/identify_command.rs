@@ -158,6 +158,8 @@ fn files_and_options_that_cannot_be_used_are_refused() {
     bench.refuses(&["missing.csv"], "missing.csv: cannot be read");
     bench.refuses(&["."], ".: cannot be read");
     bench.refuses(&["a.csv", "--json", "nowhere/out.json"], "nowhere/out.json: cannot be written");
+    let unwritable = bench.run(&["a.csv", "--json", "nowhere/out.json"]).stderr;
+    assert!(!String::from_utf8_lossy(&unwritable).contains(".freeswing-"), "a temporary file says nothing to a user");
     bench.refuses(&["a.csv", "--json", "a.csv"], "--json: a.csv is an input and would be overwritten");
     bench.refuses(&["a.csv", "--from", "24.9"], "--from, --until: the stretch holds 3 rows; a swing needs at least 8");
     bench.refuses(&["a.csv", "--from", "90"], "the table runs from 0 s to 24.966667 s");

@@ -48,7 +48,7 @@ enum Command {
 
 /// `track` alone, so that `track VIDEO --out angles.csv` works as typed.
 #[derive(Debug, Parser)]
-#[command(name = "track", version)]
+#[command(name = "track", version, about = "Follow the marks of a recording and write their angles", long_about = None)]
 pub struct TrackCli {
     #[command(flatten)]
     args: track::TrackArgs,

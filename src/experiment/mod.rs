@@ -3,6 +3,7 @@
 //! Unknown keys are an error that names the key and the nearest known one.
 
 mod consistency;
+mod keys;
 mod model;
 mod render;
 mod rig;

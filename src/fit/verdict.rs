@@ -200,7 +200,10 @@ impl Verdict {
         let follows = self.explained[link] >= EXPLAINED;
         let last = self.windows.iter().rev().find_map(|w| w.links.get(link)).copied().filter(|_| follows);
         let drift = last.map_or(String::new(), |l| {
-            format!(" At the end the recording is {:+.1} ms late and {:+.1} % larger.", 1e3 * l.lag_s, 1e2 * l.gain)
+            let when = if l.lag_s < 0.0 { "early" } else { "late" };
+            let size = if l.gain < 0.0 { "smaller" } else { "larger" };
+            let (lag_ms, percent) = (1e3 * l.lag_s.abs(), 1e2 * l.gain.abs());
+            format!(" At the end the recording is {lag_ms:.1} ms {when} and {percent:.1} % {size}.")
         });
         let little = match self.explained[link] {
             explained if explained < EXPLAINED => {

@@ -100,7 +100,7 @@ impl Display for Mode {
             }
             writeln!(f)?;
         }
-        writeln!(f, "  {:18}{:>30}{:>30}", "estimator", "f, 95 % (Hz)", "ξ, 95 %")?;
+        writeln!(f, "  {:18}{:>30}{:>33}", "estimator", "f, 95 % (Hz)", "ξ, 95 %")?;
         for e in &self.estimators {
             let cell =
                 |value: &Option<Estimate>, digits| value.as_ref().map_or("–".to_owned(), |v| interval(v, digits));
@@ -112,7 +112,7 @@ impl Display for Mode {
                 Method::Envelope => "envelope",
             };
             let (frequency, damping) = (cell(&e.frequency_hz, 5), cell(&e.damping_ratio, 6));
-            writeln!(f, "  {name:18}{frequency:>30}{damping:>30}  {}", e.note.as_deref().unwrap_or(""))?;
+            writeln!(f, "  {name:18}{frequency:>30}{damping:>33}  {}", e.note.as_deref().unwrap_or(""))?;
         }
         let verdict = |agree: bool| if agree { "agree" } else { "disagree" };
         let tests = [("frequencies", &self.frequency_consistency), ("damping ratios", &self.damping_consistency)];

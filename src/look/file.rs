@@ -40,9 +40,8 @@ fn specimen(text: &mut String, finding: &Finding) {
         if links == 1 { "" } else { "s" },
         vec!["0.1"; links].join(", ")
     );
-    text.push_str("length_m = \"MEASURE\"          # of the whole strip, or of the pendulum\n");
-    text.push_str("mass_kg = \"MEASURE\"           # of the whole strip, or of the bob\n");
-    text.push_str("# width_m = 0.05              # a strip's width, for air and light\n");
+    text.push_str("mass_kg = \"MEASURE\"           # of the whole strip, marks included\n");
+    text.push_str("# length_m = 0.25             # of the whole strip, where it goes on beyond its last mark\n");
     text.push_str(
         "# for rigid arms or a bob give [[specimen.links]] with length_m, mass_kg, com_m, inertia_kg_m2 instead\n\n",
     );
@@ -111,10 +110,7 @@ fn pivot(text: &mut String, finding: &Finding) {
     let beside = if inside { "" } else { ", outside the picture" };
     let what = format!("centre of the first arc{beside}: ± {sx:.1}, ± {sy:.1} px (standard deviation)");
     if finding.hinge_marked {
-        let _ = writeln!(
-            text,
-            "# the first mark is the hinge; the next one's arc has its centre at {x:.1}, {y:.1} ({what})"
-        );
+        let _ = writeln!(text, "# the first mark is the hinge: at {x:.1}, {y:.1} lies the {what}");
     } else if finding.states_pivot() {
         let _ = writeln!(text, "pivot_px = [{x:.2}, {y:.2}]    # {what}");
         let _ = writeln!(text, "# the first mark is {:.1} px below it", arc.radius_px);

@@ -156,7 +156,8 @@ fn words_of_torque(torque: &MissingTorque) -> String {
     }
     if let Some(share) = torque.energy_share {
         let does = if share < 0.0 { "puts in as much as" } else { "takes" };
-        let _ = write!(words, ", that {does} {:.0} % of the energy lost", 1e2 * share.abs());
+        // it is estimated beside the energy lost, and nothing takes more than all of it
+        let _ = write!(words, ", that {does} {:.0} % of the energy lost", 1e2 * share.abs().min(1.0));
     }
     words
 }
