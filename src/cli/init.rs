@@ -41,6 +41,7 @@ impl InitArgs {
     /// # Errors
     /// One line: what, where, what to do.
     pub fn run(&self) -> Result<()> {
+        self.keep_inputs()?;
         if self.out.exists() && !self.force && self.out.as_os_str() != "-" {
             let message = format!("{} exists already; name another file, or say --force", self.out.display());
             return Err(Error::Option { option: "--out".to_owned(), message });
@@ -57,6 +58,26 @@ impl InitArgs {
         out.commit(to_toml(&finding, &name).as_bytes())?;
         if !self.quiet {
             self.report(&finding);
+        }
+        Ok(())
+    }
+
+    /// The recording is never written over, nor is one output by the other; the preview is a PNG.
+    fn keep_inputs(&self) -> Result<()> {
+        let same =
+            |a: &Path, b: &Path| a == b || a.canonicalize().is_ok_and(|a| b.canonicalize().is_ok_and(|b| a == b));
+        let refused = |option: &str, message: String| Err(Error::Option { option: option.to_owned(), message });
+        for (option, target) in [("--out", Some(&self.out)), ("--preview", self.preview.as_ref())] {
+            if let Some(target) = target.filter(|target| same(target, &self.video)) {
+                return refused(option, format!("{} is the recording and would be overwritten", target.display()));
+            }
+        }
+        let Some(preview) = &self.preview else { return Ok(()) };
+        if same(preview, &self.out) {
+            return refused("--preview", format!("{} is the experiment file; name another", preview.display()));
+        }
+        if !preview.extension().is_some_and(|e| e.eq_ignore_ascii_case("png")) {
+            return refused("--preview", format!("{}: the preview is a PNG; name it .png", preview.display()));
         }
         Ok(())
     }
