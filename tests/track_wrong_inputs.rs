@@ -8,7 +8,7 @@ use std::process::{Command, Output};
 use std::sync::LazyLock;
 
 use assert_cmd::cargo::CommandCargoExt;
-use clips::{Clip, GREEN, RED, Scene};
+use clips::{BLUE, Clip, GREEN, RED, Scene};
 use tempfile::TempDir;
 
 /// What a careful colleague would do.
@@ -67,6 +67,7 @@ fn clips() -> Vec<(&'static str, Clip)> {
         ("loose", swing().with(Scene { loose_px: 3.0, ..Scene::default() })),
         ("dark", swing().with(Scene { light: 0.0, ..Scene::default() })),
         ("dim", swing().with(Scene { light: 0.25, ..Scene::default() })),
+        ("ball", swing().with(Scene { marks: vec![(1, BLUE)], radius_px: 40.0, ..Scene::default() })),
         ("one_frame", Clip { frames: 1, ..swing() }),
         ("two_frames", Clip { frames: 2, ..swing() }),
         ("short", Clip { frames: 6, ..swing() }),
@@ -153,6 +154,7 @@ fn marks() -> Vec<Case> {
     let swing = |name, arguments: &[&'static str], wanted| (name, "swing.mp4", arguments.to_vec(), wanted);
     let knob = |name, arguments: &[&'static str], wanted| (name, "knob.mp4", arguments.to_vec(), wanted);
     vec![
+        ("a ball a third of the picture high", "ball.mp4", vec!["--color", "blue", "--markers", "1"], Right(&[1])),
         knob(
             "four marks with a static knob",
             &["--markers", "4"],

@@ -9,6 +9,7 @@ pub type Rgb = [f32; 3];
 
 pub const RED: Rgb = [200.0, 30.0, 30.0];
 pub const GREEN: Rgb = [30.0, 150.0, 50.0];
+pub const BLUE: Rgb = [38.0, 66.0, 170.0];
 const STRIP: Rgb = [176.0, 174.0, 168.0];
 const SIZE: [usize; 2] = [320, 240];
 const RATE_HZ: f64 = 30.0;
