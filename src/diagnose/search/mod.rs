@@ -162,14 +162,14 @@ impl<'a, 'p> Search<'a, 'p> {
 
     /// Singles and pairs, a strip as finely as it needs.
     fn usual(&mut self) {
-        Round::USUAL.into_iter().for_each(|round| _ = self.round(round, &mut Tried::default()));
+        Round::USUAL.into_iter().for_each(|round| self.round(round, &mut Tried::default()));
         self.refine_strip();
     }
 
     /// Restarts where the best fit leaves more than noise. A strip's fits are too dear for it.
     fn restarts(&mut self) {
         if !self.context.is_strip() && self.misfit().is_some_and(|misfit| misfit.unexplained) {
-            Round::RESTARTS.into_iter().for_each(|round| _ = self.round(round, &mut Tried::default()));
+            Round::RESTARTS.into_iter().for_each(|round| self.round(round, &mut Tried::default()));
         }
     }
 
@@ -181,8 +181,9 @@ impl<'a, 'p> Search<'a, 'p> {
             self.round(Round::FromTheBeginning, &mut tried);
         }
         for turn in 0..self.context.settings.search.turns {
-            let led = self.round(Round::OneMore, &mut tried);
-            if turn > 0 && !led {
+            let led = tried.more.len();
+            self.round(Round::OneMore, &mut tried);
+            if turn > 0 && tried.more.len() == led {
                 break;
             }
             self.round(Round::OneFewer, &mut tried);
@@ -192,11 +193,11 @@ impl<'a, 'p> Search<'a, 'p> {
         }
     }
 
-    /// One round: propose, fit, keep. Says whether it had anything to propose.
-    fn round(&mut self, round: Round, tried: &mut Tried) -> bool {
+    /// One round: propose, fit, keep.
+    fn round(&mut self, round: Round, tried: &mut Tried) {
         if self.spent >= self.context.settings.search.budget {
             self.undecided.push(round.name());
-            return false;
+            return;
         }
         let before = least_chi2(&self.fits);
         let proposals = round.proposals(self, tried);
@@ -215,7 +216,6 @@ impl<'a, 'p> Search<'a, 'p> {
             Learns::IfLower if least_chi2(&self.fits) < before => self.learn_noise(),
             _ => {}
         }
-        count > 0
     }
 
     fn fitted(&self, proposals: &[Proposal<'_, 'a>]) -> Vec<Refit<'a>> {

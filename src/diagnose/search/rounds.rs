@@ -103,8 +103,10 @@ impl Round {
 /// Effects that have had their turn.
 #[derive(Debug, Default)]
 pub struct Tried {
-    more: Vec<Vec<Effect>>,
-    fewer: Vec<Vec<Effect>>,
+    /// Those beside which another one was sought.
+    pub more: Vec<Vec<Effect>>,
+    /// Those of which one was left out.
+    pub fewer: Vec<Vec<Effect>>,
 }
 
 impl<'a> Search<'a, '_> {
