@@ -88,18 +88,17 @@ pub fn context<'a>(
     let records = &prepared.records;
     let marks = records.first().map_or(0, Record::links);
     let (base, beliefs) = base_of(experiment, marks, taken, &settings.search)?;
-    let begun = beginning(prepared, experiment, &base)?;
+    let begun = beginning(prepared, &prepared.begun, experiment, &base)?;
     let step_error_rad = prepared.step_error_rad;
     Ok(FitContext { records, experiment, settings, base, beliefs, step_error_rad, begun, fine_strip: None })
 }
 
 /// Where a base model's descent begins: what was not free when the start was sought, where the file has it.
-fn beginning(prepared: &Prepared, experiment: &Experiment, base: &[Parameter]) -> Result<Vec<f64>> {
+fn beginning(prepared: &Prepared, x: &[f64], experiment: &Experiment, base: &[Parameter]) -> Result<Vec<f64>> {
     let stated = Problem::new(&prepared.records, experiment, base)?.start_values()?;
     let sought = |parameter: &Parameter| prepared.base.iter().position(|p| p == parameter);
-    let parameters =
-        base.iter().zip(stated).map(|(parameter, stated)| sought(parameter).map_or(stated, |at| prepared.x[at]));
-    Ok(parameters.chain(prepared.x[prepared.base.len()..].iter().copied()).collect())
+    let parameters = base.iter().zip(stated).map(|(parameter, stated)| sought(parameter).map_or(stated, |at| x[at]));
+    Ok(parameters.chain(x[prepared.base.len()..].iter().copied()).collect())
 }
 
 /// The base model's fit, with the noise that it leaves.
@@ -111,8 +110,12 @@ pub fn fitted<'a>(context: &FitContext<'a>, prepared: &Prepared) -> Result<Refit
         detail: "no motion near the start values follows the recording; check [specimen] and [model]".into(),
     };
     let (nothing, most_steps) = (Hypothesis::default(), context.settings.descent.most_steps);
-    let first = context.descend_from(&nothing, &prepared.noise, context.begun.clone(), most_steps);
-    let fit = from_weaker_dampers(context, first.ok_or_else(refused)?);
+    // from where short stretches led, and from where `fit` ended from there
+    let ended = beginning(prepared, &prepared.ended, context.experiment, &context.base)?;
+    let from = |x: Vec<f64>| context.descend_from(&nothing, &prepared.noise, x, most_steps);
+    let (first, other) = rayon::join(|| from(context.begun.clone()), || from(ended));
+    let first = context.best_of([first, other]).ok_or_else(refused)?;
+    let fit = from_weaker_dampers(context, first);
     match learnt_noise(context, &fit) {
         Some(noise) => context.judged_by(&noise, &fit, most_steps).ok_or_else(refused),
         None => Ok(fit),

@@ -1,14 +1,17 @@
 //! The ways to fit a hypothesis: near another fit, anew from short stretches, or on from where it stands.
 
+use nalgebra::DVector;
+
 use super::context::FitContext;
 use super::hypothesis::Hypothesis;
 use super::refit::Refit;
 use crate::experiment::Experiment;
 use crate::fit::descent::Descent;
-use crate::fit::shooting::multiple_shooting;
+use crate::fit::shooting::{multiple_shooting, shooting_along};
 use crate::fit::whitening::RecordNoise;
 use crate::fit::{Problem, straight};
 use crate::model::Parameter;
+use crate::model::observe::{chord_angles_rad, chord_slopes};
 
 /// Losses imitate each other closely: only a weakly damped step goes along the valley between them.
 const FIRST_DAMPING: f64 = 1e-8;
@@ -117,16 +120,39 @@ impl<'a> FitContext<'a> {
         self.descend_by(self.descent_below(bound), hypothesis, problem, x)
     }
 
+    /// A restart along another fit's motion, which follows the recordings, whatever hypothesis it is of: stretches begin where that motion is, with its
+    /// parameters, and are drawn together.
+    pub fn refit_along(&self, hypothesis: &Hypothesis, leader: &Refit<'_>, start: &Start) -> Option<Refit<'a>> {
+        let (mut problem, x) = self.start(hypothesis, leader, start)?;
+        let (noise, accuracy) = (problem.noise.clone(), problem.accuracy);
+        let motions: Vec<Vec<Vec<f64>>> =
+            (0..self.records.len()).map(|record| states_along(leader, record)).collect::<Option<_>>()?;
+        let parameters = &x[..problem.free.len()];
+        let x = shooting_along(&mut problem, parameters, |record, row| motions[record][row].clone()).ok()?.x;
+        (problem.noise, problem.accuracy) = (noise, accuracy);
+        self.descend_by(self.descent(self.settings.descent.most_steps), hypothesis, problem, x)
+    }
+
+    /// The best of some fits of one hypothesis, with the number of those that agree with it.
+    pub fn best_of(&self, fits: impl IntoIterator<Item = Option<Refit<'a>>>) -> Option<Refit<'a>> {
+        fits.into_iter().flatten().reduce(|mut best, other| {
+            best.meet(other, self.settings.certificate.agrees);
+            best
+        })
+    }
+
     /// Further steps of a fit.
     pub fn go_on(&self, fit: &Refit<'a>, steps: usize) -> Option<Refit<'a>> {
-        self.descend(&fit.hypothesis, fit.problem.clone(), fit.x.clone(), steps)
+        let again = self.descend(&fit.hypothesis, fit.problem.clone(), fit.x.clone(), steps)?;
+        Some(Refit { certificate: fit.certificate, ..again })
     }
 
     /// The same judged by another noise.
     pub fn judged_by(&self, noise: &[RecordNoise], fit: &Refit<'a>, steps: usize) -> Option<Refit<'a>> {
         let mut problem = fit.problem.clone();
         problem.noise = noise.to_vec();
-        self.descend(&fit.hypothesis, problem, fit.x.clone(), steps)
+        let again = self.descend(&fit.hypothesis, problem, fit.x.clone(), steps)?;
+        Some(Refit { certificate: fit.certificate, ..again })
     }
 
     /// Descends from given variables of a hypothesis.
@@ -183,6 +209,19 @@ impl<'a> FitContext<'a> {
         let settings = &self.settings.descent;
         Descent { judged: Some((settings.first_steps, bound)), ..self.descent(settings.few_steps) }
     }
+}
+
+/// Angles between marks and their rates at every row of a recording, along a fit's motion.
+fn states_along(fit: &Refit<'_>, record: usize) -> Option<Vec<Vec<f64>>> {
+    let (model, swing, true_s) = fit.motion(record)?;
+    let of_row = |t_s: &f64| {
+        let state = swing.at(*t_s);
+        let mut seen = chord_angles_rad(model.chain(), &state.theta_rad);
+        let rates = chord_slopes(model.chain(), &state.theta_rad) * DVector::from_column_slice(&state.omega_rad_s);
+        seen.extend(rates.iter());
+        seen
+    };
+    Some(true_s.iter().map(of_row).collect())
 }
 
 /// Sets a start value where the experiment holds it.

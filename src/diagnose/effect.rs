@@ -346,6 +346,11 @@ impl Effect {
         self.entry().cost == Cost::Corners
     }
 
+    /// Whether it makes another chain of the specimen, of which the base model is no special case.
+    pub fn changes_chain(self) -> bool {
+        self.entry().cost == Cost::ManyRods
+    }
+
     /// Makes a problem ready for it.
     pub fn set_up(self, problem: &mut SetUp<'_>) {
         (self.entry().set_up)(problem);

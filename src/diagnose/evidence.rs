@@ -109,6 +109,7 @@ mod tests {
     use nalgebra::DMatrix;
 
     use super::*;
+    use crate::diagnose::refit::Certificate;
     use crate::experiment::Experiment;
     use crate::fit::{Problem, Record};
 
@@ -121,7 +122,8 @@ mod tests {
         let mut normal = DMatrix::identity(x.len(), x.len());
         normal[(0, 0)] = 1e16;
         let hypothesis = Hypothesis { effects: vec![Effect::HingeCoulomb], dropped: None };
-        Refit { hypothesis, problem, x, chi2: 240.0, normal, steps: 1, converged: true }
+        let certificate = Certificate { starts_agreeing: 1, nested_ok: true };
+        Refit { hypothesis, problem, x, chi2: 240.0, normal, steps: 1, converged: true, certificate }
     }
 
     #[test]

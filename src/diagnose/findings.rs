@@ -44,6 +44,18 @@ impl<'a> Findings<'a> {
         }
     }
 
+    /// The probability of the answer, with every rival whose fit is not certified as good as the best, and without them. Only names have such rivals.
+    pub fn probability_interval(&self) -> [f64; 2] {
+        let highest = self.verdict.probability;
+        let best = &self.posterior.candidates[0];
+        // what the fall of the best one's probability is to the answer's
+        let part = if best.probability > 0.0 { (self.posterior.lowest / best.probability).min(1.0) } else { 1.0 };
+        match self.verdict.status {
+            Status::Unknown => [highest, highest],
+            _ => [part * highest, highest],
+        }
+    }
+
     /// The part of what the base model leaves beyond the noise that the named fit explains.
     pub fn explained(&self) -> f64 {
         let beyond = |fit: &Refit<'_>| (fit.chi2 - fit.values() as f64).max(0.0);

@@ -32,6 +32,12 @@ impl Hypothesis {
         self.effects.iter().all(|effect| other.has(*effect))
     }
 
+    /// Whether another one has all of its effects, and more, about the same chain: it can leave no less than that one does.
+    pub fn nests_in(&self, other: &Self) -> bool {
+        let chain = |of: &Self| of.effects.iter().copied().filter(|e| e.changes_chain()).collect::<Vec<_>>();
+        self.effects.len() < other.effects.len() && self.is_within(other) && chain(self) == chain(other)
+    }
+
     /// With one effect more.
     #[must_use]
     pub fn and(&self, effect: Effect, dropped: Option<(usize, f64)>) -> Self {

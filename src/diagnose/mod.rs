@@ -92,7 +92,7 @@ pub fn diagnose(
     // 1. the recordings
     let prepared = preparation::prepare(records, experiment, settings)?;
     // 2. the base model
-    let mut search = Search::of_base_model(&prepared, experiment, Taken::AtItsWord, settings, progress)?;
+    let mut search = Search::of_base_model(&prepared, &prepared.experiment, Taken::AtItsWord, settings, progress)?;
     // 3. what it lacks
     search.run();
     // 4. a strip's rods

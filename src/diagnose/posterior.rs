@@ -33,6 +33,10 @@ pub struct Posterior<'a> {
     pub candidates: Vec<Candidate<'a>>,
     /// The probability of something else.
     pub unknown: f64,
+    /// The probability of the likeliest one if every rival whose fit is not certified, and which is within reach, fitted as well.
+    pub lowest: f64,
+    /// Those rivals.
+    pub uncertified: Vec<Vec<Effect>>,
     /// That something around the likeliest fit, at each place.
     pub unknowns: Vec<Latent>,
 }
@@ -56,11 +60,19 @@ pub fn weigh<'a>(fits: Vec<Refit<'a>>, effects: usize, settings: &Settings) -> P
     let law_error_n_m = law_error_n_m(&fits[best], added_torque_n_m(&fits[best]));
     let gain = unknown_gain(&latents, law_error_n_m, slow_errors_rad(&fits[best]), settings.noise.coloured);
     posterior.push(posterior[best] + settings.prior.unknown.ln() + gain);
+    let rivals = uncertified_within_reach(&fits, best, settings);
+    let mut at_best = posterior.clone();
+    let ln_prior = |fit: &Refit<'_>| evidence::ln_prior(&fit.hypothesis, effects, &settings.prior);
+    for rival in &rivals {
+        at_best[*rival] = at_best[*rival].max(posterior[best] + ln_prior(&fits[*rival]) - ln_prior(&fits[best]));
+    }
+    let others: Vec<&Refit<'_>> = fits.iter().collect();
+    let lowest = normalised(&at_best)[best] * genuine(&fits[best], &others, settings);
+    let uncertified = rivals.iter().map(|rival| fits[*rival].hypothesis.effects.clone()).collect();
     let if_named = normalised(&posterior[..fits.len()]);
     let mut probability = normalised(&posterior);
     let mut unknown = probability.pop().unwrap_or(0.0);
     // a name, above all a support that moves, may be a stand-in for what is not known
-    let others: Vec<&Refit<'_>> = fits.iter().collect();
     for (fit, probability) in fits.iter().zip(&mut probability).filter(|(_, p)| **p > NEGLIGIBLE) {
         let genuine = genuine(fit, &others, settings);
         unknown += (1.0 - genuine) * *probability;
@@ -75,7 +87,19 @@ pub fn weigh<'a>(fits: Vec<Refit<'a>>, effects: usize, settings: &Settings) -> P
     // where the unknown takes all, or next to all, their order among themselves still counts
     candidates
         .sort_by(|a, b| (b.probability.total_cmp(&a.probability)).then(b.ln_posterior.total_cmp(&a.ln_posterior)));
-    Posterior { candidates, unknown, unknowns: latents }
+    Posterior { candidates, unknown, lowest, uncertified, unknowns: latents }
+}
+
+/// The rivals of the likeliest fit that are not certified, and leave so little more that a better fit of theirs might count.
+fn uncertified_within_reach(fits: &[Refit<'_>], best: usize, settings: &Settings) -> Vec<usize> {
+    let settings = (&settings.certificate, settings.misfit.counts);
+    let variance = (fits[best].chi2 / fits[best].values().max(1) as f64).max(1.0);
+    let needs = |fit: &Refit<'_>| fit.chi2 / variance + settings.1 * fit.hypothesis.effects.len() as f64;
+    let is_rival = |place: &usize| {
+        let fit = &fits[*place];
+        *place != best && !fit.is_certified(settings.0) && needs(fit) < needs(&fits[best]) + settings.0.within
+    };
+    (0..fits.len()).filter(is_rival).collect()
 }
 
 /// The odds that a fit's effects are what has been filmed, and stand for nothing else.

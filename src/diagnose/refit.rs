@@ -3,6 +3,7 @@
 use nalgebra::{DMatrix, DVector};
 
 use super::hypothesis::Hypothesis;
+use super::settings::CertificateSettings;
 use crate::fit::descent::{Ending, Outcome};
 use crate::fit::problem::stacked;
 use crate::fit::{Problem, Residuals, residuals_of};
@@ -25,13 +26,33 @@ pub struct Refit<'a> {
     pub steps: usize,
     /// Whether the descent ended in a minimum.
     pub converged: bool,
+    /// How far it may be trusted to be the best of its hypothesis.
+    pub certificate: Certificate,
+}
+
+/// How far a fit may be trusted to be the best of its hypothesis.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Certificate {
+    /// Independent starts that ended there.
+    pub starts_agreeing: usize,
+    /// Whether it leaves no more than any fit of a hypothesis within its own.
+    pub nested_ok: bool,
 }
 
 impl<'a> Refit<'a> {
     /// From the end of a descent.
     pub fn of(hypothesis: Hypothesis, problem: Problem<'a>, outcome: Outcome) -> Self {
         let Outcome { x, cost, normal, ending, steps, .. } = outcome;
-        Self { hypothesis, problem, x, chi2: cost, normal, steps, converged: ending == Ending::Converged }
+        Self {
+            hypothesis,
+            problem,
+            x,
+            chi2: cost,
+            normal,
+            steps,
+            converged: ending == Ending::Converged,
+            certificate: Certificate { starts_agreeing: 1, nested_ok: true },
+        }
     }
 
     /// The value of a free parameter.
@@ -136,6 +157,30 @@ impl<'a> Refit<'a> {
         self.problem.records.iter().map(|r| r.values(0..r.len())).sum()
     }
 
+    /// Whether it counts: it has converged, enough independent starts end there, and it leaves no more than what is within it.
+    pub fn is_certified(&self, settings: &CertificateSettings) -> bool {
+        self.converged && self.certificate.nested_ok && self.certificate.starts_agreeing >= settings.starts
+    }
+
+    /// Becomes the better one of itself and another fit of the same hypothesis.
+    pub fn meet(&mut self, other: Self, agrees: f64) {
+        let starts = match self.agrees_with(&other, agrees) {
+            true => self.certificate.starts_agreeing + other.certificate.starts_agreeing,
+            false if other.chi2 < self.chi2 => other.certificate.starts_agreeing,
+            false => self.certificate.starts_agreeing,
+        };
+        if other.chi2 < self.chi2 {
+            *self = other;
+        }
+        self.certificate.starts_agreeing = starts.max(1);
+    }
+
+    /// Whether two fits leave the same within so many times the variance left.
+    fn agrees_with(&self, other: &Self, agrees: f64) -> bool {
+        let variance = (self.chi2.min(other.chi2) / self.values().max(1) as f64).max(1.0);
+        (self.chi2 - other.chi2).abs() < agrees * variance
+    }
+
     /// Residuals and their derivatives with all variables, both over the noise; `None` where the motion cannot be integrated.
     pub fn linearised(&self) -> Option<(DVector<f64>, DMatrix<f64>)> {
         let blocks = self.problem.blocks(&self.x)?;
@@ -167,12 +212,11 @@ pub fn best<'a>(
     order.into_iter().map(|(_, i)| i).collect()
 }
 
-/// The better one of each hypothesis.
-pub fn merged<'a>(mut fits: Vec<Refit<'a>>, others: Vec<Refit<'a>>) -> Vec<Refit<'a>> {
+/// The better one of each hypothesis; where two leave the same within `agrees`, in units of the variance left, the starts that led there count together.
+pub fn merged<'a>(mut fits: Vec<Refit<'a>>, others: Vec<Refit<'a>>, agrees: f64) -> Vec<Refit<'a>> {
     for other in others {
         match fits.iter_mut().find(|fit| fit.hypothesis.effects == other.hypothesis.effects) {
-            Some(known) if other.chi2 < known.chi2 => *known = other,
-            Some(_) => {}
+            Some(known) => known.meet(other, agrees),
             None => fits.push(other),
         }
     }

@@ -13,6 +13,7 @@ use super::misfit::is_beyond_noise;
 use super::posterior::Candidate;
 use super::refit::Refit;
 use super::search::RoundEnd;
+use super::settings::CertificateSettings;
 use super::torque::MissingTorque;
 use super::verdict::Status;
 use super::{energy, locate};
@@ -162,9 +163,24 @@ pub struct Hypothetical {
     pub chi2: f64,
     /// Schwarz's criterion.
     pub bic: f64,
+    /// How far the fit may be trusted to be the best of its hypothesis.
+    pub fit: Trust,
     /// The coefficients in the order of the effects.
     #[serde(skip)]
     pub coefficients: Vec<(Parameter, Quantity)>,
+}
+
+/// How far a fit may be trusted to be the best of its hypothesis.
+#[derive(Debug, Clone, Copy, Serialize)]
+pub struct Trust {
+    /// Nothing is to be gained where it stands.
+    pub converged: bool,
+    /// Independent starts that ended there.
+    pub starts_agreeing: usize,
+    /// It leaves no more than any fit of a hypothesis within its own.
+    pub nested_ok: bool,
+    /// All of that, of as many starts as it takes: it counts.
+    pub certified: bool,
 }
 
 /// The verdict.
@@ -180,6 +196,10 @@ pub struct Answer {
     pub class: Vec<Effect>,
     /// Of the answer as it is given.
     pub probability: f64,
+    /// That probability with every rival whose fit is not certified as good as the best, and without them.
+    pub probability_interval: [f64; 2],
+    /// Those rivals.
+    pub uncertified: Vec<Vec<Effect>>,
     /// That the truth is in the class.
     pub class_probability: f64,
     /// Of anything outside the table.
@@ -258,13 +278,15 @@ impl Diagnosis {
     /// From all that was found about a specimen of some name.
     pub fn of(findings: &Findings<'_>, specimen: &str) -> Self {
         let best = findings.posterior.best();
+        let candidates = findings.posterior.candidates.iter().take(WRITTEN);
+        let certificate = &findings.context.settings.certificate;
         let energy_shares = energy::energy_shares(best);
         Self {
             schema: "freeswing.diagnosis/1",
             specimen: specimen.to_owned(),
             baseline: Baseline::of(findings),
             location: Location::of(findings, energy_shares),
-            candidates: findings.posterior.candidates.iter().take(WRITTEN).map(Hypothetical::of).collect(),
+            candidates: candidates.map(|candidate| Hypothetical::of(candidate, certificate)).collect(),
             verdict: Answer::of(findings),
             heldout: Proof::of(findings),
             detectable: Limits(findings.adequacy.detectable.clone()),
@@ -340,7 +362,7 @@ impl Unknown {
 }
 
 impl Hypothetical {
-    fn of(candidate: &Candidate<'_>) -> Self {
+    fn of(candidate: &Candidate<'_>, settings: &CertificateSettings) -> Self {
         let fit = &candidate.fit;
         let coefficients = quantities(fit, &fit.added());
         Self {
@@ -352,6 +374,12 @@ impl Hypothetical {
             rmse_rad: rmse_rad(fit),
             chi2: fit.chi2,
             bic: fit.chi2 + fit.x.len() as f64 * (fit.values() as f64).ln(),
+            fit: Trust {
+                converged: fit.converged,
+                starts_agreeing: fit.certificate.starts_agreeing,
+                nested_ok: fit.certificate.nested_ok,
+                certified: fit.is_certified(settings),
+            },
             coefficients,
         }
     }
@@ -371,6 +399,8 @@ impl Answer {
             further_effects,
             class: verdict.class.clone(),
             probability: verdict.probability,
+            probability_interval: findings.probability_interval(),
+            uncertified: findings.posterior.uncertified.clone(),
             class_probability: verdict.class_probability,
             unknown_probability: verdict.unknown,
             statement: findings.verdict_statement(),

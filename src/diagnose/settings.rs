@@ -15,6 +15,8 @@ pub struct Settings {
     pub misfit: MisfitSettings,
     /// What is fitted.
     pub search: SearchSettings,
+    /// Which fits count.
+    pub certificate: CertificateSettings,
     /// How probable each hypothesis is.
     pub prior: PriorSettings,
     /// Which answer that makes.
@@ -150,6 +152,19 @@ pub struct SearchSettings {
     pub count_unexplained: f64,
 }
 
+/// Which fits count.
+#[derive(Debug, Clone)]
+pub struct CertificateSettings {
+    /// Two ends are one where their χ² differ by less than this many variances of what is left (0.2 is a tenth of an ln-likelihood).
+    pub agrees: f64,
+    /// Independent starts that must end there.
+    pub starts: usize,
+    /// Fits that are given further starts until so many agree (cost)…
+    pub most: usize,
+    /// … of those that leave, and need, at most this much more than the best (statistics: beyond it odds are e⁻²⁵).
+    pub within: f64,
+}
+
 /// How probable each hypothesis is.
 #[derive(Debug, Clone)]
 pub struct PriorSettings {
@@ -282,6 +297,12 @@ impl Default for SearchSettings {
             worth_a_count: 25.0,
             count_unexplained: 1.2,
         }
+    }
+}
+
+impl Default for CertificateSettings {
+    fn default() -> Self {
+        Self { agrees: 0.2, starts: 3, most: 6, within: 50.0 }
     }
 }
 

@@ -10,6 +10,8 @@ use super::verdict::{self, Status};
 use crate::digits::number;
 use crate::model::Parameter;
 
+/// A change of a probability that is worth a sentence.
+const SLIGHT_CHANGE: f64 = 0.01;
 /// A joint that yields before this part of its largest bend is dry.
 const DRY_SHARE: f64 = 0.01;
 
@@ -18,7 +20,8 @@ impl Findings<'_> {
     pub fn verdict_statement(&self) -> String {
         let verdict = &self.verdict;
         let percent = 1e2 * verdict.probability;
-        match verdict.status {
+        let reservation = self.reservation();
+        let statement = match verdict.status {
             Status::Adequate => format!(
                 "Nothing is missing that this recording could show: the base model leaves only noise ({percent:.0} %)."
             ),
@@ -38,7 +41,22 @@ impl Findings<'_> {
                 let (effects, remark, more) = (words(&verdict.effects), self.remark(), self.more());
                 format!("Missing: most likely {effects} ({percent:.0} %){others}.{remark}{more}")
             }
+        };
+        statement + &reservation
+    }
+
+    /// What rivals whose fits are not certified could change.
+    fn reservation(&self) -> String {
+        let [low, high] = self.probability_interval();
+        let rivals: Vec<String> = self.posterior.uncertified.iter().map(|rival| names(rival, "nothing else")).collect();
+        if high - low < SLIGHT_CHANGE || rivals.is_empty() {
+            return String::new();
         }
+        format!(
+            " Too few starts of the search agree on {}: if that fitted as well, the probability would be {:.0} %.",
+            rivals.join("; "),
+            1e2 * low
+        )
     }
 
     /// What of the table comes nearest to something that is not in it, and what is not told from that.

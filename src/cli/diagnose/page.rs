@@ -30,7 +30,8 @@ pub(super) fn page(diagnosis: &Diagnosis) -> String {
     for candidate in diagnosis.candidates.iter().take(LISTED) {
         let left = candidate.rmse_rad.iter().map(|r| number(1e3 * r, 3)).collect::<Vec<_>>().join(" ");
         let probability = if among { candidate.probability_if_named } else { candidate.probability };
-        let mut first = [names(&candidate.effects, "nothing else"), number(probability.max(0.0), 3), left];
+        let mark = if candidate.fit.certified { "" } else { " *" };
+        let mut first = [names(&candidate.effects, "nothing else") + mark, number(probability.max(0.0), 3), left];
         for (_, quantity) in &candidate.coefficients {
             let [name, probability, left] = std::mem::take(&mut first);
             let value = number(quantity.value.unwrap_or(0.0), 4);
@@ -43,6 +44,9 @@ pub(super) fn page(diagnosis: &Diagnosis) -> String {
     }
     table.row(["something not in the table".to_owned(), number(verdict.unknown_probability, 3)]);
     text.push_str(&table.text());
+    if diagnosis.candidates.iter().take(LISTED).any(|candidate| !candidate.fit.certified) {
+        text.push_str("  * not certified: it has not converged, too few starts agree, or fewer effects leave less\n");
+    }
     proof(diagnosis, &mut text);
     limits(diagnosis, &mut text);
     text

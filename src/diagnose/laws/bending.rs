@@ -38,7 +38,7 @@ impl Law for Bending {
         let near = begun.and_then(|b| if b.converged { Some(b) } else { context.go_on(&b, settings.few_steps) });
         let lost = near.as_ref().is_none_or(|near| is_out_of_step(near, &context.settings.misfit));
         let anew = (misfit.out_of_step && lost).then(|| context.refit_anew(&hypothesis, &[], base)).flatten();
-        Sought::best([near, anew])
+        context.best_of([near, anew])
     }
 
     /// It takes the place of the joint's spring.

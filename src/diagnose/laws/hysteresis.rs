@@ -39,7 +39,7 @@ impl Law for Hysteresis {
         let is_worth_it = misfit.unsolved && !context.is_strip();
         let anew = || is_worth_it.then(|| context.refit_anew(&hypothesis, &[], base)).flatten();
         let (near, (softened, anew)) = rayon::join(near, || rayon::join(softened, anew));
-        Sought::best([near, softened, anew])
+        context.best_of([near, softened, anew])
     }
 
     fn anywhere<'a>(&self, context: &FitContext<'a>, base: &Refit<'a>) -> Option<Refit<'a>> {

@@ -40,7 +40,7 @@ impl Law for MissingFrames {
     fn beside<'a>(&self, sought: &Sought<'_, 'a>) -> Option<Refit<'a>> {
         let Sought { context, base, score, .. } = *sought;
         let scored = score.and_then(|s| context.refit(&s.hypothesis(&base.hypothesis), base, &s.start));
-        Sought::best([alone(context, base), scored.map(|fit| settled(context, fit))])
+        context.best_of([alone(context, base), scored.map(|fit| settled(context, fit))])
     }
 
     fn scan(&self, screen: &Screen<'_, '_>) -> Option<Score> {

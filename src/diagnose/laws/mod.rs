@@ -93,13 +93,6 @@ pub fn law_of(effect: Effect) -> &'static dyn Law {
     }
 }
 
-impl Sought<'_, '_> {
-    /// The best of some fits.
-    fn best<'a>(fits: impl IntoIterator<Item = Option<Refit<'a>>>) -> Option<Refit<'a>> {
-        fits.into_iter().flatten().min_by(|a, b| a.chi2.total_cmp(&b.chi2))
-    }
-}
-
 /// A fit, each of its laws settled.
 pub fn settled<'a>(context: &FitContext<'a>, fit: Refit<'a>) -> Refit<'a> {
     let effects = fit.hypothesis.effects.clone();

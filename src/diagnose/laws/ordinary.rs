@@ -36,7 +36,7 @@ impl Law for Ordinary {
             // what bends a joint at rest: a base model that has given its second mode up is no place to start from
             tries.push(context.refit_anew(&base.hypothesis.and(effect, None), &[], base));
         }
-        Sought::best(tries)
+        context.best_of(tries)
     }
 
     /// Either sign, where it may have either.

@@ -41,7 +41,10 @@ pub fn continued<'a>(context: &FitContext<'a>, fits: &[Refit<'a>], effects: &[Ef
             .into_iter()
             .flat_map(|best| with_one_more(&early, best, effects))
             .collect();
-        followed = foremost(merged(there, more), settings).into_iter().map(|fit| (fit.hypothesis, fit.x)).collect();
+        followed = foremost(merged(there, more, context.settings.certificate.agrees), settings)
+            .into_iter()
+            .map(|fit| (fit.hypothesis, fit.x))
+            .collect();
     }
     descended(context, &noise, followed, steps.most_steps)
 }

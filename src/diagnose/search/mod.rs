@@ -104,6 +104,7 @@ impl<'a, 'p> Search<'a, 'p> {
         self.usual();
         self.restarts();
         self.allow_errors_in_step();
+        self.certify();
     }
 
     /// Searches again with the number of rods that the recordings of a strip ask for, where that does better.
@@ -147,6 +148,7 @@ impl<'a, 'p> Search<'a, 'p> {
         };
         search.further();
         search.allow_errors_in_step();
+        search.certify();
         search
     }
 
@@ -171,6 +173,14 @@ impl<'a, 'p> Search<'a, 'p> {
         if !self.context.is_strip() && self.misfit().is_some_and(|misfit| misfit.unexplained) {
             Round::RESTARTS.into_iter().for_each(|round| self.round(round, &mut Tried::default()));
         }
+    }
+
+    /// Further starts for the fits that may count; of each it is then known whether it leaves no more than those within it.
+    fn certify(&mut self) {
+        self.round(Round::Certify, &mut Tried::default());
+        self.round(Round::Nested, &mut Tried::default());
+        let nested_ok: Vec<bool> = self.fits.iter().map(|fit| self.best_within(fit).is_none()).collect();
+        self.fits.iter_mut().zip(nested_ok).for_each(|(fit, nested_ok)| fit.certificate.nested_ok = nested_ok);
     }
 
     /// More effects and fewer, by turns, until nothing new leads the way; from the beginning of the recordings first where far more than noise is left.
@@ -228,7 +238,7 @@ impl<'a, 'p> Search<'a, 'p> {
     }
 
     fn keep(&mut self, found: Vec<Refit<'a>>) {
-        self.fits = merged(std::mem::take(&mut self.fits), found);
+        self.fits = merged(std::mem::take(&mut self.fits), found, self.context.settings.certificate.agrees);
     }
 
     /// How many hypotheses some fits are new to, or do better.

@@ -4,7 +4,7 @@ use super::super::context::FitContext;
 use super::super::effect::Effect;
 use super::super::hypothesis::Hypothesis;
 use super::super::laws::{self, law_of};
-use super::super::refit::Refit;
+use super::super::refit::{Certificate, Refit};
 use super::super::screen::{Score, Screen};
 use super::beside::Beside;
 use super::horizon;
@@ -31,6 +31,12 @@ pub enum Proposal<'f, 'a> {
     },
     /// A restart: a fit anew from where the first part of each recording leads. When a dry hinge stops, and where, no derivative tells, and early on it has not.
     Restart(&'f Refit<'a>),
+    /// A restart along the motion of another fit, which follows the recordings: the hypothesis cannot fall out of step with them.
+    Along(Hypothesis, &'f Refit<'a>),
+    /// A hypothesis from a fit that has fewer of its effects, the others being nothing: it cannot leave more than that one does.
+    Nested(Hypothesis, &'f Refit<'a>),
+    /// A hypothesis from the base model's fit, followed from the beginning of the recordings on.
+    FromTheBeginning(Hypothesis, &'f Refit<'a>),
     /// A fit without one of its effects, and with another one of these in its place.
     Instead(&'f Refit<'a>, Effect, &'f [Effect]),
     /// A hypothesis anew from short stretches, beside what is left without.
@@ -53,6 +59,12 @@ impl<'a> Proposal<'_, 'a> {
                 from_leader(context, fit, hypothesis, leader).into_iter().collect()
             }
             Self::Restart(fit) => restarted(context, fit).into_iter().collect(),
+            Self::Along(hypothesis, leader) => context.refit_along(hypothesis, leader, &[]).into_iter().collect(),
+            Self::Nested(hypothesis, within) => context.refit(hypothesis, within, &[]).into_iter().collect(),
+            Self::FromTheBeginning(hypothesis, base) => {
+                let begun = Refit { hypothesis: hypothesis.clone(), ..(*base).clone() };
+                horizon::continued_alone(context, &begun).into_iter().collect()
+            }
             Self::Instead(fit, effect, others) => instead(context, fit, *effect, others),
             Self::Anew(hypothesis, without) => context.refit_anew(hypothesis, &[], without).into_iter().collect(),
             Self::Continued(fits, effects) => horizon::continued(context, fits, effects),
@@ -79,7 +91,10 @@ fn from_leader<'a>(
 fn restarted<'a>(context: &FitContext<'a>, fit: &Refit<'a>) -> Option<Refit<'a>> {
     let early = first_parts(context)?;
     let x = context.on(&early).refit(&fit.hypothesis, fit, &[])?.x;
-    context.descend_from(&fit.hypothesis, &fit.problem.noise, x, context.settings.descent.most_steps)
+    let again = context.descend_from(&fit.hypothesis, &fit.problem.noise, x, context.settings.descent.most_steps)?;
+    // it has begun where that fit is
+    let certificate = Certificate { starts_agreeing: 0, ..again.certificate };
+    Some(Refit { certificate, ..again })
 }
 
 /// The first part of each recording: half of it, or as much of it as still swings.

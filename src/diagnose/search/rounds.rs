@@ -25,6 +25,12 @@ pub enum Round {
     Pairs,
     /// Simpler hypotheses from where a richer one has found a better minimum.
     Stragglers,
+    /// Single effects, and none, along the motion of the best fit, where they leave more.
+    AlongTheLeader,
+    /// Hypotheses that leave more than one with fewer of their effects, which proves a failed fit: from that one.
+    Nested,
+    /// The likeliest hypotheses from further starts, until enough of them agree.
+    Certify,
     /// The best single effects anew from the first part of the recordings.
     RestartedLeaders,
     /// Every effect beside the best single ones, from all its starts.
@@ -52,7 +58,8 @@ pub enum Learns {
 
 impl Round {
     /// The rounds that every recording has.
-    pub const USUAL: [Self; 5] = [Self::Singles, Self::DearSingles, Self::FromTheLeader, Self::Pairs, Self::Stragglers];
+    pub const USUAL: [Self; 6] =
+        [Self::Singles, Self::DearSingles, Self::FromTheLeader, Self::AlongTheLeader, Self::Pairs, Self::Stragglers];
     /// Those where the best of the usual ones leaves more than noise: it may stand in a false minimum, or its partner have been sought from the wrong place.
     pub const RESTARTS: [Self; 3] = [Self::RestartedLeaders, Self::BesideLeaders, Self::RestartedBest];
 
@@ -64,6 +71,9 @@ impl Round {
             Self::FromTheLeader => "from the best",
             Self::Pairs => "pairs",
             Self::Stragglers => "from better minima",
+            Self::AlongTheLeader => "along the best",
+            Self::Nested => "nested",
+            Self::Certify => "further starts",
             Self::RestartedLeaders => "restarts of the leaders",
             Self::RestartedBest => "restarts of the best",
             Self::BesideLeaders => "beside the leaders",
@@ -76,7 +86,7 @@ impl Round {
     /// When the noise is learnt anew.
     pub fn learns(self) -> Learns {
         match self {
-            Self::FromTheLeader | Self::Pairs | Self::RestartedBest | Self::OneFewer => Learns::Always,
+            Self::AlongTheLeader | Self::Pairs | Self::RestartedBest | Self::OneFewer => Learns::Always,
             Self::Stragglers => Learns::IfLower,
             _ => Learns::Never,
         }
@@ -90,6 +100,9 @@ impl Round {
             Self::FromTheLeader => search.from_the_leader(),
             Self::Pairs => search.pairs(),
             Self::Stragglers => search.stragglers(),
+            Self::AlongTheLeader => search.along_the_leader(),
+            Self::Nested => search.nested(),
+            Self::Certify => search.further_starts(),
             Self::RestartedLeaders => search.leaders().into_iter().map(Proposal::Restart).collect(),
             Self::BesideLeaders => search.beside_leaders(),
             Self::RestartedBest => search.restarted_best(),
@@ -134,6 +147,57 @@ impl<'a> Search<'a, '_> {
         }
         let others = self.fits.iter().filter(|fit| !fit.hypothesis.is_dear() && !std::ptr::eq(*fit, leader));
         others.map(|fit| Proposal::FromLeader { fit, hypothesis: fit.hypothesis.clone(), leader }).collect()
+    }
+
+    /// Where the base model leaves more than noise: a rival in a false minimum would count as evidence for the best. A strip's fits are too dear for it.
+    fn along_the_leader(&self) -> Vec<Proposal<'_, 'a>> {
+        let misfit = Misfit::of(&self.context, self.base(), &self.scores);
+        let Some(leader) = least(&self.fits).filter(|_| misfit.unexplained && !self.context.is_strip()) else {
+            return Vec::new();
+        };
+        let behind = leader.chi2 + self.context.settings.misfit.counts;
+        let is_behind = |fit: &&Refit<'a>| !fit.hypothesis.is_dear() && fit.chi2 > behind;
+        self.fits.iter().filter(is_behind).map(|fit| Proposal::Along(fit.hypothesis.clone(), leader)).collect()
+    }
+
+    fn nested(&self) -> Vec<Proposal<'_, 'a>> {
+        let of = |fit: &Refit<'a>| {
+            let within = self.best_within(fit)?;
+            let dropped = within.hypothesis.dropped.or(fit.hypothesis.dropped);
+            Some(Proposal::Nested(Hypothesis { dropped, ..fit.hypothesis.clone() }, within))
+        };
+        self.fits.iter().filter_map(of).collect()
+    }
+
+    /// The best fit of a hypothesis within another fit's own that leaves less than that one does.
+    pub fn best_within(&self, fit: &Refit<'a>) -> Option<&Refit<'a>> {
+        let variance = (least_chi2(&self.fits) / self.context.values() as f64).max(1.0);
+        let bound = fit.chi2 - self.context.settings.certificate.agrees * variance;
+        let within = self.fits.iter().filter(|own| own.chi2 < bound && own.hypothesis.nests_in(&fit.hypothesis));
+        within.min_by(|a, b| a.chi2.total_cmp(&b.chi2))
+    }
+
+    /// Of those fits that may count the ones that too few starts have led to: along the motion of the best other one, from short stretches, and from the
+    /// beginning of the recordings on. A strip's fits are too dear for it.
+    fn further_starts(&self) -> Vec<Proposal<'_, 'a>> {
+        let (settings, base) = (&self.context.settings.certificate, self.base());
+        let variance = (least_chi2(&self.fits) / self.context.values() as f64).max(1.0);
+        let needs = |fit: &Refit<'a>| {
+            fit.chi2 / variance + self.context.settings.misfit.counts * fit.hypothesis.effects.len() as f64
+        };
+        let order = best(&self.fits, usize::MAX, |_| !self.context.is_strip(), needs);
+        let enough = order.first().map_or(0.0, |first| needs(&self.fits[*first])) + settings.within;
+        let counts = order.iter().map(|place| &self.fits[*place]).filter(|fit| needs(fit) < enough).take(settings.most);
+        let lacking = counts.filter(|fit| fit.certificate.starts_agreeing < settings.starts);
+        let of = |fit: &Refit<'a>| {
+            let hypothesis = &fit.hypothesis;
+            let leader = order.iter().map(|place| &self.fits[*place]).find(|other| other.hypothesis != *hypothesis);
+            let along = leader.map(|leader| Proposal::Along(hypothesis.clone(), leader));
+            let anew = Proposal::Anew(hypothesis.clone(), base);
+            let begun = Proposal::FromTheBeginning(hypothesis.clone(), base);
+            along.into_iter().chain([anew, begun]).collect::<Vec<_>>()
+        };
+        lacking.flat_map(of).collect()
     }
 
     fn pairs(&self) -> Vec<Proposal<'_, 'a>> {
