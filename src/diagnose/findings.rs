@@ -5,7 +5,7 @@ use super::context::FitContext;
 use super::effect::{Effect, Phase, Place};
 use super::heldout::HeldOut;
 use super::locate::Departure;
-use super::posterior::Posterior;
+use super::posterior::{Posterior, left_of_excess};
 use super::refit::Refit;
 use super::search::RoundEnd;
 use super::torque::MissingTorque;
@@ -21,6 +21,8 @@ pub struct Findings<'a> {
     pub verdict: Verdict,
     /// Where and when the base model departs.
     pub departure: Departure,
+    /// The same of what the names leave.
+    pub remaining: Departure,
     /// Where the unknown acts, where it is at least as likely as any name.
     pub unknown_at: Option<Place>,
     /// The torque that the base model lacks, there or where it explains most.
@@ -58,8 +60,13 @@ impl<'a> Findings<'a> {
 
     /// The part of what the base model leaves beyond the noise that the named fit explains.
     pub fn explained(&self) -> f64 {
-        let beyond = |fit: &Refit<'_>| (fit.chi2 - fit.values() as f64).max(0.0);
-        1.0 - beyond(self.named()) / beyond(self.posterior.base()).max(1.0)
+        1.0 - left_of_excess(self.named(), self.posterior.base())
+    }
+
+    /// Where what remains beside the names acts, as far as that is told.
+    pub fn remains_at(&self) -> Option<Place> {
+        let likeliest = self.posterior.unknowns.first().filter(|unknown| unknown.gain > 0.0)?;
+        (self.posterior.remains > self.context.settings.verdict.even).then(|| likeliest.place())
     }
 
     /// The effects named, the one that explains most first.

@@ -6,7 +6,7 @@
 //! | 2 | the base model is fitted | [`base`], [`context`], [`refit`], [`descents`], [`noise`], [`learnt_noise`] |
 //! | 3 | what it lacks is sought: effects are proposed, fitted, kept | [`mod@search`], [`screen`], [`misfit`], [`laws`] |
 //! | 4 | a strip's rods are counted | [`rods`] |
-//! | 5 | the hypotheses are weighed, beside something that is not in the table | [`posterior`], [`evidence`], [`unknowns`], [`latent`], [`basis_law`] |
+//! | 5 | the hypotheses are weighed, beside something that is not in the table | [`posterior`], [`evidence`], [`bag`], [`unknowns`], [`latent`], [`basis_law`] |
 //! | 6 | in doubt the search goes on, and they are weighed again | [`mod@search`], [`search::horizon`] |
 //! | 7 | what was not fitted is predicted | [`heldout`] |
 //! | 8 | the base model is judged, and what could have been seen | [`adequacy`] |
@@ -17,6 +17,7 @@
 //! stand before it: [`settings`], [`effect`], [`hypothesis`] and [`context`] import nothing of what follows.
 
 pub mod adequacy;
+pub mod bag;
 pub mod base;
 pub mod basis_law;
 pub mod context;
@@ -120,6 +121,7 @@ pub fn diagnose(
     let unknown_at = verdict.leaves_it_open().then(|| locate::place_of_unknown(&posterior, settings)).flatten();
     let findings = Findings {
         departure: locate::departure(posterior.base()),
+        remaining: locate::departure(posterior.best()),
         missing_torque: torque::missing(posterior.best(), posterior.base(), unknown_at),
         unknown_at,
         context,

@@ -1,5 +1,6 @@
 //! The posterior: how probable each hypothesis is, beside the others and beside something that no table holds.
 
+use super::bag;
 use super::effect::{Effect, Place};
 use super::energy::added_torque_n_m;
 use super::evidence::{self, Scatter, normalised};
@@ -24,6 +25,8 @@ pub struct Candidate<'a> {
     pub probability: f64,
     /// Posterior where nothing outside the table is at work.
     pub if_named: f64,
+    /// Posterior of these names, whatever remains beside them.
+    pub in_layers: f64,
 }
 
 /// Hypotheses beside the unknown.
@@ -33,6 +36,8 @@ pub struct Posterior<'a> {
     pub candidates: Vec<Candidate<'a>>,
     /// The probability of something else.
     pub unknown: f64,
+    /// The probability that something remains beside the likeliest names, whatever they are.
+    pub remains: f64,
     /// The probability of the likeliest one if every rival whose fit is not certified, and which is within reach, fitted as well.
     pub lowest: f64,
     /// Those rivals.
@@ -72,6 +77,8 @@ pub fn weigh<'a>(fits: Vec<Refit<'a>>, effects: usize, settings: &Settings) -> P
     let if_named = normalised(&posterior[..fits.len()]);
     let mut probability = normalised(&posterior);
     let mut unknown = probability.pop().unwrap_or(0.0);
+    let remains = unknown;
+    let in_layers = in_layers(&fits, &posterior, (scatter, remains), &if_named, settings);
     // a name, above all a support that moves, may be a stand-in for what is not known
     for (fit, probability) in fits.iter().zip(&mut probability).filter(|(_, p)| **p > NEGLIGIBLE) {
         let genuine = genuine(fit, &others, settings);
@@ -81,13 +88,56 @@ pub fn weigh<'a>(fits: Vec<Refit<'a>>, effects: usize, settings: &Settings) -> P
     let mut candidates: Vec<Candidate<'a>> = (fits
         .into_iter()
         .zip(posterior)
-        .zip(probability.into_iter().zip(if_named)))
-    .map(|((fit, ln_posterior), (probability, if_named))| Candidate { fit, ln_posterior, probability, if_named })
+        .zip(probability.into_iter().zip(if_named).zip(in_layers)))
+    .map(|((fit, ln_posterior), ((probability, if_named), in_layers))| Candidate {
+        fit,
+        ln_posterior,
+        probability,
+        if_named,
+        in_layers,
+    })
     .collect();
     // where the unknown takes all, or next to all, their order among themselves still counts
     candidates
         .sort_by(|a, b| (b.probability.total_cmp(&a.probability)).then(b.ln_posterior.total_cmp(&a.ln_posterior)));
-    Posterior { candidates, unknown, lowest, uncertified, unknowns: latents }
+    Posterior { candidates, unknown, remains, lowest, uncertified, unknowns: latents }
+}
+
+/// The names in layers: P(S) = (1 − z) P(S | nothing remains) + z g P(S | something remains), z being the probability that something does, and g the odds
+/// that names which leave so much are at work and stand for nothing else. The last of `ln_posterior` is that of the unknown.
+fn in_layers(
+    fits: &[Refit<'_>],
+    ln_posterior: &[f64],
+    (scatter, remains): (Scatter, f64),
+    if_named: &[f64],
+    settings: &Settings,
+) -> Vec<f64> {
+    let others: Vec<&Refit<'_>> = fits.iter().collect();
+    let ln_weight: Vec<f64> = fits.iter().zip(ln_posterior).map(|(f, ln)| ln + 0.5 * f.chi2 / scatter.of_all).collect();
+    let together = ((scatter.of_all - 1.0) / (scatter.of_values - 1.0).max(1e-9)).max(1.0);
+    let bagged = if remains > NEGLIGIBLE {
+        bag::bagged(fits, &ln_weight, (scatter.of_values, together))
+    } else {
+        if_named.to_vec()
+    };
+    let base = fits.iter().find(|f| f.hypothesis.effects.is_empty());
+    let of = |((fit, plain), bagged): ((&Refit<'_>, &f64), &f64)| {
+        let stands = |odds: f64| odds * genuine(fit, &others, settings);
+        let left = base.map_or(1.0, |base| left_of_excess(fit, base));
+        let odds = if fit.hypothesis.effects.is_empty() { 1.0 } else { settings.prior.odds_where_left(left) };
+        if *plain > NEGLIGIBLE || *bagged > NEGLIGIBLE {
+            (1.0 - remains) * stands(1.0) * plain + remains * stands(odds) * bagged
+        } else {
+            0.0
+        }
+    };
+    fits.iter().zip(if_named).zip(&bagged).map(of).collect()
+}
+
+/// The part of what the base model leaves beyond the noise that a fit leaves, too.
+pub fn left_of_excess(fit: &Refit<'_>, base: &Refit<'_>) -> f64 {
+    let beyond = |fit: &Refit<'_>| (fit.chi2 - fit.values() as f64).max(0.0);
+    beyond(fit) / beyond(base).max(1.0)
 }
 
 /// The rivals of the likeliest fit that are not certified, and leave so little more that a better fit of theirs might count.
@@ -150,6 +200,12 @@ impl<'a> Posterior<'a> {
     /// The base model's fit, which every search holds.
     pub fn base(&self) -> &Refit<'a> {
         self.candidates.iter().find(|c| c.fit.hypothesis.effects.is_empty()).map_or(self.best(), |c| &c.fit)
+    }
+
+    /// How probable each effect is, over all sets of names that hold it, whatever remains beside them.
+    pub fn inclusion(&self, effect: Effect) -> f64 {
+        let with = self.candidates.iter().filter(|c| c.fit.hypothesis.has(effect));
+        with.map(|c| c.in_layers).sum::<f64>().min(1.0)
     }
 
     /// A fit's effects, the one that explains most first: without which it would be worst.

@@ -181,6 +181,16 @@ impl<'a> Refit<'a> {
         (self.chi2 - other.chi2).abs() < agrees * variance
     }
 
+    /// The residuals of all recordings over the noise, row after row; `None` where the motion cannot be integrated.
+    pub fn left(&self) -> Option<Vec<f64>> {
+        let mut left = Vec::with_capacity(self.values());
+        for record in 0..self.problem.records.len() {
+            let prediction = self.problem.predict(record, &self.x, false).ok()?;
+            left.extend(self.problem.block(record, &prediction, Vec::new()).residual.iter());
+        }
+        Some(left)
+    }
+
     /// Residuals and their derivatives with all variables, both over the noise; `None` where the motion cannot be integrated.
     pub fn linearised(&self) -> Option<(DVector<f64>, DMatrix<f64>)> {
         let blocks = self.problem.blocks(&self.x)?;

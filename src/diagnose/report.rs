@@ -10,7 +10,7 @@ use super::effect::{Effect, Phase, Place};
 use super::findings::Findings;
 use super::latent::Latent;
 use super::misfit::is_beyond_noise;
-use super::posterior::Candidate;
+use super::posterior::{Candidate, left_of_excess};
 use super::refit::Refit;
 use super::search::RoundEnd;
 use super::settings::CertificateSettings;
@@ -204,6 +204,10 @@ pub struct Answer {
     pub class_probability: f64,
     /// Of anything outside the table.
     pub unknown_probability: f64,
+    /// How probable each effect of the table is, over all sets of names that hold it, whatever remains beside them.
+    pub inclusion: BTreeMap<&'static str, f64>,
+    /// What remains beside the names.
+    pub remainder: Remainder,
     /// The same in words.
     pub statement: String,
     /// The measurement that would split the class.
@@ -211,6 +215,44 @@ pub struct Answer {
     /// Whether the names leave so much more than noise that they are weighed among themselves.
     #[serde(skip)]
     pub among_themselves: bool,
+}
+
+/// What the names leave of the first recording, or the base model where there are none.
+#[derive(Debug, Clone, Serialize)]
+pub struct Remainder {
+    /// The probability that it is more than noise.
+    pub present: f64,
+    /// Where it would act.
+    pub place: Option<Place>,
+    /// With what it goes.
+    pub phase: Option<Phase>,
+    /// Its strongest frequency.
+    pub frequency_hz: Option<f64>,
+    /// Of each angle, noise included.
+    pub rms_rad: Vec<f64>,
+    /// The same over the noise.
+    pub over_noise: Vec<f64>,
+    /// Its part of what the base model leaves beyond the noise.
+    pub share: f64,
+}
+
+impl Remainder {
+    fn of(findings: &Findings<'_>) -> Self {
+        let named = findings.named();
+        let rms_rad = rmse_rad(named);
+        let over_noise = rms_rad.iter().zip(&named.problem.noise[0].sd_rad).map(|(rms, noise)| rms / noise).collect();
+        let locate::Departure { goes_with, frequency_hz, .. } = findings.remaining;
+        let present = findings.posterior.remains;
+        Self {
+            present,
+            place: findings.remains_at(),
+            phase: goes_with,
+            frequency_hz,
+            rms_rad,
+            over_noise,
+            share: left_of_excess(named, findings.posterior.base()).min(1.0),
+        }
+    }
 }
 
 /// What was not fitted, predicted.
@@ -403,6 +445,8 @@ impl Answer {
             uncertified: findings.posterior.uncertified.clone(),
             class_probability: verdict.class_probability,
             unknown_probability: verdict.unknown,
+            inclusion: Effect::ALL.iter().map(|effect| (effect.id(), findings.posterior.inclusion(*effect))).collect(),
+            remainder: Remainder::of(findings),
             statement: findings.verdict_statement(),
             to_decide: verdict.to_decide.clone(),
             among_themselves: is_beyond_noise(findings.named(), &settings.noise),

@@ -3,7 +3,7 @@
 use super::effect::Effect;
 use super::heldout::HeldOut;
 use super::misfit::is_beyond_noise;
-use super::posterior::{Candidate, Posterior};
+use super::posterior::{Candidate, Posterior, left_of_excess};
 use super::settings::Settings;
 
 /// What the recordings say.
@@ -73,6 +73,15 @@ impl Verdict {
             to_decide: None,
         };
         if unknown > adequate && unknown > named {
+            // names that take all but next to nothing stand, whatever remains beside them
+            let best = posterior.best();
+            let left = left_of_excess(best, posterior.base());
+            if left < settings.prior.imitated_down_to && best.is_certified(&settings.certificate) {
+                let verdict = Self::naming(weighed, |w| w.in_layers, unknown, marks, settings);
+                if verdict.status == Status::Identified {
+                    return verdict;
+                }
+            }
             let predicts = proof.is_some_and(|proof| proof.leaves() <= settings.verdict.proven);
             let nearest = settings.verdict.nearest;
             return if predicts && is_beyond_noise(posterior.best(), &settings.noise) {
@@ -89,7 +98,8 @@ impl Verdict {
 
     /// Whether something outside the table is at least as likely as the names that are given.
     pub fn leaves_it_open(&self) -> bool {
-        self.status == Status::Unknown || self.unknown >= self.class_probability && self.status != Status::Adequate
+        let names_stand = matches!(self.status, Status::Adequate | Status::Identified);
+        self.status == Status::Unknown || self.unknown >= self.class_probability && !names_stand
     }
 
     /// The likeliest names and their class.

@@ -12,6 +12,8 @@ use crate::model::Parameter;
 
 /// A change of a probability that is worth a sentence.
 const SLIGHT_CHANGE: f64 = 0.01;
+/// Ratios of frequencies that differ by less are one: the swing is slower at large angles.
+const SAME_FREQUENCY: f64 = 0.12;
 /// A joint that yields before this part of its largest bend is dry.
 const DRY_SHARE: f64 = 0.01;
 
@@ -85,18 +87,42 @@ impl Findings<'_> {
         )
     }
 
-    /// What names that leave far more than noise do not explain.
+    /// What remains beside the names, where that is more than noise.
     fn more(&self) -> String {
         let fit = self.named();
-        if !is_beyond_noise(fit, &self.context.settings.noise) {
+        let certainly = is_beyond_noise(fit, &self.context.settings.noise);
+        if !(certainly || self.posterior.remains > self.context.settings.verdict.even) {
             return String::new();
         }
-        format!(
-            " Of the table they come nearest and explain {:.1} % of what the base model leaves, but what is left is still {:.0} times the noise: something that is \
-             not in the table is missing beside them, or in their place.",
-            1e2 * self.explained(),
-            fit.over_noise()
-        )
+        let Some(left) = fit.residuals(0) else { return String::new() };
+        let rms = |values: &[f64]| (values.iter().map(|v| v * v).sum::<f64>() / values.len().max(1) as f64).sqrt();
+        let over_noise = fit.over_noise();
+        let mut words = format!(
+            " That takes {} of what the base model leaves beyond the noise; {} mrad remain, {} times the noise",
+            percent_of_all(self.explained()),
+            number(1e3 * rms(&left.rmse_rad), 2),
+            number(over_noise, 2)
+        );
+        if let Some(place) = self.remains_at() {
+            let _ = write!(words, ", {}", in_place(place));
+        }
+        if let Some(hz) = self.remaining.frequency_hz {
+            let _ = write!(words, ", {}", self.in_swings(hz));
+        }
+        words + ": not in the table."
+    }
+
+    /// A frequency, as a multiple of the swing's where it is one.
+    fn in_swings(&self, hz: f64) -> String {
+        let base = self.posterior.base();
+        let pace = base.problem.model(0, &base.x[..base.problem.free.len()]).map(|(model, _)| model.pace_rad_s());
+        let ratio = pace.map_or(0.0, |pace| hz * std::f64::consts::TAU / pace);
+        match ratio.round() as usize {
+            1 if (ratio - 1.0).abs() < SAME_FREQUENCY => "at the swing's frequency".to_owned(),
+            2 if (ratio - 2.0).abs() < SAME_FREQUENCY => "at twice the swing's frequency".to_owned(),
+            3 if (ratio - 3.0).abs() < SAME_FREQUENCY => "at three times the swing's frequency".to_owned(),
+            _ => format!("at {hz:.2} Hz"),
+        }
     }
 
     /// What a law's coefficients say beside their values.
@@ -145,6 +171,21 @@ impl Findings<'_> {
         }
         statement.push('.');
         statement
+    }
+}
+
+/// A share as a percentage, with as many digits as it takes to tell it from all.
+fn percent_of_all(share: f64) -> String {
+    let digits = if share > 0.999 { 2 } else { 1 };
+    if share > 0.9999 { "more than 99.99 %".to_owned() } else { format!("{:.digits$} %", 1e2 * share) }
+}
+
+fn in_place(place: Place) -> &'static str {
+    match place {
+        Place::Hinge => "at the hinge",
+        Place::Joint => "in the joint",
+        Place::Air => "along the strip",
+        Place::Camera => "in what the camera sees",
     }
 }
 
