@@ -6,6 +6,9 @@ use crate::error::{Error, Result};
 use crate::experiment::Rig;
 use crate::video::{Layout, Orientation};
 
+/// Half the side of the patch that is found again around a reference mark.
+pub const PATCH_HALF_PX: f64 = 15.0;
+
 /// The part of the picture in which marks are sought.
 #[derive(Debug, Clone, Default)]
 pub struct Area {
@@ -29,6 +32,18 @@ impl Area {
                 size.0, size.1
             );
             return Err(Error::Option { option: "--roi".to_owned(), message });
+        }
+        let margin = PATCH_HALF_PX + 2.0;
+        let reaches = |p: &&[f64; 2]| {
+            let held = |v: f64, side: usize| (margin..=side as f64 - margin).contains(&v);
+            !(held(p[0], size.0) && held(p[1], size.1))
+        };
+        if let Some([x, y]) = rig.reference_marks.iter().find(reaches) {
+            let message = format!(
+                "({x}, {y}) px is not in the picture of {}×{} px, or nearer to its edge than {margin} px; name a fixed point with clear edges farther inside",
+                size.0, size.1
+            );
+            return Err(Error::Option { option: "--reference".to_owned(), message });
         }
         let mask = rig.mask.as_ref().map(|mask| read_mask(&folder.join(mask), size)).transpose()?;
         Ok(Self { roi_px: rig.roi_px, mask })
@@ -80,7 +95,11 @@ fn read_mask(path: &Path, size: (usize, usize)) -> Result<(usize, Vec<bool>)> {
             size.0, size.1
         )));
     }
-    Ok((width, picture.pixels().map(|p| p.0[0] > 127).collect()))
+    let white: Vec<bool> = picture.pixels().map(|p| p.0[0] > 127).collect();
+    if !white.contains(&true) {
+        return Err(wrong("the mask is dark all over; paint it white where marks are sought".to_owned()));
+    }
+    Ok((width, white))
 }
 
 #[cfg(test)]
@@ -93,6 +112,9 @@ mod tests {
         let area = Area::new(&rig, Path::new(""), (100, 100)).unwrap();
         assert!(area.holds([10.0, 20.0]) && area.holds([39.0, 59.0]));
         assert!(!area.holds([9.0, 30.0]) && !area.holds([20.0, 61.0]));
+        let reference = |p: [f64; 2]| Rig { reference_marks: vec![p], ..Rig::default() };
+        assert!(Area::new(&reference([40.0, 60.0]), Path::new(""), (100, 100)).is_ok());
+        assert!(Area::new(&reference([40.0, 99.0]), Path::new(""), (100, 100)).is_err());
         let beside = Rig { roi_px: Some([200.0, 0.0, 10.0, 10.0]), ..Rig::default() };
         assert!(Area::new(&beside, Path::new(""), (100, 100)).is_err());
     }

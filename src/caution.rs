@@ -1,7 +1,7 @@
 //! What a careful colleague would say about a measurement: each with the number and what to do.
 
 use crate::experiment::Experiment;
-use crate::measure::{Measurement, Options};
+use crate::measure::{Measurement, Options, Steadying};
 use crate::statistics::median;
 use crate::track::{Point, Spare};
 
@@ -19,6 +19,11 @@ const MOST_NOISE_PX: f64 = 0.25;
 const NOISE_OF_WIDTH: f64 = 0.005;
 /// Share of the marks' own motion from which another thing's is no trembling.
 const LEAST_TRAVEL: f64 = 0.05;
+/// Change of the distance from a still thing, over the motion, up to which that is the hinge.
+const HINGE_STRETCH: f64 = 0.1;
+/// Share of the largest angle, and standard deviations of a link's own, below which it does not turn.
+const LEAST_TURN: f64 = 0.02;
+const STILL_DEVIATIONS: f64 = 4.0;
 /// Things that are listed one by one.
 const LISTED: usize = 4;
 /// Rates at which cameras record slow motion, and rates at which they play it.
@@ -40,13 +45,36 @@ pub fn cautions(m: &Measurement, options: &Options) -> Vec<String> {
     let first = usize::from(options.rig.pivot_px.is_none());
     for link in 0..m.angles.links.len() {
         cautions.extend(link_length(m, options, link, first));
+        cautions.extend(turns(m, options, link));
     }
     for mark in 0..m.tracks.marks.len() {
         cautions.extend(mark_noise(m, mark));
         cautions.extend(blur(m, mark));
     }
-    cautions.extend(camera(m));
+    cautions.extend(camera(m, options));
+    cautions.extend(time(m, options));
     cautions
+}
+
+/// A span too short to show a swing, and a true rate that is none of slow motion.
+fn time(m: &Measurement, options: &Options) -> Vec<String> {
+    let mut said = Vec::new();
+    let frames = m.timing.frames;
+    if frames < FEWEST_FRAMES {
+        let span_s = m.timing.last_s - m.timing.first_s;
+        said.push(format!(
+            "only {frames} frame{} of {span_s:.2} s were measured, too few to show how it swings; give a longer recording, or widen --from and --until",
+            if frames == 1 { "" } else { "s" }
+        ));
+    }
+    if let Some(true_hz) = options.rig.true_rate_hz.filter(|_| m.time_scale > 1.0) {
+        said.push(format!(
+            "true_rate_hz = {true_hz} is slower than the file's {:.3} frames a second, so every second counts {:.2} times; slow motion has the faster rate: leave it out unless this is a time lapse",
+            true_hz * m.time_scale,
+            m.time_scale
+        ));
+    }
+    said
 }
 
 /// Things of the marks' colour that were not used.
@@ -82,15 +110,64 @@ fn spares(m: &Measurement) -> Vec<String> {
     }
     if !still.is_empty() {
         said.push(format!(
-            "{} thing{} of the marks' colour never move{} and {} taken for no mark: about {} px",
+            "{} thing{} of the marks' colour never move{} and {} taken for no mark: about {} px{}",
             still.len(),
             if still.len() == 1 { "" } else { "s" },
             if still.len() == 1 { "s" } else { "" },
             if still.len() == 1 { "was" } else { "were" },
             places(&still),
+            hinge_among(m).map_or(String::new(), |[x, y]| format!(
+                "; the first mark swings about the one at ({x:.0}, {y:.0}): if it is the hinge, say --markers {}",
+                marks + 1
+            )),
         ));
     }
     said
+}
+
+/// A thing that stands still and from which the first mark keeps its distance.
+fn hinge_among(m: &Measurement) -> Option<[f64; 2]> {
+    let path: Vec<[f64; 2]> = m.tracks.marks.first()?.iter().filter_map(|p| Some(p.measured?.position_px)).collect();
+    let range = |values: &dyn Fn(&[f64; 2]) -> f64| {
+        let mut sorted: Vec<f64> = path.iter().map(values).collect();
+        sorted.sort_unstable_by(f64::total_cmp);
+        let last = sorted.len().saturating_sub(1);
+        sorted.get(last * 19 / 20).zip(sorted.get(last / 20)).map_or(0.0, |(high, low)| high - low)
+    };
+    let travel_px = range(&|p| p[0]).max(range(&|p| p[1]));
+    let keeps = |s: &&Spare| {
+        let [x, y] = s.position_px;
+        range(&|p| (p[0] - x).hypot(p[1] - y)) < HINGE_STRETCH * travel_px
+    };
+    m.tracks.spares.iter().filter(|s| !s.moves).find(keeps).map(|s| s.position_px)
+}
+
+/// A link between two things that stand still says nothing, and the marks were counted from the wrong one.
+fn turns(m: &Measurement, options: &Options, link: usize) -> Option<String> {
+    let half_range = |link: usize| {
+        let angles = m.angles.links[link].iter().flatten().map(|a| a.theta_rad);
+        0.5 * (angles.clone().fold(f64::MIN, f64::max) - angles.fold(f64::MAX, f64::min))
+    };
+    let sd_rad = median(&mut m.angles.links[link].iter().flatten().map(|a| a.sd_rad).collect::<Vec<_>>())?;
+    let (own, most) = (half_range(link), (0..m.angles.links.len()).map(half_range).fold(0.0, f64::max));
+    let measured = m.angles.links[link].iter().flatten().count();
+    let still = measured >= FEWEST_FRAMES && own < (LEAST_TURN * most).max(STILL_DEVIATIONS * sd_rad).min(0.2 * most);
+    let remedy = if options.rig.pivot_px.is_some() && link == 0 {
+        format!(
+            "its ends, the pivot and the first mark, both stand still; leave --pivot out, or put it where the strip turns and say --markers {}",
+            m.tracks.marks.len().saturating_sub(1).max(1)
+        )
+    } else {
+        "both its ends stand still; name the marks that swing with --markers, --roi or --mask".to_owned()
+    };
+    still.then(|| {
+        format!(
+            "link {} turns by no more than ± {:.2}°, where another turns by ± {:.1}°: {remedy}",
+            link + 1,
+            own.to_degrees(),
+            most.to_degrees()
+        )
+    })
 }
 
 /// The ends of a link in every frame that shows both: (Δx, Δy, variance of the distance).
@@ -220,13 +297,23 @@ fn blur(m: &Measurement, mark: usize) -> Option<String> {
     })
 }
 
-fn camera(m: &Measurement) -> Vec<String> {
+fn camera(m: &Measurement, options: &Options) -> Vec<String> {
     let camera = &m.camera;
     let mut said = Vec::new();
+    let named = options.rig.reference_marks.len();
     if camera.taken_out && camera.greatest_shift_px > 0.0 {
+        let against = if named > 0 {
+            format!("against {named} reference mark{}", if named == 1 { "" } else { "s" })
+        } else {
+            format!("with {} patches of what stands still (to {:.2} px)", camera.patches, camera.sd_px)
+        };
         said.push(format!(
-            "the camera moved by up to {:.1} px; taken out with {} patches of what stands still (to {:.2} px); --steady never leaves it in",
-            camera.greatest_shift_px, camera.patches, camera.sd_px
+            "the camera moved by up to {:.1} px; taken out {against}; --steady never leaves it in",
+            camera.greatest_shift_px
+        ));
+    } else if named > 0 && options.steadying != Steadying::Never {
+        said.push(format!(
+            "none of the {named} reference marks has edges clear enough to be found again, so the camera's motion is left in; name a corner or a dot on what stands still"
         ));
     } else if camera.greatest_shift_px > 0.3 {
         said.push(format!(
@@ -236,8 +323,10 @@ fn camera(m: &Measurement) -> Vec<String> {
     }
     if camera.lost_frames > 0 {
         said.push(format!(
-            "in {} frames too little of the background was found again to say where the camera looked; nothing is measured there",
-            camera.lost_frames
+            "in {} frames too little of {} was found again to say where the camera looked; nothing is measured there: {}",
+            camera.lost_frames,
+            if named > 0 { "the reference marks" } else { "the background" },
+            if named > 0 { "name others with --reference, on what stands still" } else { "--steady never measures them with the camera's motion in" },
         ));
     }
     said

@@ -24,6 +24,7 @@ pub mod error;
 pub mod experiment;
 pub mod output;
 pub mod progress;
+mod digits;
 mod statistics;
 
 pub mod video;

@@ -4,7 +4,8 @@ use std::path::Path;
 
 use crate::detect::{Album, Hue, Trial};
 use crate::error::{Error, Result};
-use crate::experiment::{Look, MarkColour};
+use crate::experiment::{Look, MarkColour, Rig};
+use crate::statistics::median;
 use crate::track::{MarkFound, Spare, Tracks};
 
 /// A recording whose marks are to be judged.
@@ -13,8 +14,11 @@ pub struct Rejected<'a> {
     pub album: &'a Album,
     pub hues: &'a [Hue],
     pub frames: u64,
+    pub rig: &'a Rig,
 }
 
+/// Frames below which nothing is said of what stands still.
+const FEWEST_FRAMES: usize = 8;
 /// Things that are listed one by one.
 const LISTED: usize = 3;
 /// A proposal that shows fewer marks than this share of what is wanted, in the usual picture, is none.
@@ -26,7 +30,7 @@ impl Rejected<'_> {
     /// # Errors
     /// [`Error::NoMarks`] and [`Error::TooFewMarks`].
     pub fn check(&self, found: &[MarkFound], tracks: &Tracks) -> Result<()> {
-        if found.iter().any(|f| f.frames > 0) && !tracks.moves && tracks.t_s.len() > 1 {
+        if found.iter().any(|f| f.frames > 0) && !tracks.moves && tracks.t_s.len() >= FEWEST_FRAMES {
             return Err(self.nothing_swings(tracks)?);
         }
         for (index, hue) in self.hues.iter().enumerate() {
@@ -39,7 +43,32 @@ impl Rejected<'_> {
                 return Err(self.too_few(hue, seen, &spares));
             }
         }
-        Ok(())
+        self.pivot_apart(tracks)
+    }
+
+    /// A link is longer than the mark at its end is wide: else the mark is the pivot.
+    fn pivot_apart(&self, tracks: &Tracks) -> Result<()> {
+        let (Some(pivot), Some(first)) = (self.rig.pivot_px, tracks.marks.first()) else { return Ok(()) };
+        let seen = first.iter().filter_map(|p| p.measured);
+        let distance = |p: [f64; 2]| (p[0] - pivot[0]).hypot(p[1] - pivot[1]);
+        let usual_px = median(&mut seen.map(|m| distance(m.position_px)).collect::<Vec<_>>());
+        let width_px = 2.0 * (tracks.area_px2[0] / std::f64::consts::PI).sqrt();
+        let Some(usual_px) = usual_px.filter(|d| *d < width_px) else { return Ok(()) };
+        let message = format!(
+            "{} lies {usual_px:.1} px from the first mark, which is {width_px:.0} px wide: that mark is the pivot itself; leave --pivot out, or count only the marks below it with --markers {}",
+            point(pivot),
+            tracks.marks.len().saturating_sub(1).max(1)
+        );
+        Err(Error::Option { option: "--pivot".to_owned(), message })
+    }
+
+    /// What is said where only a part of the picture is looked at.
+    fn part(&self) -> &'static str {
+        match (self.rig.roi_px, &self.rig.mask) {
+            (Some(_), _) => " in the region of --roi",
+            (None, Some(_)) => " in the white of the mask",
+            (None, None) => "",
+        }
     }
 
     fn no_marks(&self, hue: &Hue, spares: &[&Spare]) -> Result<Error> {
@@ -73,6 +102,10 @@ impl Rejected<'_> {
                 "name the marks' colour with --color, or lower --threshold; --debug-frames DIR shows each step".into()
             }
         };
+        let remedy = match self.part() {
+            "" => remedy,
+            part => format!("only what lies{part} is looked at: widen it, or {remedy}"),
+        };
         let colour = hue.colour.name.clone();
         Ok(Error::NoMarks { path: self.path.to_owned(), colour, frames: self.frames, found, remedy })
     }
@@ -90,7 +123,11 @@ impl Rejected<'_> {
                 verb(&still)
             )
         };
-        let remedy = format!("say --markers {found}, or light or uncover what is missing, or lower --threshold");
+        let wider = match self.part() {
+            "" => String::new(),
+            part => format!(", or look at more of the picture than what lies{part}"),
+        };
+        let remedy = format!("say --markers {found}, or light or uncover what is missing{wider}, or lower --threshold");
         let (path, colour, wanted) = (self.path.to_owned(), hue.colour.name.clone(), hue.marks);
         Error::TooFewMarks { path, colour, found, wanted, beside, remedy }
     }

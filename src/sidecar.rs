@@ -231,11 +231,16 @@ impl Sidecar {
         for (i, mark) in self.marks.iter().enumerate() {
             if mark.share_measured < 0.98 {
                 warnings.push(format!(
-                    "mark {} ({}) was measured in {:.1} % of the frames, longest gap {} frames",
+                    "mark {} ({}) was measured in {:.1} % of the frames, longest gap {} frames; {}",
                     i + 1,
                     mark.colour,
                     100.0 * mark.share_measured,
-                    mark.longest_gap_frames
+                    mark.longest_gap_frames,
+                    if self.options.roi_px.is_some() || self.options.mask.is_some() {
+                        "where it leaves the region of --roi or --mask, widen that"
+                    } else {
+                        "look with --overlay where it is covered or dark"
+                    }
                 ));
             }
         }

@@ -12,7 +12,7 @@ use crate::statistics::median;
 use crate::video::Picture;
 
 /// Half the side of a patch.
-const HALF: i64 = 15;
+const HALF: i64 = crate::area::PATCH_HALF_PX as i64;
 /// Farthest that a patch is sought, px.
 const REACH_PX: i64 = 21;
 /// Columns and rows of cells, each with one patch.
@@ -93,7 +93,8 @@ impl Background {
         let patches = if points_px.is_empty() {
             corners(&luma)
         } else {
-            points_px.iter().filter_map(|p| Patch::at(&luma, p[0].round() as i64, p[1].round() as i64)).collect()
+            let named = points_px.iter().filter_map(|p| Patch::at(&luma, p[0].round() as i64, p[1].round() as i64));
+            named.filter(|p| p.strength > LEAST_GRADIENT).collect()
         };
         Self { patches, centre_px, named: !points_px.is_empty() }
     }

@@ -16,8 +16,10 @@ Examples:
   freeswing init swing.mp4 --out rig/experiment.toml --preview seen.png
   track swing.mp4 --config experiment.toml --out angles.csv
 
-Finds what swings, in which colours, and what stands still; proposes the marks in order, the pivot as the centre of the
-first arc, and what only a ruler and a scale can tell is left as a marked line. Look at the preview before believing it.")]
+The file names the marks in order from the hinge down, their colours, the hinge or the point they swing about, their
+distances in pixels and the frame rate. Lengths and mass, which no picture shows, are left as lines marked \"MEASURE\":
+`track` does not need them, `fit` and `diagnose` do. Look at the preview before you believe what was found.
+Exit code 0: done; 2: nothing that swings was found, or bad input; nothing written.")]
 pub struct InitArgs {
     /// The recording: MP4, MOV, AVI, MKV, …, or a folder of stills.
     video: PathBuf,
@@ -41,6 +43,7 @@ impl InitArgs {
     /// # Errors
     /// One line: what, where, what to do.
     pub fn run(&self) -> Result<()> {
+        self.keep_inputs()?;
         if self.out.exists() && !self.force && self.out.as_os_str() != "-" {
             let message = format!("{} exists already; name another file, or say --force", self.out.display());
             return Err(Error::Option { option: "--out".to_owned(), message });
@@ -61,15 +64,60 @@ impl InitArgs {
         Ok(())
     }
 
+    /// The recording is never written over, nor is one output by the other; the preview is a PNG.
+    fn keep_inputs(&self) -> Result<()> {
+        let same =
+            |a: &Path, b: &Path| a == b || a.canonicalize().is_ok_and(|a| b.canonicalize().is_ok_and(|b| a == b));
+        let refused = |option: &str, message: String| Err(Error::Option { option: option.to_owned(), message });
+        for (option, target) in [("--out", Some(&self.out)), ("--preview", self.preview.as_ref())] {
+            if let Some(target) = target.filter(|target| same(target, &self.video)) {
+                return refused(option, format!("{} is the recording and would be overwritten", target.display()));
+            }
+        }
+        let Some(preview) = &self.preview else { return Ok(()) };
+        if same(preview, &self.out) {
+            return refused("--preview", format!("{} is the experiment file; name another", preview.display()));
+        }
+        if !preview.extension().is_some_and(|e| e.eq_ignore_ascii_case("png")) {
+            return refused("--preview", format!("{}: the preview is a PNG; name it .png", preview.display()));
+        }
+        Ok(())
+    }
+
     fn report(&self, finding: &Finding) {
         let colours: Vec<&str> = finding.marks.iter().map(|m| m.colour.as_str()).collect();
-        let n = colours.len();
-        eprintln!("{}: {n} mark{}: {}", self.video.display(), if n == 1 { "" } else { "s" }, colours.join(", "));
-        if let Some(arc) = finding.arc {
-            let ([x, y], [sx, sy]) = (arc.centre_px, arc.sd_px);
-            eprintln!("pivot at {x:.1}, {y:.1} px (± {sx:.1}, ± {sy:.1})");
-        }
         let (video, out) = (self.video.display(), self.out.display());
+        match colours[..] {
+            [one] => eprintln!("{video}: 1 mark: {one}"),
+            _ => eprintln!("{video}: {} marks, from the hinge down: {}", colours.len(), colours.join(", ")),
+        }
+        eprintln!("{}", hinge_in_words(finding));
+        match &self.preview {
+            Some(picture) => eprintln!("look at {} to see whether these are the marks", picture.display()),
+            None => eprintln!("to see whether these are the marks, run it again with --force --preview seen.png"),
+        }
         eprintln!("written to {out}; next: track {video} --config {out} --out angles.csv");
+    }
+}
+
+/// Where it hangs, and how that is known.
+fn hinge_in_words(finding: &Finding) -> String {
+    if finding.hinge_marked {
+        let [x, y] = finding.marks[0].thing.place_px();
+        return format!("the first mark stands still and is taken for the hinge: {x:.1}, {y:.1} px");
+    }
+    match finding.arc.filter(|_| finding.states_pivot()) {
+        Some(arc) => {
+            let ([x, y], [sx, sy]) = (arc.centre_px, arc.sd_px);
+            format!(
+                "no mark shows the hinge; the first mark swings about {x:.1}, {y:.1} px (standard deviation {sx:.1}, {sy:.1})"
+            )
+        }
+        None if finding.marks.len() == 1 => {
+            "it swings too little to show where it hangs: its displacement is measured, no angle".to_owned()
+        }
+        None => {
+            "the first mark swings too little to show where it hangs: angles are measured between the marks".to_owned()
+        }
     }
 }

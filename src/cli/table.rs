@@ -2,6 +2,8 @@
 
 use std::fmt::Write;
 
+pub use crate::digits::number;
+
 /// Columns of a terminal.
 const WIDTH: usize = 100;
 /// Blanks before every line of a table.
@@ -59,15 +61,6 @@ pub fn paragraph(bullet: &str, text: &str) -> String {
     let hanging = columns_of(bullet);
     let lines = wrapped(text, WIDTH - hanging).join(&format!("\n{}", " ".repeat(hanging)));
     format!("{bullet}{lines}\n")
-}
-
-/// A number with `digits` significant ones, as a power of ten where it is very small or very large.
-pub fn number(value: f64, digits: usize) -> String {
-    let magnitude = if value == 0.0 { 0 } else { value.abs().log10().floor() as i32 };
-    if !(-4..6).contains(&magnitude) {
-        return format!("{value:.*e}", digits - 1);
-    }
-    format!("{value:.*}", (digits as i32 - 1 - magnitude).max(0) as usize)
 }
 
 /// A configured value as a person would write it.

@@ -52,29 +52,29 @@ pub struct TrackArgs {
     #[arg(long, value_name = "N")]
     markers: Option<usize>,
     /// A fixed, unmarked pivot above the first mark, in displayed pixels.
-    #[arg(long, value_name = "X,Y", value_parser = point)]
+    #[arg(long, value_name = "X,Y", value_parser = point, allow_hyphen_values = true)]
     pivot: Option<[f64; 2]>,
     /// The camera looks into a mirror.
     #[arg(long)]
     mirrored: bool,
     /// Seek marks only in this part of the picture: left, top, width, height, displayed pixels.
-    #[arg(long, value_name = "X,Y,W,H", value_parser = rectangle)]
+    #[arg(long, value_name = "X,Y,W,H", value_parser = rectangle, allow_hyphen_values = true)]
     roi: Option<[f64; 4]>,
     /// Seek marks only where this picture, as large as the recording's, is white.
     #[arg(long, value_name = "PNG")]
     mask: Option<PathBuf>,
     /// Leave out what comes before, seconds of the file.
-    #[arg(long, value_name = "S")]
+    #[arg(long, value_name = "S", allow_negative_numbers = true)]
     from: Option<f64>,
     /// Leave out what comes after, seconds of the file.
-    #[arg(long, value_name = "S")]
+    #[arg(long, value_name = "S", allow_negative_numbers = true)]
     until: Option<f64>,
     /// Frames a second at which the camera ran, where the file plays slower (slow motion).
-    #[arg(long, value_name = "HZ")]
+    #[arg(long, value_name = "HZ", allow_negative_numbers = true)]
     true_rate: Option<f64>,
     /// A fixed point with clear edges, displayed pixels, against which the camera's own motion is taken out; may be
     /// given several times. The standing background is used otherwise.
-    #[arg(long, value_name = "X,Y", value_parser = point)]
+    #[arg(long, value_name = "X,Y", value_parser = point, allow_hyphen_values = true)]
     reference: Vec<[f64; 2]>,
     /// Take out the camera's own motion.
     #[arg(long, value_name = "WHEN", default_value = "needed")]
@@ -293,9 +293,10 @@ impl TrackArgs {
         let links = &measurement.angles.links;
         let measured = (0..measurement.timing.frames).filter(|f| links.iter().all(|l| l[*f].is_some())).count();
         eprintln!(
-            "{}: {} frames, all angles in {measured}, written to {}",
+            "{}: {} frame{}, all angles in {measured}, written to {}",
             self.video.display(),
             measurement.timing.frames,
+            if measurement.timing.frames == 1 { "" } else { "s" },
             self.out.display()
         );
     }

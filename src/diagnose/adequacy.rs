@@ -13,10 +13,12 @@ use rayon::prelude::*;
 use rustfft::FftPlanner;
 use rustfft::num_complex::Complex;
 
-use super::ground::Ground;
+use super::context::FitContext;
+use super::effect::Effect;
+use super::laws;
 use super::refit::Refit;
 use super::screen::{Score, Screen};
-use super::{Cause, selection};
+use super::settings::VerdictSettings;
 use crate::fit::whitening::Whitening;
 use crate::model::Parameter;
 use crate::progress::Progress;
@@ -27,20 +29,13 @@ const REPLICATES: usize = 500;
 const STATISTICS: usize = 4;
 /// Values of a window.
 const WINDOW: usize = 40;
-/// An effect is detected at this many standard deviations.
-const DETECTED: f64 = 4.0;
-/// An effect is named when it is this many standard deviations from its nearest rival.
-const NAMED: f64 = 5.0;
 /// Columns that differ by less than this part do the same.
 const NEVER_TOLD: f64 = 1e-3;
-/// Two effects whose columns go together by more than this cannot be named apart at twice the size at which they are detected.
-const CONFUSED: f64 = 0.93;
-
 /// The smallest amount of an effect that a recording can show.
 #[derive(Debug, Clone)]
 pub struct Detectable {
     /// The effect.
-    pub cause: Cause,
+    pub effect: Effect,
     /// Its first coefficient.
     pub parameter: Parameter,
     /// The amount; infinite where no amount can be told from the base model.
@@ -48,7 +43,7 @@ pub struct Detectable {
     /// From this amount on its name is told from every other single effect's; infinite where it never is.
     pub named: f64,
     /// Effects that would do nearly the same.
-    pub confused_with: Vec<Cause>,
+    pub confused_with: Vec<Effect>,
 }
 
 /// What [`adequacy`] says.
@@ -64,18 +59,18 @@ pub struct Adequacy {
 ///
 /// With `bootstraps` whole recordings are made from it and fitted anew, that many; otherwise only their residuals, to first order.
 pub fn adequacy(
-    ground: &Ground<'_>,
+    context: &FitContext<'_>,
     null: &Refit<'_>,
-    causes: &[Cause],
+    effects: &[Effect],
     bootstraps: usize,
     progress: &dyn Progress,
 ) -> Adequacy {
     let nothing = Adequacy { p_value: 0.0, detectable: Vec::new() };
-    let Some(screen) = Screen::at(ground, null) else { return nothing };
-    let scores = screen.scores(&selection::cheap(ground, causes));
+    let Some(screen) = Screen::at(context, null) else { return nothing };
+    let scores = laws::scores(&screen, &laws::cheap_to_score(context, effects));
     let basis = &screen.projection.basis;
     // of the hysteresis, the best of several yield angles
-    let is_fixed = |s: &&Score| !s.cause.is_scanned() && s.cause != Cause::JointHysteretic;
+    let is_fixed = |s: &&Score| !s.effect.is_scanned() && !s.effect.has_corners();
     let fixed: Vec<&Score> = scores.iter().filter(is_fixed).collect();
     let transform = FftPlanner::new().plan_fft_forward(basis.nrows());
     let statistics = |residual: &DVector<f64>| {
@@ -103,7 +98,7 @@ pub fn adequacy(
     let replicates: Vec<[f64; STATISTICS]> = if bootstraps > 0 {
         progress.begin("bootstraps", Some(bootstraps as u64));
         let of = |seed: u64| {
-            let residual = replicate(ground, null, seed);
+            let residual = replicate(context, null, seed);
             progress.advance(1);
             residual.map(|r| statistics(&r))
         };
@@ -117,13 +112,13 @@ pub fn adequacy(
         (0..REPLICATES as u64).into_par_iter().map(of).collect()
     };
     let own = statistics(&screen.projection.residual);
-    Adequacy { p_value: ranked(&own, &replicates), detectable: detectable(&scores, causes) }
+    Adequacy { p_value: ranked(&own, &replicates), detectable: detectable(&scores, effects, &context.settings.verdict) }
 }
 
 /// The residuals, over the noise, of the base model fitted to a recording that it made itself, with noise as it was found.
-fn replicate(ground: &Ground<'_>, null: &Refit<'_>, seed: u64) -> Option<DVector<f64>> {
+fn replicate(context: &FitContext<'_>, null: &Refit<'_>, seed: u64) -> Option<DVector<f64>> {
     let mut random = StdRng::seed_from_u64(seed);
-    let mut records = ground.records.to_vec();
+    let mut records = context.records.to_vec();
     for (index, record) in records.iter_mut().enumerate() {
         let values = null.problem.predict(index, &null.x, false).ok()?.values;
         let mut noise_rad: Vec<f64> = values.iter().map(|_| StandardNormal.sample(&mut random)).collect();
@@ -132,8 +127,8 @@ fn replicate(ground: &Ground<'_>, null: &Refit<'_>, seed: u64) -> Option<DVector
             record.theta_rad[value.link][value.row] = Some(value.predicted_rad + noise_rad);
         }
     }
-    let again = ground.on(&records).refit(&null.hypothesis, null, &[])?;
-    again.linearised().map(|(residual, _)| residual.rows(0, ground.values()).into_owned())
+    let again = context.on(&records).refit(&null.hypothesis, null, &[])?;
+    again.linearised().map(|(residual, _)| residual.rows(0, context.values()).into_owned())
 }
 
 /// The share of replicates whose least rank is as small as the recording's.
@@ -150,30 +145,30 @@ fn ranked(own: &[f64; STATISTICS], replicates: &[[f64; STATISTICS]]) -> f64 {
 }
 
 /// The smallest detectable amount of each effect, and what it would be confused with.
-pub fn detectable(scores: &[Score], causes: &[Cause]) -> Vec<Detectable> {
-    let of = |cause: &Cause| {
-        let parameter = cause.parameters()[0];
-        let Some(score) = scores.iter().find(|s| s.cause == *cause) else {
+pub fn detectable(scores: &[Score], effects: &[Effect], settings: &VerdictSettings) -> Vec<Detectable> {
+    let of = |effect: &Effect| {
+        let parameter = effect.parameters()[0];
+        let Some(score) = scores.iter().find(|s| s.effect == *effect) else {
             return Detectable {
-                cause: *cause,
+                effect: *effect,
                 parameter,
                 smallest: f64::INFINITY,
                 named: f64::INFINITY,
                 confused_with: Vec::new(),
             };
         };
-        let confused = |other: &&Score| other.cause != *cause && together(score, other) > CONFUSED;
-        let nearest = scores.iter().filter(|o| o.cause != *cause).map(|o| together(score, o)).fold(0.0, f64::max);
+        let confused = |other: &&Score| other.effect != *effect && together(score, other) > settings.confused;
+        let nearest = scores.iter().filter(|o| o.effect != *effect).map(|o| together(score, o)).fold(0.0, f64::max);
         let apart = (1.0 - nearest * nearest).max(0.0).sqrt();
         Detectable {
-            cause: *cause,
+            effect: *effect,
             parameter,
-            smallest: DETECTED * score.sd,
-            named: if apart > NEVER_TOLD { NAMED * score.sd / apart } else { f64::INFINITY },
-            confused_with: scores.iter().filter(confused).map(|s| s.cause).collect(),
+            smallest: settings.seen * score.sd,
+            named: if apart > NEVER_TOLD { settings.named * score.sd / apart } else { f64::INFINITY },
+            confused_with: scores.iter().filter(confused).map(|s| s.effect).collect(),
         }
     };
-    causes.iter().map(of).collect()
+    effects.iter().map(of).collect()
 }
 
 /// How much of one effect's column others of another can make: the cosine between them.

@@ -1,28 +1,17 @@
 //! Work of the laws along a fitted motion: what each place dissipates, and the torque that the added effects exert.
 
-use super::Place;
+use super::effect::{Acts, Effect, Place};
+use super::linearisation::motion_at;
 use super::refit::Refit;
-use super::surroundings::motion_at;
 use crate::model::{Parameter, Partials};
-
-/// The laws that dissipate, and where.
-const LOSSES: [(Parameter, Place); 6] = [
-    (Parameter::HingeViscous, Place::Hinge),
-    (Parameter::HingeCoulomb, Place::Hinge),
-    (Parameter::JointDamping, Place::Joint),
-    (Parameter::HysteresisTorque, Place::Joint),
-    (Parameter::AirLinear, Place::Air),
-    (Parameter::AirQuadratic, Place::Air),
-];
 
 /// Root mean square of the torque that the laws added to the base model exert, on all links together (N·m). A support that moves is no law: its
 /// motion is what it is.
 pub fn added_torque_n_m(fit: &Refit<'_>) -> f64 {
     let mut square = 0.0;
     let mut count = 0usize;
-    let is_law =
-        |p: &Parameter| !matches!(p, Parameter::SupportSine | Parameter::SupportCosine | Parameter::SupportFrequency);
-    let added: Vec<Parameter> = fit.added().into_iter().filter(is_law).collect();
+    let laws = fit.hypothesis.effects.iter().filter(|effect| effect.entry().acts != Acts::Motion);
+    let added: Vec<Parameter> = laws.flat_map(|effect| effect.parameters()).copied().collect();
     let values: Vec<f64> = added.iter().map(|p| fit.value(*p).unwrap_or(0.0)).collect();
     for record in 0..fit.problem.records.len() {
         along(fit, record, &added, |_, torques, _| {
@@ -51,9 +40,11 @@ pub fn energy_shares(fit: &Refit<'_>) -> [f64; 3] {
 pub fn dissipated_j(fit: &Refit<'_>, record: usize) -> [f64; 3] {
     let mut work_j = [0.0; 3];
     let Ok((model, _)) = fit.problem.model(record, &fit.x[..fit.problem.free.len()]) else { return work_j };
-    let values = LOSSES.map(|(parameter, _)| model.value(parameter).unwrap_or(0.0));
-    along(fit, record, &LOSSES.map(|l| l.0), |step_s, torques, rate| {
-        for ((torque, value), (_, place)) in torques.iter().zip(values).zip(&LOSSES) {
+    let losses = Effect::losses();
+    let of: Vec<Parameter> = losses.iter().map(|loss| loss.0).collect();
+    let values: Vec<f64> = of.iter().map(|parameter| model.value(*parameter).unwrap_or(0.0)).collect();
+    along(fit, record, &of, |step_s, torques, rate| {
+        for ((torque, value), (_, place)) in torques.iter().zip(&values).zip(&losses) {
             let power: f64 = torque.iter().zip(rate).map(|(q, omega)| q * omega).sum::<f64>() * value;
             work_j[Place::OF_LOSSES.iter().position(|p| p == place).unwrap_or(0)] -= power * step_s;
         }

@@ -10,33 +10,13 @@
 //! Σ is scaled by v. What the best hypothesis leaves beyond the noise goes on from row to row, so that fewer values count than there are. A support's
 //! frequency, a joint's yield angle and the instant of missing frames count as any value within their range.
 
-use super::ground::Hypothesis;
+use super::effect::{Effect, Place};
+use super::hypothesis::Hypothesis;
+use super::laws::law_of;
+use super::noise;
 use super::refit::Refit;
-use super::screen::LOWEST;
-use super::{Cause, Place, noise};
+use super::settings::PriorSettings;
 use crate::model::Parameter;
-
-/// ln R: sizes over four decades.
-const SIZES: f64 = 9.2;
-/// Yield angles over a factor of thirty.
-const YIELDS: f64 = 3.4;
-/// Coefficients of less than this many standard deviations are not told from zero.
-const TOLD_FROM_ZERO: f64 = 1.5;
-
-/// From this variance on, over the noise's, a fall of χ² by this many variances counts instead.
-const MUCH_LEFT: f64 = 4.0;
-const NEEDED: f64 = 9.0;
-
-/// Prior probabilities before anything is measured.
-const PRIOR_NULL: f64 = 0.25;
-const PRIOR_ONE: f64 = 0.40;
-const PRIOR_TWO: f64 = 0.25;
-/// Three are this much less probable than two, and so on.
-const FURTHER: f64 = 0.2;
-/// An effect of the camera is this much likelier than one of physics.
-const CAMERA_FIRST: f64 = 2.0;
-/// Of physics outside the table.
-pub const PRIOR_UNKNOWN: f64 = 0.10;
 
 /// How much the best hypothesis leaves, over the variance of the noise.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -61,15 +41,15 @@ impl Scatter {
 }
 
 /// ln of the prior probability of a hypothesis, of `candidates` effects.
-pub fn ln_prior(hypothesis: &Hypothesis, candidates: usize) -> f64 {
+pub fn ln_prior(hypothesis: &Hypothesis, candidates: usize, settings: &PriorSettings) -> f64 {
     let count = candidates.max(1) as f64;
     // in doubt it is the camera
-    let camera = hypothesis.causes.iter().filter(|c| c.place() == Place::Camera).count() as f64 * CAMERA_FIRST.ln();
-    camera
-        + match hypothesis.causes.len() {
-            0 => PRIOR_NULL.ln(),
-            1 => (PRIOR_ONE / count).ln(),
-            many => (PRIOR_TWO * FURTHER.powi(many as i32 - 2) / ways(count, many)).ln(),
+    let of_camera = hypothesis.effects.iter().filter(|c| c.place() == Place::Camera).count() as f64;
+    of_camera * settings.camera_first.ln()
+        + match hypothesis.effects.len() {
+            0 => settings.none.ln(),
+            1 => (settings.one / count).ln(),
+            many => (settings.two * settings.further.powi(many as i32 - 2) / ways(count, many)).ln(),
         }
 }
 
@@ -79,10 +59,18 @@ fn ways(count: f64, chosen: usize) -> f64 {
 }
 
 /// ln Z of a fitted hypothesis; −∞ where a coefficient is not told from zero. `least_without` is the least χ² of all hypotheses that lack an effect of
-/// it: where far more than noise is left, it says better than the tangent whether that effect is needed.
-pub fn ln_evidence(fit: &Refit<'_>, scatter: Scatter, least_without: impl Fn(Cause) -> f64) -> f64 {
+/// it: where far more than noise is left, it says better than the tangent whether that effect is needed (a fall by `counts` variances).
+pub fn ln_evidence(
+    fit: &Refit<'_>,
+    scatter: Scatter,
+    least_without: impl Fn(Effect) -> f64,
+    settings: &PriorSettings,
+    counts: f64,
+) -> f64 {
     let likelihood = -0.5 * fit.chi2 / scatter.of_all;
-    let added: Vec<Parameter> = fit.added().into_iter().filter(|p| *p != Parameter::BendingStiffness).collect();
+    let is_weighed = |effect: &&Effect| law_of(**effect).strength(**effect, &|_| (0.0, 0.0)).is_some();
+    let weighed: Vec<Effect> = fit.hypothesis.effects.iter().filter(is_weighed).copied().collect();
+    let added: Vec<Parameter> = weighed.iter().flat_map(|effect| effect.parameters()).copied().collect();
     if added.is_empty() {
         return likelihood;
     }
@@ -92,53 +80,21 @@ pub fn ln_evidence(fit: &Refit<'_>, scatter: Scatter, least_without: impl Fn(Cau
         let i = added.iter().position(|p| *p == parameter).unwrap_or(0);
         (fit.value(parameter).unwrap_or(0.0), covariance[(i, i)].sqrt())
     };
-    for cause in &fit.hypothesis.causes {
-        let (value, sd) = match cause {
-            Cause::DistributedFlexibility => continue,
-            Cause::SupportMotion if only_leans(fit) => return f64::NEG_INFINITY,
-            Cause::SupportMotion => {
-                let ((sine, sd), (cosine, _)) = (of(Parameter::SupportSine), of(Parameter::SupportCosine));
-                (sine.hypot(cosine), sd)
-            }
-            one => of(one.parameters()[0]),
+    for effect in weighed {
+        let law = law_of(effect);
+        let Some((value, sd)) = law.strength(effect, &of).filter(|_| law.is_possible(fit)) else {
+            return f64::NEG_INFINITY;
         };
-        let fall = (least_without(*cause) - fit.chi2) / scatter.of_all;
-        let needed = scatter.of_values > MUCH_LEFT && fall > NEEDED;
+        let fall = (least_without(effect) - fit.chi2) / scatter.of_all;
+        let needed = scatter.of_values > settings.much_left && fall > counts;
         // a law of no size is none, however much more is left without it
-        if value == 0.0 || !(needed || value.abs() > TOLD_FROM_ZERO * sd) {
+        if value == 0.0 || !(needed || value.abs() > settings.told_from_zero * sd) {
             return f64::NEG_INFINITY;
         }
-        ln_volume -= (value.abs() * SIZES).ln();
-        match cause {
-            Cause::SupportMotion => {
-                // direction of the phase, and any frequency up to a multiple of the swing's
-                ln_volume -= (std::f64::consts::TAU * value.abs()).ln();
-                let highest_hz = 10.0;
-                ln_volume -= f64::ln(highest_hz);
-            }
-            Cause::JointHysteretic => {
-                let (yield_rad, sd) = of(Parameter::HysteresisYield);
-                // a yield angle that the recording does not tell can be any
-                ln_volume -= (yield_rad * YIELDS).ln().max(sd.ln());
-            }
-            Cause::DroppedFrames => {
-                let rows: usize = fit.problem.records.iter().map(crate::fit::Record::len).sum();
-                ln_volume -= (rows as f64).ln();
-            }
-            // either sign
-            one if !one.parameters()[0].is_not_negative() => ln_volume -= std::f64::consts::LN_2,
-            _ => {}
-        }
+        ln_volume -= (value.abs() * settings.sizes).ln() + law.ln_kinds(fit, effect, &of, settings);
     }
     let ln = likelihood + ln_volume;
     if ln.is_nan() { f64::NEG_INFINITY } else { ln }
-}
-
-/// Whether the support of a fit moves so slowly beside the swing that nothing moves but the angles' zero.
-fn only_leans(fit: &Refit<'_>) -> bool {
-    let Ok((model, _)) = fit.problem.model(0, &fit.x[..fit.problem.free.len()]) else { return false };
-    let swing_hz = model.pace_rad_s() / std::f64::consts::TAU;
-    fit.value(Parameter::SupportFrequency).is_some_and(|hz| hz < LOWEST * swing_hz)
 }
 
 /// Probabilities from logarithms, which need not be normalised.
@@ -153,6 +109,7 @@ mod tests {
     use nalgebra::DMatrix;
 
     use super::*;
+    use crate::diagnose::refit::Certificate;
     use crate::experiment::Experiment;
     use crate::fit::{Problem, Record};
 
@@ -164,8 +121,9 @@ mod tests {
         x.resize(problem.variables(), 0.3);
         let mut normal = DMatrix::identity(x.len(), x.len());
         normal[(0, 0)] = 1e16;
-        let hypothesis = Hypothesis { causes: vec![Cause::HingeCoulomb], dropped: None };
-        Refit { hypothesis, problem, x, chi2: 240.0, normal, steps: 1, converged: true }
+        let hypothesis = Hypothesis { effects: vec![Effect::HingeCoulomb], dropped: None };
+        let certificate = Certificate { starts_agreeing: 1, nested_ok: true };
+        Refit { hypothesis, problem, x, chi2: 240.0, normal, steps: 1, converged: true, certificate }
     }
 
     #[test]
@@ -175,11 +133,14 @@ mod tests {
         let records =
             [Record { path: "made".into(), theta_rad, relative_sd: vec![vec![1.0; 30]; 2], t_s, in_step: 0.0 }];
         let scatter = Scatter { of_values: 5.0, of_all: 5.0 };
-        let needed = |torque_n_m: f64| ln_evidence(&with_friction(&records, torque_n_m), scatter, |_| 1e6);
+        let needed = |torque_n_m: f64| {
+            ln_evidence(&with_friction(&records, torque_n_m), scatter, |_| 1e6, &PriorSettings::default(), 9.0)
+        };
         assert_eq!(needed(0.0), f64::NEG_INFINITY);
         // far more than noise is left: what is needed is not held against its own standard deviation
         assert!(needed(1e-8).is_finite());
-        let not_needed = ln_evidence(&with_friction(&records, 1e-8), scatter, |_| 241.0);
+        let not_needed =
+            ln_evidence(&with_friction(&records, 1e-8), scatter, |_| 241.0, &PriorSettings::default(), 9.0);
         assert_eq!(not_needed, f64::NEG_INFINITY);
     }
 }

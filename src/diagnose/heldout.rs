@@ -2,74 +2,121 @@
 
 use rayon::prelude::*;
 
-use super::ground::{Ground, Hypothesis};
-use super::growing;
+use super::context::{FitContext, without_errors_in_step};
+use super::hypothesis::Hypothesis;
+use super::misfit::{is_beyond_noise, leaves_more_than_noise};
+use super::posterior::{Posterior, weigh};
 use super::refit::Refit;
-use super::verdict::leaves_more_than_noise;
-use crate::fit::{Belief, Record};
+use super::search::horizon::continued_alone;
+use crate::fit::{Belief, Problem, Record, Residuals, residuals_of};
 
-/// Part of a recording that is fitted; the rest is predicted.
-const FITTED: f64 = 2.0 / 3.0;
 /// A frozen coefficient may move by this part of itself.
 const FROZEN: f64 = 1e-9;
 
-/// Root mean square errors of what was not fitted.
+/// What was not fitted, predicted.
 #[derive(Debug, Clone, PartialEq)]
 pub struct HeldOut {
     /// The recording that was predicted.
     pub record: usize,
     /// From which stamp on it was not fitted.
     pub from_s: f64,
-    /// By the base model, each angle.
-    pub baseline_rad: Vec<f64>,
+    /// By the base model.
+    pub baseline: Prediction,
     /// By the model with the effects named.
-    pub augmented_rad: Vec<f64>,
+    pub augmented: Prediction,
+}
+
+/// What one model leaves of it.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Prediction {
+    /// Root mean square error of each angle, of what was not fitted.
+    pub rmse_rad: Vec<f64>,
+    /// What is left of the whole recording, where a part of it was fitted.
+    pub left: Option<Residuals>,
 }
 
 impl HeldOut {
     /// What the names leave, as a part of what the base model leaves: root mean squares of all angles.
     pub fn leaves(&self) -> f64 {
-        let square = |of: &[f64]| of.iter().map(|r| r * r).sum::<f64>();
-        (square(&self.augmented_rad) / square(&self.baseline_rad).max(1e-300)).sqrt()
+        let square = |of: &Prediction| of.rmse_rad.iter().map(|r| r * r).sum::<f64>();
+        (square(&self.augmented) / square(&self.baseline).max(1e-300)).sqrt()
+    }
+}
+
+/// The posterior, or that with fewer effects unless a further one predicts what was not fitted much better; and its proof. Where the model's own error is far
+/// above the noise, that of what was fitted always falls.
+pub fn borne_out<'a>(
+    context: &FitContext<'a>,
+    posterior: Posterior<'a>,
+    fits: Vec<Refit<'a>>,
+    effects: usize,
+    from_s: Option<f64>,
+) -> (Posterior<'a>, Option<HeldOut>) {
+    let settings = context.settings;
+    let most = settings.search.main_effects;
+    let best = posterior.best();
+    let fewer = (best.hypothesis.effects.len() > most && is_beyond_noise(best, &settings.noise)).then(|| {
+        let few = fits.into_iter().filter(|fit| fit.hypothesis.effects.len() <= most);
+        weigh(few.collect(), effects, settings)
+    });
+    let named: Vec<&Refit<'a>> = std::iter::once(&posterior).chain(&fewer).map(Posterior::best).collect();
+    let mut proofs = held_out(context, posterior.base(), &named, from_s).into_iter();
+    let proof = proofs.next().flatten();
+    let leaves = |proof: &Option<HeldOut>| proof.as_ref().map_or(f64::INFINITY, HeldOut::leaves);
+    match (fewer, proofs.next().flatten()) {
+        (Some(fewer), other) if leaves(&proof) > settings.verdict.borne_out * leaves(&other) => (fewer, other),
+        _ => (posterior, proof),
     }
 }
 
 /// Predicts, by the base model and by each of some fits, the last third of a single recording from the first two; of several, the last recording from the others,
 /// of which only the start is then fitted. `from_s` moves the border of a single one.
-pub fn held_out(
-    ground: &Ground<'_>,
+fn held_out(
+    context: &FitContext<'_>,
     null: &Refit<'_>,
     fits: &[&Refit<'_>],
     from_s: Option<f64>,
 ) -> Vec<Option<HeldOut>> {
-    if ground.records.len() > 1 { across(ground, null, fits) } else { along(ground, null, fits, from_s) }
+    // a prediction is held against what was seen, whoever erred
+    let null = &plain(null);
+    let fits: Vec<Refit<'_>> = fits.iter().map(|fit| plain(fit)).collect();
+    if context.records.len() > 1 { across(context, null, &fits) } else { along(context, null, &fits, from_s) }
 }
 
-fn along(ground: &Ground<'_>, null: &Refit<'_>, fits: &[&Refit<'_>], from_s: Option<f64>) -> Vec<Option<HeldOut>> {
-    let record = &ground.records[0];
+/// The same judged without errors in step with the swing; what it left is no more known.
+fn plain<'a>(fit: &Refit<'a>) -> Refit<'a> {
+    let mut fit = fit.clone();
+    fit.problem.noise = without_errors_in_step(&fit.problem.noise);
+    fit
+}
+
+fn along(context: &FitContext<'_>, null: &Refit<'_>, fits: &[Refit<'_>], from_s: Option<f64>) -> Vec<Option<HeldOut>> {
+    let record = &context.records[0];
     let (first_s, last_s) = (record.t_s[0], record.t_s[record.len() - 1]);
-    let border_s = from_s.unwrap_or(first_s + FITTED * (last_s - first_s));
+    let border_s = from_s.unwrap_or(first_s + context.settings.verdict.fitted * (last_s - first_s));
     let rows = record.t_s.partition_point(|t| *t < border_s);
     if rows < crate::series::FEWEST_ROWS || rows + crate::series::FEWEST_ROWS > record.len() {
         return vec![None; fits.len()];
     }
     let early = [record.until(rows)];
-    let part = ground.on(&early);
+    let part = context.on(&early);
     let predicted = |fit: &Refit<'_>| {
         let refitted = part.refit(&fit.hypothesis, fit, &[])?;
         // what leaves far more than noise may have lost step between here and there
-        let grown = leaves_more_than_noise(&refitted).then(|| growing::grown_alone(&part, &refitted)).flatten();
+        let grown = leaves_more_than_noise(&refitted, &context.settings.noise);
+        let grown = grown.then(|| continued_alone(&part, &refitted)).flatten();
         let refitted = grown.into_iter().chain([refitted]).min_by(|a, b| a.chi2.total_cmp(&b.chi2))?;
-        let whole = ground.problem(&fit.hypothesis).ok()?;
-        errors(&whole.predict(0, &refitted.x, false).ok()?.values, record, rows)
+        let whole = context.problem(&fit.hypothesis, &fit.problem.noise).ok()?;
+        let rmse_rad = errors(&whole.predict(0, &refitted.x, false).ok()?.values, record, rows)?;
+        Some(Prediction { rmse_rad, left: residuals_of(&whole, &refitted.x, 0).ok() })
     };
     beside_the_base(null, fits, predicted, (0, border_s))
 }
 
-fn across(ground: &Ground<'_>, null: &Refit<'_>, fits: &[&Refit<'_>]) -> Vec<Option<HeldOut>> {
-    let last = ground.records.len() - 1;
-    let others = ground.on(&ground.records[..last]);
-    let alone = ground.on(&ground.records[last..]);
+fn across(context: &FitContext<'_>, null: &Refit<'_>, fits: &[Refit<'_>]) -> Vec<Option<HeldOut>> {
+    let last = context.records.len() - 1;
+    let others = context.on(&context.records[..last]);
+    let alone = context.on(&context.records[last..]);
     let predicted = |fit: &Refit<'_>| {
         let starts = 2 * fit.problem.shapes();
         let hypothesis =
@@ -81,28 +128,31 @@ fn across(ground: &Ground<'_>, null: &Refit<'_>, fits: &[&Refit<'_>]) -> Vec<Opt
         let frozen: Vec<Belief> = (fitted.problem.free.iter().zip(&fitted.x))
             .map(|(p, value)| Belief { parameter: *p, value: *value, sd: FROZEN * value.abs().max(1e-12) })
             .collect();
-        let alone = Ground { beliefs: frozen, ..alone.clone() };
-        let mut start = fitted.clone();
+        let alone = FitContext { beliefs: frozen, ..alone.clone() };
+        let noise = vec![fit.problem.noise[last].clone()];
+        let problem = Problem { records: alone.records, noise, ..fitted.problem.clone() };
+        let mut start = Refit { problem, ..fitted.clone() };
         start.x.truncate(fitted.problem.free.len());
         start.x.extend_from_slice(&fit.x[fit.x.len() - starts..]);
         let hypothesis = Hypothesis { dropped: None, ..hypothesis };
         let seen = alone.refit(&hypothesis, &start, &[])?;
-        errors(&seen.problem.predict(0, &seen.x, false).ok()?.values, &ground.records[last], 0)
+        let rmse_rad = errors(&seen.problem.predict(0, &seen.x, false).ok()?.values, &context.records[last], 0)?;
+        Some(Prediction { rmse_rad, left: None })
     };
-    beside_the_base(null, fits, predicted, (last, ground.records[last].t_s[0]))
+    beside_the_base(null, fits, predicted, (last, context.records[last].t_s[0]))
 }
 
 /// What each fit leaves of a recording from a stamp on, beside what the base model does.
 fn beside_the_base(
     null: &Refit<'_>,
-    fits: &[&Refit<'_>],
-    predicted: impl Fn(&Refit<'_>) -> Option<Vec<f64>> + Sync,
+    fits: &[Refit<'_>],
+    predicted: impl Fn(&Refit<'_>) -> Option<Prediction> + Sync,
     (record, from_s): (usize, f64),
 ) -> Vec<Option<HeldOut>> {
-    let of_fits = || fits.par_iter().with_max_len(1).map(|fit| predicted(fit)).collect::<Vec<_>>();
+    let of_fits = || fits.par_iter().with_max_len(1).map(&predicted).collect::<Vec<_>>();
     let (baseline, augmented) = rayon::join(|| predicted(null), of_fits);
-    let proof = |augmented_rad: Option<Vec<f64>>| {
-        Some(HeldOut { record, from_s, baseline_rad: baseline.clone()?, augmented_rad: augmented_rad? })
+    let proof = |augmented: Option<Prediction>| {
+        Some(HeldOut { record, from_s, baseline: baseline.clone()?, augmented: augmented? })
     };
     augmented.into_iter().map(proof).collect()
 }

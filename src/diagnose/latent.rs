@@ -21,9 +21,9 @@
 
 use nalgebra::{DMatrix, DVector};
 
-use super::Place;
+use super::effect::Place;
+use super::linearisation::{Input, Linearisation};
 use super::refit::Refit;
-use super::surroundings::{Input, Surroundings};
 use crate::fit::whitening::{Colour, IN_STEP_SHAPES, RecordNoise, in_step_shapes};
 use crate::statistics::median_step_s;
 
@@ -40,7 +40,7 @@ const SIZE_FACTOR: f64 = 3.0;
 pub enum Form {
     /// Any smooth course in time.
     Course(Input),
-    /// Any law of the state at a place ([`super::any_law`]).
+    /// Any law of the state at a place ([`super::basis_law`]).
     Law(Place),
 }
 
@@ -112,7 +112,7 @@ struct Seen {
 
 /// The filter for one recording and input.
 pub struct Filter<'a> {
-    around: &'a Surroundings,
+    around: &'a Linearisation,
     /// Of the noise, over what was thought.
     variance: f64,
     /// Of the recording.
@@ -161,7 +161,7 @@ impl<'a> Filter<'a> {
     pub fn new(
         fit: &'a Refit<'_>,
         record: usize,
-        (around, variance): (&'a Surroundings, f64),
+        (around, variance): (&'a Linearisation, f64),
         input: Input,
         Assumed { beyond, memory }: Assumed,
     ) -> Option<Self> {

@@ -1,248 +1,197 @@
 //! What the model lacks: where simulation and recording differ, the physics left out, and the proof that it was that.
 //!
-//! | file | holds |
-//! |---|---|
-//! | [`cause`] | the table of effects |
-//! | [`noise`] | the noise, from where the motion has no power |
-//! | [`ground`] | what all fits share, and the ways to make one |
-//! | [`refit`] | the base model with some effects, fitted |
-//! | [`dropped`] | at which instant frames are missing |
-//! | [`hysteresis`] | where its fit starts, and in which variables |
-//! | [`pieces`] | how many rods stand for a strip |
-//! | [`screen`] | which would lower the residuals |
-//! | [`preparation`] | outliers, noise, where the base model's descent starts |
-//! | [`search`] | the way through what follows, with the file at its word or loosely |
-//! | [`selection`] | which are fitted in full |
-//! | [`single`] | one effect beside a fit, from every start that may lead to it |
-//! | [`fine_strip`] | a strip that bends everywhere, as finely as it needs |
-//! | [`second_look`] | from further starts, where much is left |
-//! | [`growing`] | from the beginning of the recordings on, where still more is |
-//! | [`stepwise`] | more effects than two |
-//! | [`evidence`] | how probable each is |
-//! | [`surroundings`] | what a small torque would have done |
-//! | [`latent`] | the unknown torque, of any course |
-//! | [`any_law`] | the same, as a law of any form |
-//! | [`torque`] | its course |
-//! | [`energy`] | the work of the laws |
-//! | [`locate`] | place, time, amplitude, phase |
-//! | [`verdict`] | the answer, its class, what would decide |
-//! | [`heldout`] | the proof |
-//! | [`mod@adequacy`] | is the base model enough? |
-//! | [`plan`] | the same before an experiment |
+//! | step | | files |
+//! |---|---|---|
+//! | 1 | the recordings are prepared: outliers, noise, where the base model's descent starts | [`preparation`] |
+//! | 2 | the base model is fitted | [`base`], [`context`], [`refit`], [`descents`], [`noise`], [`learnt_noise`] |
+//! | 3 | what it lacks is sought: effects are proposed, fitted, kept | [`mod@search`], [`screen`], [`misfit`], [`laws`] |
+//! | 4 | a strip's rods are counted | [`rods`] |
+//! | 5 | the hypotheses are weighed, beside something that is not in the table | [`posterior`], [`evidence`], [`unknowns`], [`latent`], [`basis_law`] |
+//! | 6 | in doubt the search goes on, and they are weighed again | [`mod@search`], [`search::horizon`] |
+//! | 7 | what was not fitted is predicted | [`heldout`] |
+//! | 8 | the base model is judged, and what could have been seen | [`adequacy`] |
+//! | 9 | the verdict: the answer, its class, what would decide | [`verdict`] |
+//! | 10 | place, time, amplitude and phase are found, and all of it told | [`locate`], [`torque`], [`energy`], [`findings`], [`words`], [`report`] |
+//!
+//! The table of effects is [`effect`], every threshold stands in [`settings`], and [`plan`] asks the same before an experiment. A file imports only from files that
+//! stand before it: [`settings`], [`effect`], [`hypothesis`] and [`context`] import nothing of what follows.
 
 pub mod adequacy;
-pub mod any_law;
-pub mod cause;
-pub mod dropped;
+pub mod base;
+pub mod basis_law;
+pub mod context;
+pub mod descents;
+pub mod effect;
 pub mod energy;
 pub mod evidence;
-pub mod fine_strip;
-pub mod ground;
-pub mod growing;
+pub mod findings;
 pub mod heldout;
-pub mod hysteresis;
+pub mod hypothesis;
 pub mod latent;
+pub mod laws;
+pub mod learnt_noise;
+pub mod linearisation;
 pub mod locate;
+pub mod misfit;
 pub mod noise;
-pub mod pieces;
 pub mod plan;
+pub mod posterior;
 pub mod preparation;
 pub mod refit;
+pub mod report;
+pub mod rods;
 pub mod screen;
 pub mod search;
-pub mod second_look;
-pub mod selection;
-pub mod single;
-pub mod stepwise;
-pub mod surroundings;
+pub mod settings;
 pub mod torque;
+pub mod unknowns;
 pub mod verdict;
+pub mod words;
+
+use std::sync::OnceLock;
 
 use crate::error::Result;
 use crate::experiment::Experiment;
+use crate::fit::Record;
 use crate::progress::Progress;
-use search::Found;
+use base::Taken;
+use findings::Findings;
+use posterior::Posterior;
+use search::Search;
 
 pub use adequacy::Detectable;
-pub use cause::{Cause, Place};
-pub use ground::{Ground, Hypothesis};
-pub use heldout::HeldOut;
-pub use latent::{Assumed, Beyond, Form, Latent};
-pub use locate::Departure;
+pub use effect::{Effect, Phase, Place};
 pub use plan::{Plan, planned};
-pub use preparation::{Prepared, prepare};
-pub use refit::Refit;
-pub use torque::{MissingTorque, Phase};
-pub use verdict::{Status, Verdict, Weighed, Weighing};
-
-/// Effects that an answer has at first, those that explain most; further ones stand beside them.
-pub const MAIN_EFFECTS: usize = 2;
-/// Where far more than noise is left, a further one must leave at most this part of what they do of what was not fitted.
-const BORNE_OUT: f64 = 0.9;
-/// What is at least this probable counts.
-const EVEN: f64 = 0.5;
-/// Everything a diagnosis says.
-#[derive(Debug)]
-pub struct Diagnosis<'a> {
-    /// The hypotheses, likeliest first.
-    pub weighed: Vec<Weighed<'a>>,
-    /// The unknown around the likeliest one, at each place, likeliest first.
-    pub unknowns: Vec<Latent>,
-    /// Root mean square of the torque of the likeliest one's effects (N·m).
-    pub added_torque_n_m: f64,
-    /// The verdict.
-    pub verdict: Verdict,
-    /// Where and when the base model departs.
-    pub departure: Departure,
-    /// Where the unknown acts, where it is at least as likely as any name.
-    pub unknown_at: Option<Place>,
-    /// The torque that the base model lacks, there or where it explains most.
-    pub missing_torque: Option<MissingTorque>,
-    /// Share of hinge, joint and air in the energy lost, by the likeliest model.
-    pub energy_shares: [f64; 3],
-    /// The prediction of what was not fitted.
-    pub held_out: Option<HeldOut>,
-    /// What could have been seen.
-    pub detectable: Vec<Detectable>,
-    /// p of the base model.
-    pub p_value: f64,
-    /// What all fits share: the noise, and how much of it is correlated from row to row.
-    pub ground: Ground<'a>,
-}
-
-impl<'a> Diagnosis<'a> {
-    /// The base model.
-    pub fn null(&self) -> &Refit<'a> {
-        base_model(&self.weighed)
-    }
-
-    /// The part of what the base model leaves beyond the noise that the named fit explains.
-    pub fn explained(&self) -> f64 {
-        let values: usize = self.null().problem.records.iter().map(|r| r.values(0..r.len())).sum();
-        let beyond = |fit: &Refit<'_>| (fit.chi2 - values as f64).max(0.0);
-        1.0 - beyond(self.named()) / beyond(self.null()).max(1.0)
-    }
-
-    /// The effects named, the one that explains most first.
-    pub fn named_effects(&self) -> Vec<Cause> {
-        by_what_they_explain(&self.weighed, self.named())
-    }
-
-    /// Where what is missing acts.
-    pub fn place(&self) -> Option<Place> {
-        match self.verdict.status {
-            Status::Adequate => None,
-            _ => self.unknown_at.or_else(|| self.named_effects().first().map(|cause| cause.place())),
-        }
-    }
-
-    /// The fit that the verdict names; the likeliest of the table where something else is at work; the base model where that is enough.
-    pub fn named(&self) -> &Refit<'a> {
-        match self.verdict.status {
-            Status::Adequate => self.null(),
-            _ => &self.weighed[0].fit,
-        }
-    }
-}
+pub use report::{Diagnosis, Drawn};
+pub use settings::Settings;
+pub use torque::MissingTorque;
+pub use verdict::Status;
 
 /// What may be asked of a diagnosis.
-#[derive(Debug, Clone, Copy, Default, PartialEq)]
+#[derive(Debug, Clone, Default)]
 pub struct Options {
     /// Recordings made anew from the base model and fitted, to judge it by; with none, residuals are made anew to first order.
     pub bootstraps: usize,
     /// The stamp from which on a single recording is predicted; two thirds through it otherwise.
     pub predict_from_s: Option<f64>,
+    /// Thresholds.
+    pub settings: Settings,
 }
 
 /// Diagnoses recordings of one specimen.
 ///
 /// # Errors
 /// [`crate::error::Error::Simulation`] where the specimen cannot swing, or no motion near the start values follows the recording.
-pub fn diagnose<'a>(
-    prepared: &'a Prepared,
-    experiment: &'a Experiment,
+pub fn diagnose(
+    records: &[Record],
+    experiment: &Experiment,
     options: &Options,
     progress: &dyn Progress,
-) -> Result<Diagnosis<'a>> {
-    let mut found = search::at_its_word(prepared, experiment, progress)?;
-    let weigh = |found: &Found<'a>| {
-        verdict::weigh(found.fits.clone(), found.ground.values(), found.causes.len(), |fit, variance| {
-            (locate::unknowns(fit, variance, Assumed::BESIDE), energy::added_torque_n_m(fit))
-        })
-    };
+) -> Result<Diagnosis> {
+    let (settings, counted) = (&options.settings, OnceLock::new());
+    // 1. the recordings
+    let prepared = preparation::prepare(records, experiment, settings)?;
+    // 2. the base model
+    let mut search = Search::of_base_model(&prepared, &prepared.experiment, Taken::AtItsWord, settings, progress)?;
+    // 3. what it lacks
+    search.run();
+    // 4. a strip's rods
+    let search = search.recounted(&counted)?;
+    // 5. how probable each hypothesis is
     progress.begin("weighing", None);
-    let mut answer = weigh(&found);
-    // a strip's fits are too dear to be followed from the beginning
-    if !found.ground.is_strip() && (answer.unknown > EVEN || found.leaves_more_than_noise()) {
-        found = search::doubted(prepared, experiment, found, progress);
-        answer = weigh(&found);
-    }
-    let best = &answer.weighed[0].fit;
-    let fewer = (best.hypothesis.causes.len() > MAIN_EFFECTS && verdict::is_beyond_noise(best)).then(|| {
-        found.fits.retain(|fit| fit.hypothesis.causes.len() <= MAIN_EFFECTS);
-        weigh(&found)
-    });
-    let Found { ground, causes, .. } = found;
+    let posterior = posterior::weigh(search.fits.clone(), search.effects.len(), settings);
+    // 6. in doubt, further
+    let (search, posterior) = if is_in_doubt(&search, &posterior, settings) {
+        let search = search.doubted();
+        let posterior = posterior::weigh(search.fits.clone(), search.effects.len(), settings);
+        (search, posterior)
+    } else {
+        (search, posterior)
+    };
+    let Search { context, effects, fits, rounds, undecided, .. } = search;
+    // 7. what was not fitted
     progress.begin("proof", None);
-    let (proofs, adequacy) = {
-        let null = base_model(&answer.weighed);
-        let named: Vec<&Refit<'a>> = std::iter::once(&answer).chain(&fewer).map(|a| &a.weighed[0].fit).collect();
-        rayon::join(
-            || heldout::held_out(&ground.plain(), null, &named, options.predict_from_s),
-            || adequacy::adequacy(&ground, null, &causes, options.bootstraps, progress),
-        )
-    };
-    let (Weighing { weighed, unknown, unknowns }, held_out) = borne_out(answer, fewer, proofs);
-    let marks = ground.records[0].links();
-    let null = base_model(&weighed);
-    let best = &weighed[0].fit;
-    let verdict = Verdict::of(&weighed, unknown, marks, held_out.as_ref());
-    let of_nearest = by_what_they_explain(&weighed, best).first().map(|cause| cause.place());
-    let unknown_at = if verdict.leaves_it_open() { locate::place_of_all(null, of_nearest) } else { None };
-    Ok(Diagnosis {
-        verdict,
+    let (posterior, held_out) = heldout::borne_out(&context, posterior, fits, effects.len(), options.predict_from_s);
+    // 8. the base model by itself
+    let adequacy = adequacy::adequacy(&context, posterior.base(), &effects, options.bootstraps, progress);
+    // 9. the verdict
+    let verdict = verdict::Verdict::of(&posterior, context.marks(), held_out.as_ref(), settings);
+    // 10. where, when and how
+    let unknown_at = verdict.leaves_it_open().then(|| locate::place_of_unknown(&posterior, settings)).flatten();
+    let findings = Findings {
+        departure: locate::departure(posterior.base()),
+        missing_torque: torque::missing(posterior.best(), posterior.base(), unknown_at),
         unknown_at,
-        departure: locate::departure(null),
-        missing_torque: torque::missing(best, null, unknown_at),
-        added_torque_n_m: energy::added_torque_n_m(best),
-        energy_shares: energy::energy_shares(best),
-        p_value: adequacy.p_value,
-        detectable: adequacy.detectable,
+        context,
+        posterior,
+        verdict,
         held_out,
-        unknowns,
-        weighed,
-        ground,
-    })
-}
-
-/// The answer, or that with fewer effects unless the further one predicts what was not fitted much better; and its proof. Where the model's own error is far
-/// above the noise, that of what was fitted always falls.
-fn borne_out<'a>(
-    answer: Weighing<'a>,
-    fewer: Option<Weighing<'a>>,
-    proofs: Vec<Option<HeldOut>>,
-) -> (Weighing<'a>, Option<HeldOut>) {
-    let mut proofs = proofs.into_iter();
-    let proof = proofs.next().flatten();
-    let leaves = |proof: &Option<HeldOut>| proof.as_ref().map_or(f64::INFINITY, HeldOut::leaves);
-    match (fewer, proofs.next().flatten()) {
-        (Some(fewer), other) if leaves(&proof) > BORNE_OUT * leaves(&other) => (fewer, other),
-        _ => (answer, proof),
-    }
-}
-
-/// The base model's fit, which every selection holds.
-fn base_model<'w, 'a>(weighed: &'w [Weighed<'a>]) -> &'w Refit<'a> {
-    weighed.iter().find(|w| w.fit.hypothesis.causes.is_empty()).map_or(&weighed[0].fit, |w| &w.fit)
-}
-
-/// A fit's effects, the one that explains most first: without which it would be worst.
-fn by_what_they_explain(weighed: &[Weighed<'_>], fit: &Refit<'_>) -> Vec<Cause> {
-    let mut causes = fit.hypothesis.causes.clone();
-    let left_without = |cause: &Cause| {
-        let others: Vec<Cause> = fit.hypothesis.causes.iter().copied().filter(|c| c != cause).collect();
-        weighed.iter().find(|w| w.fit.hypothesis.causes == others).map_or(f64::INFINITY, |w| w.fit.chi2)
+        adequacy,
+        rounds,
+        undecided,
     };
-    causes.sort_by(|a, b| left_without(b).total_cmp(&left_without(a)));
-    causes
+    Ok(Diagnosis::of(&findings, &experiment.specimen.name))
+}
+
+/// Whether something unknown is likelier than not, or far more than noise is left. (A strip's fits are too dear to be followed from the beginning.)
+fn is_in_doubt(search: &Search<'_, '_>, posterior: &Posterior<'_>, settings: &Settings) -> bool {
+    !search.context.is_strip() && (posterior.unknown > settings.verdict.even || search.leaves_more_than_noise())
+}
+
+#[cfg(test)]
+mod tests {
+    use std::collections::BTreeMap;
+    use std::fs;
+    use std::path::Path;
+
+    /// The modules of a folder, each with those of the same crate's `diagnose` that it imports.
+    fn imports() -> BTreeMap<String, Vec<String>> {
+        let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("src/diagnose");
+        let mut files = Vec::new();
+        for folder in ["", "laws", "search"] {
+            for entry in fs::read_dir(root.join(folder)).unwrap() {
+                let path = entry.unwrap().path();
+                let name = path.file_stem().unwrap().to_str().unwrap().to_owned();
+                if path.is_file() {
+                    let name = if name == "mod" { folder.to_owned() } else { name };
+                    files.push((name, fs::read_to_string(&path).unwrap()));
+                }
+            }
+        }
+        let names: Vec<String> = files.iter().map(|(name, _)| name.clone()).filter(|name| !name.is_empty()).collect();
+        let imported = |text: &str, own: &str| {
+            let text = text.split("#[cfg(test)]").next().unwrap_or(text);
+            let uses: String = text.lines().filter(|line| line.starts_with("use ") && line.contains("super")).collect();
+            let words: Vec<&str> = uses.split(|c: char| !c.is_alphanumeric() && c != '_').collect();
+            names.iter().filter(|name| words.contains(&name.as_str()) && *name != own).cloned().collect()
+        };
+        let named = files.iter().filter(|(name, _)| !name.is_empty());
+        named.map(|(name, text)| (name.clone(), imported(text, name))).collect()
+    }
+
+    #[test]
+    fn no_file_is_imported_by_what_it_imports() {
+        let mut left = imports();
+        assert!(left.len() > 20 && left["refit"].contains(&"hypothesis".to_owned()), "{left:?}");
+        // a folder's own file and its parts are one
+        for (part, whole) in [("beside", "search"), ("horizon", "search"), ("proposal", "search"), ("rounds", "search")]
+        {
+            left.get_mut(part).unwrap().retain(|import| import != whole);
+        }
+        for part in ["bending", "hysteresis", "missing_frames", "moving_support", "ordinary"] {
+            left.get_mut(part).unwrap().retain(|import| import != "laws");
+        }
+        loop {
+            let free: Vec<String> = left
+                .iter()
+                .filter(|(_, imports)| imports.iter().all(|i| !left.contains_key(i)))
+                .map(|f| f.0.clone())
+                .collect();
+            if free.is_empty() {
+                break;
+            }
+            free.iter().for_each(|name| _ = left.remove(name));
+        }
+        assert!(left.is_empty(), "these import each other: {left:?}");
+    }
 }

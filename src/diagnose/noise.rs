@@ -11,38 +11,22 @@
 use rustfft::FftPlanner;
 use rustfft::num_complex::Complex;
 
+use super::settings::NoiseSettings;
 use crate::fit::whitening::Colour;
 use crate::statistics::{median, median_step_s};
 
-/// A frequency belongs to the motion where the motion has more than this part of its largest power, and as much of it as the residual may hold would be more
-/// than this part of the noise…
-const MOTION: f64 = 1e-7;
-const LEAKS: f64 = 0.1;
-/// … or lies this many bins from such a one.
+/// A frequency that lies this many bins from one that belongs to the motion belongs to it.
 const BINS: usize = 4;
 /// The first bin that an offset does not reach: after a Hann window it lies in those of zero and one. A tilt, a curl or a side force is no slow noise.
 const PAST_ZERO: usize = 2;
-/// A line of the residual's own has this many times the power of so many frequencies to either side.
-const LINE: f64 = 25.0;
+/// Frequencies to either side with which a line is compared.
 const AROUND: usize = 12;
-/// Part of the frequencies that has to be left.
-const ENOUGH: f64 = 0.15;
 /// Noise that goes on must be the same in so many parts of a recording.
 const PARTS: usize = 3;
 /// Times tried for which noise goes on, in rows: from the shortest by a factor each.
 const ROWS: (f64, f64, usize) = (0.3, 1.12, 48);
-/// Of noise that goes on the frequencies off the lines tell only a part: its variance is at most this multiple of the residual's.
-const MOST: f64 = 1.2;
 /// Shares of the variance tried that go on.
 const SHARES: usize = 20;
-/// Less than this is none: ln-likelihood that colour must gain, and white noise beside it.
-pub(super) const COLOURED: f64 = 6.0;
-const BESIDE: f64 = 3.0;
-
-/// Where the best of the table leaves this many times the noise, noise is no yardstick for the model any more.
-pub(super) const BEYOND_NOISE: f64 = 5.0;
-/// Two angles' noise goes together where their correlation is this many times what chance makes of it.
-const TOGETHER: f64 = 4.0;
 
 /// Noise of one angle.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -55,9 +39,9 @@ pub struct Noise {
 
 /// How far the noise of two angles goes together: the correlation of their residuals at frequencies at which neither swings; zero where that is no more
 /// than chance, or where they swing nearly everywhere. Each is given as its residual and its motion.
-pub fn across([first, second]: [(&[f64], &[f64]); 2]) -> f64 {
+pub fn across([first, second]: [(&[f64], &[f64]); 2], settings: &NoiseSettings) -> f64 {
     let (a, b) = (transform(first.0), transform(second.0));
-    let between = |noise: &[Complex<f64>], motion: &[f64]| Lines::of(motion)?.between(&power(noise));
+    let between = |noise: &[Complex<f64>], motion: &[f64]| Lines::of(motion)?.between(&power(noise), settings);
     let (Some(one), Some(other)) = (between(&a, first.1), between(&b, second.1)) else { return 0.0 };
     let free: Vec<usize> = one.into_iter().filter(|k| other.binary_search(k).is_ok()).collect();
     let (mut both, mut powers) = (0.0, [0.0; 2]);
@@ -66,7 +50,7 @@ pub fn across([first, second]: [(&[f64], &[f64]); 2]) -> f64 {
         powers = [powers[0] + a[*k].norm_sqr(), powers[1] + b[*k].norm_sqr()];
     }
     let together = both / (powers[0] * powers[1]).sqrt().max(1e-300);
-    if together.abs() > TOGETHER / (free.len().max(1) as f64).sqrt() { together } else { 0.0 }
+    if together.abs() > settings.together / (free.len().max(1) as f64).sqrt() { together } else { 0.0 }
 }
 
 /// At which tick of an even clock each stamp is. Rows are missing where it skips some; where more would be missing than there are, each row is a tick.
@@ -82,20 +66,20 @@ pub fn ticks(t_s: &[f64]) -> Vec<usize> {
 }
 
 /// The noise in a residual, given the motion it is the residual of; missing rows are zero in both. `None` where the motion has power nearly everywhere.
-pub fn off_the_lines(residual: &[f64], motion: &[f64]) -> Option<Noise> {
+pub fn off_the_lines(residual: &[f64], motion: &[f64], settings: &NoiseSettings) -> Option<Noise> {
     let present = residual.iter().filter(|r| **r != 0.0).count() as f64 / residual.len() as f64;
-    let seen = Between::of(residual, motion)?;
+    let seen = Between::of(residual, motion, settings)?;
     let length = residual.len().div_ceil(PARTS);
     let parts: Vec<Between> =
-        residual.chunks(length).zip(motion.chunks(length)).filter_map(|(r, m)| Between::of(r, m)).collect();
+        residual.chunks(length).zip(motion.chunks(length)).filter_map(|(r, m)| Between::of(r, m, settings)).collect();
     // what comes once, as a gust does or a jump of the clock, or fades, as a joint that settles, is no noise: without the part that says most for it the others
     // must say so, too
     let throughout = |colour: Colour| {
         let gains: Vec<f64> = parts.iter().map(|part| part.gains(colour)).collect();
-        gains.len() < PARTS || gains.iter().sum::<f64>() > gains.iter().copied().fold(0.0, f64::max) + BESIDE
+        gains.len() < PARTS || gains.iter().sum::<f64>() > gains.iter().copied().fold(0.0, f64::max) + settings.beside
     };
     // there is no more noise than there is residual
-    let most = MOST * residual.iter().map(|r| r * r).sum::<f64>() / residual.len() as f64;
+    let most = settings.most * residual.iter().map(|r| r * r).sum::<f64>() / residual.len() as f64;
     let likeliest = |colours: &mut dyn Iterator<Item = Colour>| {
         let fitted = colours.map(|colour| (colour, seen.likelihood(colour))).filter(|(_, (_, v))| *v < most);
         fitted.max_by(|a, b| a.1.0.total_cmp(&b.1.0))
@@ -104,12 +88,12 @@ pub fn off_the_lines(residual: &[f64], motion: &[f64]) -> Option<Noise> {
     let rhos: Vec<f64> = (0..steps).map(|k| (-1.0 / (shortest * factor.powi(k as i32))).exp()).collect();
     let mut best = (Colour::default(), seen.likelihood(Colour::default()));
     let alone = likeliest(&mut rhos.iter().map(|rho| Colour { rho: *rho, share: 1.0 }));
-    if let Some(alone) = alone.filter(|alone| alone.1.0 > best.1.0 + COLOURED && throughout(alone.0)) {
+    if let Some(alone) = alone.filter(|alone| alone.1.0 > best.1.0 + settings.coloured && throughout(alone.0)) {
         best = alone;
     }
     let shares = (1..SHARES).map(|k| k as f64 / SHARES as f64);
     let beside = likeliest(&mut shares.flat_map(|share| rhos.iter().map(move |rho| Colour { rho: *rho, share })));
-    let more = if best.0.is_white() { COLOURED } else { BESIDE };
+    let more = if best.0.is_white() { settings.coloured } else { settings.beside };
     if let Some(beside) = beside.filter(|beside| beside.1.0 > best.1.0 + more && throughout(beside.0)) {
         best = beside;
     }
@@ -123,10 +107,10 @@ struct Between {
 }
 
 impl Between {
-    fn of(residual: &[f64], motion: &[f64]) -> Option<Self> {
+    fn of(residual: &[f64], motion: &[f64], settings: &NoiseSettings) -> Option<Self> {
         let power = spectrum(residual);
         let angle_rad = |k: usize| std::f64::consts::PI * k as f64 / (power.len() - 1) as f64;
-        let free = Lines::of(motion)?.between(&power)?;
+        let free = Lines::of(motion)?.between(&power, settings)?;
         Some(Self { powers: free.into_iter().map(|k| (angle_rad(k).cos(), power[k])).collect() })
     }
 
@@ -165,17 +149,17 @@ impl Lines {
 
     /// The frequencies at which neither the motion has power nor the residual, of whose spectrum this is, a line of its own, in order; `None` where few are
     /// left.
-    fn between(&self, noise: &[f64]) -> Option<Vec<usize>> {
+    fn between(&self, noise: &[f64], settings: &NoiseSettings) -> Option<Vec<usize>> {
         let Self { power: lines, peak } = self;
         let near = |k: usize| k.saturating_sub(BINS)..(k + BINS + 1).min(lines.len());
         // as much of the motion as the residual has where that is strongest, it may have everywhere: it must stay below the noise
         let least = usual(&mut noise[1..].to_vec())?;
         let share =
             noise[near(*peak)].iter().sum::<f64>() / lines[near(*peak)].iter().sum::<f64>().max(f64::MIN_POSITIVE);
-        let bound = (MOTION * lines[*peak]).max(LEAKS * least / share);
+        let bound = (settings.motion * lines[*peak]).max(settings.leaks * least / share);
         let of_motion = |k: usize| lines[near(k)].iter().any(|p| *p > bound);
         let free: Vec<usize> = (PAST_ZERO..noise.len()).filter(|k| !of_motion(*k)).collect();
-        if (free.len() as f64) < ENOUGH * noise.len() as f64 {
+        if (free.len() as f64) < settings.enough * noise.len() as f64 {
             return None;
         }
         // a line that the motion does not have, as of a moving support, must not count as noise
@@ -183,7 +167,7 @@ impl Lines {
         let stands_out = |i: usize| {
             let first = i.saturating_sub(AROUND).min(power.len().saturating_sub(2 * AROUND + 1));
             let around = &power[first..power.len().min(first + 2 * AROUND + 1)];
-            usual(&mut around.to_vec()).is_some_and(|usual| power[i] > LINE * usual)
+            usual(&mut around.to_vec()).is_some_and(|usual| power[i] > settings.line * usual)
         };
         Some((0..free.len()).filter(|i| !stands_out(*i)).map(|i| free[i]).collect())
     }
@@ -244,7 +228,7 @@ mod tests {
             })
             .collect();
         let motion: Vec<f64> = (0..1800).map(|i| 0.5 * swing(i, 0.0)).collect();
-        off_the_lines(&residual, &motion)
+        off_the_lines(&residual, &motion, &NoiseSettings::default())
     }
 
     #[test]
@@ -263,10 +247,10 @@ mod tests {
             (0..1800).map(|i| 1e-4 * (seen[i][link + 1] - seen[i][link]) + 0.02 * motion[i]).collect()
         };
         let (first, second) = (left(0), left(1));
-        let found = across([(&first, &motion), (&second, &motion)]);
+        let found = across([(&first, &motion), (&second, &motion)], &NoiseSettings::default());
         assert!((found + 0.5).abs() < 0.06, "{found}");
         let other: Vec<f64> = (0..1800).map(|i| 1e-4 * seen[(i + 900) % 1800][0]).collect();
-        assert_eq!(across([(&first, &motion), (&other, &motion)]), 0.0);
+        assert_eq!(across([(&first, &motion), (&other, &motion)], &NoiseSettings::default()), 0.0);
     }
 
     #[test]
@@ -289,7 +273,7 @@ mod tests {
             })
             .collect();
         let motion: Vec<f64> = (0..3600).map(|i| (-3e-4 * f64::from(i)).exp() * (0.08 * f64::from(i)).cos()).collect();
-        let noise = off_the_lines(&residual, &motion).unwrap();
+        let noise = off_the_lines(&residual, &motion, &NoiseSettings::default()).unwrap();
         assert!((noise.colour.rho - rho).abs() < 0.02 && (noise.colour.share - share).abs() < 0.1, "{noise:?}");
         assert!((noise.sd / 4e-3 - 1.0).abs() < 0.12, "{noise:?}");
     }
@@ -305,7 +289,7 @@ mod tests {
                     2e-3 * white + 5e-4
                 })
                 .collect();
-            off_the_lines(&residual, &motion).unwrap().colour.is_white()
+            off_the_lines(&residual, &motion, &NoiseSettings::default()).unwrap().colour.is_white()
         };
         let coloured = (0..50).filter(|seed| !is_white(*seed)).count();
         assert!(coloured <= 2, "{coloured} of 50");
@@ -322,7 +306,7 @@ mod tests {
             })
             .collect();
         let motion: Vec<f64> = (0..600).map(|i| 0.5 * (0.4 * f64::from(i)).cos()).collect();
-        let noise = off_the_lines(&residual, &motion).unwrap();
+        let noise = off_the_lines(&residual, &motion, &NoiseSettings::default()).unwrap();
         assert!(noise.colour.rho < 0.5, "{noise:?}");
     }
 
@@ -338,7 +322,7 @@ mod tests {
             })
             .collect();
         let motion: Vec<f64> = (0..1320).map(|i| 0.9 * (0.107 * f64::from(i)).cos()).collect();
-        let noise = off_the_lines(&residual, &motion).unwrap();
+        let noise = off_the_lines(&residual, &motion, &NoiseSettings::default()).unwrap();
         assert!(noise.colour.rho < 0.5, "{noise:?}");
     }
 

@@ -1,10 +1,12 @@
 //! Before an experiment: what a planned recording could show, and what it could tell apart.
 
-use super::Cause;
 use super::adequacy::{Detectable, detectable};
-use super::ground::{Ground, Hypothesis};
+use super::base::{Taken, base_of, candidates};
+use super::context::FitContext;
+use super::hypothesis::Hypothesis;
+use super::laws;
 use super::screen::Screen;
-use super::search::{Taken, base_of};
+use super::settings::Settings;
 use crate::error::{Error, Result};
 use crate::experiment::Experiment;
 use crate::fit::Record;
@@ -30,27 +32,28 @@ pub struct Plan {
 pub fn planned(experiment: &Experiment, plan: &Plan) -> Result<Vec<Detectable>> {
     let record = [recorded(experiment, plan)?];
     let marks = record[0].links();
-    let (base, beliefs) = base_of(experiment, marks, Taken::AtItsWord)?;
-    let causes: Vec<Cause> = Cause::ALL.into_iter().filter(|c| c.may_be_missing(experiment, &base, marks)).collect();
-    let ground = Ground {
+    let settings = Settings::default();
+    let (base, beliefs) = base_of(experiment, marks, Taken::AtItsWord, &settings.search)?;
+    let context = FitContext {
         records: &record,
         experiment,
+        settings: &settings,
         base,
         beliefs,
-        noise: vec![RecordNoise::white(vec![plan.noise_rad; marks])],
         step_error_rad: (1e-3 * plan.noise_rad).clamp(1e-10, 1e-6),
         begun: Vec::new(),
         fine_strip: None,
     };
     let nothing = Hypothesis::default();
-    let problem = ground.problem(&nothing)?;
+    let problem = context.problem(&nothing, &[RecordNoise::white(vec![plan.noise_rad; marks])])?;
     let mut x = problem.start_values()?;
     x.extend(&experiment.model.release_rad);
     x.resize(problem.variables(), 0.0);
     let refused = || Error::Simulation { detail: "the planned swing cannot be integrated; check [model]".into() };
-    let null = ground.descend(&nothing, problem, x, 1).ok_or_else(refused)?;
-    let screen = Screen::at(&ground, &null).ok_or_else(refused)?;
-    Ok(detectable(&screen.scores(&causes), &causes))
+    let base = context.descend(&nothing, problem, x, 1).ok_or_else(refused)?;
+    let screen = Screen::at(&context, &base).ok_or_else(refused)?;
+    let effects = candidates(&context);
+    Ok(detectable(&laws::scores(&screen, &effects), &effects, &settings.verdict))
 }
 
 /// The base model's own swing, released at rest, without noise.

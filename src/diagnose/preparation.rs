@@ -1,78 +1,71 @@
 //! What all searches begin with: recordings without outliers, their noise, and where the base model's descent starts.
 
-use std::sync::OnceLock;
-
-use super::search::{Taken, base_of};
+use super::base::{Taken, base_of};
+use super::settings::Settings;
 use crate::error::Result;
 use crate::experiment::Experiment;
-use crate::fit::shooting::multiple_shooting;
+use crate::fit::noise::noise_rad;
+use crate::fit::search::{End, best_end};
 use crate::fit::whitening::{Colour, RecordNoise};
-use crate::fit::{Problem, Record};
+use crate::fit::{Record, Seen, refuse_another_pace};
 use crate::model::Parameter;
-
-/// Springs to start from, over the file's, where that leads nowhere.
-const SPRINGS: [f64; 3] = [0.03, 30.0, 1e-3];
-/// Correlation of the noise from row to row that counts as colour.
-const COLOURED: f64 = 0.12;
+use crate::progress::Silent;
 
 /// What the recordings, cleaned of outliers, are held against.
 pub struct Prepared {
     /// Cleaned.
     pub records: Vec<Record>,
+    /// Learnt from short stretches.
     pub noise: Vec<RecordNoise>,
-    pub(super) step_error_rad: f64,
+    /// Of the integration.
+    pub step_error_rad: f64,
+    /// The experiment, its spring and dampers as the file or the recordings' modes have them, whichever led further.
+    pub experiment: Experiment,
     /// Parameters of the base model, taken at the file's word.
-    pub(super) base: Vec<Parameter>,
-    /// Their values and the starts to descend from.
-    pub(super) x: Vec<f64>,
-    /// The experiment with as many rods as the recordings ask for, where they do.
-    pub(super) counted: OnceLock<Experiment>,
+    pub base: Vec<Parameter>,
+    /// Their values and the starts to descend from: where short stretches led to.
+    pub begun: Vec<f64>,
+    /// The same where the robust descent from there ended.
+    pub ended: Vec<f64>,
 }
 
-/// Learns the noise, leaves outliers out, and finds where the base model's descent is to start: near the file's values, and where no motion near them can
-/// follow the recordings, from softer and stiffer springs.
+/// Learns the noise, leaves outliers out, and finds where the base model's descent is to start: where `fit` ends, which begins with the file's values and with
+/// those that the recordings' modes say.
 ///
 /// # Errors
-/// [`crate::error::Error::Simulation`] where the specimen cannot swing.
-pub fn prepare(records: &[Record], experiment: &Experiment) -> Result<Prepared> {
-    let marks = records.first().map_or(0, Record::links);
-    let (base, _) = base_of(experiment, marks, Taken::AtItsWord)?;
-    let from = |spring: &f64| {
-        let mut experiment = experiment.clone();
-        experiment.model.k_eq_n_m_per_rad *= spring;
-        if let Some(bending) = &mut experiment.model.effects.distributed_flexibility {
-            *bending *= spring;
-        }
-        let mut problem = Problem::new(records, &experiment, &base)?;
-        let shot = multiple_shooting(&mut problem)?;
-        problem.integrate_below_the_noise();
-        let step_error_rad = problem.accuracy.step_error_rad;
-        problem.accuracy = problem.accuracy_of(problem.longest_s(), step_error_rad);
-        let (kept, _) = crate::fit::without_outliers(&problem, &shot.x)?;
-        Ok(Prepared {
-            noise: coloured(&shot.residuals, &problem.noise),
-            step_error_rad,
-            base: base.clone(),
-            x: shot.x,
-            records: kept,
-            counted: OnceLock::new(),
-        })
-    };
-    let as_stated = from(&1.0);
-    if as_stated.is_ok() {
-        as_stated
-    } else {
-        SPRINGS.iter().find_map(|spring| from(spring).ok()).map_or(as_stated, Ok)
+/// [`crate::error::Error::Table`] for a recording that swings at another pace than the specimen can; [`crate::error::Error::Simulation`] where the specimen
+/// cannot swing, or no motion near any start follows the recordings.
+pub fn prepare(records: &[Record], experiment: &Experiment, settings: &Settings) -> Result<Prepared> {
+    for record in records {
+        Seen::of(record).map_or(Ok(()), |seen| refuse_another_pace(record, &seen, experiment))?;
     }
+    let marks = records.first().map_or(0, Record::links);
+    let (base, _) = base_of(experiment, marks, Taken::AtItsWord, &settings.search)?;
+    let noise_rad: Vec<Vec<f64>> = records.iter().map(noise_rad).collect();
+    let End { mut problem, outcome, shot, begun } = best_end(records, experiment, &base, &noise_rad, &Silent)?;
+    problem.noise.clone_from(&shot.noise);
+    problem.integrate_below_the_noise();
+    let step_error_rad = problem.accuracy.step_error_rad;
+    problem.accuracy = problem.accuracy_of(problem.longest_s(), step_error_rad);
+    let (kept, _) = crate::fit::without_outliers(&problem, &outcome.x)?;
+    Ok(Prepared {
+        noise: coloured(&shot.residuals, &shot.noise, settings.noise.stretches_coloured),
+        step_error_rad,
+        experiment: begun,
+        base,
+        begun: shot.x,
+        ended: outcome.x,
+        records: kept,
+    })
 }
 
 /// Noise with the correlation of neighbouring residuals of each angle, where it is more than chance and the stretches' own starts make of it.
-fn coloured(residuals: &[(usize, usize, f64)], white: &[RecordNoise]) -> Vec<RecordNoise> {
+fn coloured(residuals: &[(usize, usize, f64)], white: &[RecordNoise], least: f64) -> Vec<RecordNoise> {
     let of = |record: usize, link: usize| {
         let r: Vec<f64> = residuals.iter().filter(|r| r.0 == record && r.1 == link).map(|r| r.2).collect();
         let power: f64 = r.iter().map(|v| v * v).sum();
         let rho = r.windows(2).map(|w| w[0] * w[1]).sum::<f64>() / power.max(1e-300);
-        if rho > COLOURED { Colour { rho: (rho + 0.05).min(0.9), share: 1.0 } } else { Colour::default() }
+        if rho > least { Colour { rho: (rho + 0.05).min(0.9), share: 1.0 } } else { Colour::default() }
     };
     let with_colour = |(record, white): (usize, &RecordNoise)| {
         let colour = (0..white.sd_rad.len()).map(|link| of(record, link)).collect();

@@ -2,19 +2,14 @@
 
 use nalgebra::{DMatrix, DVector};
 
-use super::Cause;
-use super::ground::Hypothesis;
-use crate::fit::Problem;
+use super::hypothesis::Hypothesis;
+use super::settings::CertificateSettings;
 use crate::fit::descent::{Ending, Outcome};
 use crate::fit::problem::stacked;
+use crate::fit::{Problem, Residuals, residuals_of};
 use crate::model::{Camera, ForwardModel, Parameter, State, Trajectory};
 
-/// A fit that leaves this part of the swing lacks something, whatever the noise.
-pub(super) const MUCH_LEFT: f64 = 0.05;
-/// A motion that leaves more than this part of the swing has lost step.
-pub(super) const OUT_OF_STEP: f64 = 0.35;
-
-/// A hypothesis fitted to the recordings.
+/// A hypothesis fitted to the recordings, with the noise by which it was judged.
 #[derive(Debug, Clone)]
 pub struct Refit<'a> {
     /// What was assumed.
@@ -31,13 +26,33 @@ pub struct Refit<'a> {
     pub steps: usize,
     /// Whether the descent ended in a minimum.
     pub converged: bool,
+    /// How far it may be trusted to be the best of its hypothesis.
+    pub certificate: Certificate,
+}
+
+/// How far a fit may be trusted to be the best of its hypothesis.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Certificate {
+    /// Independent starts that ended there.
+    pub starts_agreeing: usize,
+    /// Whether it leaves no more than any fit of a hypothesis within its own.
+    pub nested_ok: bool,
 }
 
 impl<'a> Refit<'a> {
     /// From the end of a descent.
     pub fn of(hypothesis: Hypothesis, problem: Problem<'a>, outcome: Outcome) -> Self {
         let Outcome { x, cost, normal, ending, steps, .. } = outcome;
-        Self { hypothesis, problem, x, chi2: cost, normal, steps, converged: ending == Ending::Converged }
+        Self {
+            hypothesis,
+            problem,
+            x,
+            chi2: cost,
+            normal,
+            steps,
+            converged: ending == Ending::Converged,
+            certificate: Certificate { starts_agreeing: 1, nested_ok: true },
+        }
     }
 
     /// The value of a free parameter.
@@ -45,12 +60,11 @@ impl<'a> Refit<'a> {
         self.place(parameter).map(|i| self.x[i])
     }
 
-    /// Whether a hypothesis only adds laws to this one's, about the same recordings with the same noise.
+    /// Whether a problem only adds laws to this one's, about the same recordings with the same noise.
     pub fn is_part_of(&self, hypothesis: &Hypothesis, problem: &Problem<'_>) -> bool {
-        let (own, all) = (&self.hypothesis, &hypothesis.causes);
-        let bends = |causes: &[Cause]| causes.contains(&Cause::DistributedFlexibility);
-        own.causes.iter().all(|cause| all.contains(cause))
-            && bends(&own.causes) == bends(all)
+        let own = &self.hypothesis;
+        own.is_within(hypothesis)
+            && self.problem.free.iter().all(|parameter| problem.free.contains(parameter))
             && (own.dropped == hypothesis.dropped || own.dropped.is_none())
             && std::ptr::eq(self.problem.records, problem.records)
             && self.problem.noise == problem.noise
@@ -61,14 +75,14 @@ impl<'a> Refit<'a> {
         self.problem.free.iter().position(|p| *p == parameter)
     }
 
-    /// The coefficients of the added effects, in the order of the causes.
+    /// The coefficients of the added effects, in the order of the effects.
     pub fn added(&self) -> Vec<Parameter> {
-        self.hypothesis.causes.iter().flat_map(|cause| cause.parameters()).copied().collect()
+        self.hypothesis.effects.iter().flat_map(|effect| effect.parameters()).copied().collect()
     }
 
     /// How many there are.
     pub fn coefficients(&self) -> usize {
-        self.hypothesis.causes.iter().map(|cause| cause.parameters().len()).sum()
+        self.hypothesis.effects.iter().map(|effect| effect.parameters().len()).sum()
     }
 
     /// The covariance of some of the parameters, all other variables being free: the inverse of JᵀJ, of which variables held by their bound
@@ -105,11 +119,6 @@ impl<'a> Refit<'a> {
         Some((model, swing, true_s))
     }
 
-    /// Whether the motion has lost step with a recording: what is left is a good part of the swing.
-    pub fn is_out_of_step(&self) -> bool {
-        self.left_share() > OUT_OF_STEP
-    }
-
     /// What is left of the worst recording, as a part of the swing: root mean squares of both.
     pub fn left_share(&self) -> f64 {
         (0..self.problem.records.len()).map(|record| self.left_share_of(record)).fold(0.0, f64::max)
@@ -126,6 +135,50 @@ impl<'a> Refit<'a> {
             whole += measured_rad * measured_rad;
         }
         (left / whole.max(1e-300)).sqrt()
+    }
+
+    /// What it leaves of a recording.
+    pub fn residuals(&self, record: usize) -> Option<Residuals> {
+        residuals_of(&self.problem, &self.x, record).ok()
+    }
+
+    /// What it leaves of the angles, over their noise: root mean squares, of the worst recording.
+    pub fn over_noise(&self) -> f64 {
+        let of = |record: usize| {
+            let Some(left) = self.residuals(record) else { return 0.0 };
+            let squares = left.rmse_rad.iter().zip(&left.noise_rad).map(|(left, noise)| (left / noise).powi(2));
+            (squares.sum::<f64>() / left.rmse_rad.len().max(1) as f64).sqrt()
+        };
+        (0..self.problem.records.len()).map(of).fold(0.0, f64::max)
+    }
+
+    /// Number of values.
+    pub fn values(&self) -> usize {
+        self.problem.records.iter().map(|r| r.values(0..r.len())).sum()
+    }
+
+    /// Whether it counts: it has converged, enough independent starts end there, and it leaves no more than what is within it.
+    pub fn is_certified(&self, settings: &CertificateSettings) -> bool {
+        self.converged && self.certificate.nested_ok && self.certificate.starts_agreeing >= settings.starts
+    }
+
+    /// Becomes the better one of itself and another fit of the same hypothesis.
+    pub fn meet(&mut self, other: Self, agrees: f64) {
+        let starts = match self.agrees_with(&other, agrees) {
+            true => self.certificate.starts_agreeing + other.certificate.starts_agreeing,
+            false if other.chi2 < self.chi2 => other.certificate.starts_agreeing,
+            false => self.certificate.starts_agreeing,
+        };
+        if other.chi2 < self.chi2 {
+            *self = other;
+        }
+        self.certificate.starts_agreeing = starts.max(1);
+    }
+
+    /// Whether two fits leave the same within so many times the variance left.
+    fn agrees_with(&self, other: &Self, agrees: f64) -> bool {
+        let variance = (self.chi2.min(other.chi2) / self.values().max(1) as f64).max(1.0);
+        (self.chi2 - other.chi2).abs() < agrees * variance
     }
 
     /// Residuals and their derivatives with all variables, both over the noise; `None` where the motion cannot be integrated.
@@ -159,14 +212,19 @@ pub fn best<'a>(
     order.into_iter().map(|(_, i)| i).collect()
 }
 
-/// The better one of each hypothesis.
-pub fn merged<'a>(mut fits: Vec<Refit<'a>>, others: Vec<Refit<'a>>) -> Vec<Refit<'a>> {
+/// The better one of each hypothesis; where two leave the same within `agrees`, in units of the variance left, the starts that led there count together.
+pub fn merged<'a>(mut fits: Vec<Refit<'a>>, others: Vec<Refit<'a>>, agrees: f64) -> Vec<Refit<'a>> {
     for other in others {
-        match fits.iter_mut().find(|fit| fit.hypothesis.causes == other.hypothesis.causes) {
-            Some(known) if other.chi2 < known.chi2 => *known = other,
-            Some(_) => {}
+        match fits.iter_mut().find(|fit| fit.hypothesis.effects == other.hypothesis.effects) {
+            Some(known) => known.meet(other, agrees),
             None => fits.push(other),
         }
     }
     fits
+}
+
+/// The best fit of each number of coefficients but none, up to the most.
+pub fn best_of_each_count<'f, 'a>(fits: &'f [Refit<'a>], most: usize) -> Vec<&'f Refit<'a>> {
+    let of_count = |count: usize| best(fits, 1, |fit| fit.coefficients() == count, |fit| fit.chi2);
+    (1..=most).flat_map(of_count).map(|place| &fits[place]).collect()
 }

@@ -1,10 +1,12 @@
 //! The course of the torque that a model lacks, at the place where it explains most: what to add to the fitted motion, row by row, for the
 //! recording to follow.
 
+use super::effect::{Phase, Place};
 use super::latent::{Assumed, Filter, Form, Latent};
+use super::linearisation::{Input, Linearisation};
 use super::refit::Refit;
-use super::surroundings::{Input, Surroundings};
-use super::{Place, energy, locate, noise};
+use super::unknowns::unknowns;
+use super::{energy, noise};
 
 /// A torque that works less than this part of what it could, with the angle or with its rate, has no phase.
 const NO_PHASE: f64 = 0.3;
@@ -32,34 +34,14 @@ pub struct MissingTorque {
     pub energy_share: Option<f64>,
 }
 
-/// Whether a torque acts with the position or with the velocity.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Phase {
-    /// It stores energy.
-    Position,
-    /// It takes energy away, or gives it.
-    Velocity,
-}
-
-impl Phase {
-    /// The name in files.
-    pub fn id(self) -> &'static str {
-        match self {
-            Self::Position => "position",
-            Self::Velocity => "velocity",
-        }
-    }
-}
-
 /// The torque that the base model lacks, at a place, or where it explains most, in the recording that the base model reproduces worst; `fit` is the
 /// likeliest one of the table, whose motion follows the recordings.
 pub fn missing(fit: &Refit<'_>, null: &Refit<'_>, at: Option<Place>) -> Option<MissingTorque> {
-    let values = fit.problem.records.iter().map(|r| r.values(0..r.len())).sum::<usize>() as f64;
-    let variance = (fit.chi2 / values).max(1.0);
+    let variance = (fit.chi2 / fit.values() as f64).max(1.0);
     let worst = |record: &usize| null.left_share_of(*record);
     let record = (0..fit.problem.records.len()).max_by(|a, b| worst(a).total_cmp(&worst(b)))?;
-    let unknowns = locate::unknowns(fit, variance, Assumed::INSTEAD);
-    let likeliest = unknowns.iter().find(|u| u.gain > 0.0 && at.is_none_or(|place| u.place() == place))?;
+    let around = unknowns(fit, variance, Assumed::INSTEAD);
+    let likeliest = around.iter().find(|u| u.gain > 0.0 && at.is_none_or(|place| u.place() == place))?;
     MissingTorque::of(fit, record, likeliest, variance)
 }
 
@@ -67,7 +49,7 @@ impl MissingTorque {
     /// Beside a fit, in one of its recordings; `variance` scales that of the noise.
     pub fn of(fit: &Refit<'_>, record: usize, unknown: &Latent, variance: f64) -> Option<Self> {
         let Form::Course(input) = unknown.form else { return None };
-        let around = Surroundings::of(fit, record)?;
+        let around = Linearisation::of(fit, record)?;
         let course = Filter::new(fit, record, (&around, variance), input, Assumed::INSTEAD)?.course(unknown.size);
         let rms = (course.iter().map(|c| c.0 * c.0).sum::<f64>() / course.len().max(1) as f64).sqrt();
         let torque: Vec<f64> = course.iter().map(|c| c.0).collect();
@@ -92,7 +74,7 @@ impl MissingTorque {
     }
 
     /// What it does with the angle and the rate that are conjugate to it.
-    fn work(&mut self, fit: &Refit<'_>, around: &Surroundings, input: Input) {
+    fn work(&mut self, fit: &Refit<'_>, around: &Linearisation, input: Input) {
         let (mut torque, mut angle, mut rate, mut with_angle, mut with_rate, mut taken_j) =
             (0.0, 0.0, 0.0, 0.0, 0.0, 0.0);
         for (k, row) in around.rows.iter().enumerate() {

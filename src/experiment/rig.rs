@@ -170,6 +170,11 @@ impl Rig {
         {
             return Err("rig.roi_px: give left, top, width and height, at least 8 px wide and high".to_owned());
         }
+        for (key, value) in [("from_s", self.from_s), ("until_s", self.until_s)] {
+            if value.is_some_and(|v| !v.is_finite()) {
+                return Err(format!("rig.{key}: must be a number of seconds"));
+            }
+        }
         if let (Some(from), Some(until)) = (self.from_s, self.until_s)
             && !(until > from)
         {

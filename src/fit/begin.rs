@@ -4,8 +4,8 @@
 //! frequency says what the spring is, near enough to be in step; where no second mode is seen, the shape of the first does: the stiffer the joint, the more the
 //! links turn alike.
 
-use super::Seen;
 use super::seen::SeenMode;
+use super::{Record, Seen};
 use crate::experiment::Experiment;
 use crate::model::modes::{Linearised, Mode, Modes};
 use crate::model::{ForwardModel, Parameter};
@@ -23,6 +23,35 @@ const MIRRORED: f64 = 0.6;
 
 /// Damping ratio of a second mode that is not seen.
 const SILENT: f64 = 0.3;
+
+/// A spring that differs from the seen one by more than this factor is not where to begin.
+const FAR_OFF: f64 = 1.5;
+
+/// Most beginnings.
+pub const MOST: u64 = 3;
+
+/// Where a fit may begin, likeliest first: with the file's values, and with what the modes of the longest recording say. Without a second mode these are vague, and
+/// come last: a stiff joint with little damping ends on a line in the noise. Where the file's spring is far from the seen one, the file's values do.
+pub fn beginnings(records: &[Record], experiment: &Experiment, free: &[Parameter]) -> Vec<Experiment> {
+    let begun_with = |p: &Parameter| {
+        p.is_spring() || matches!(p, Parameter::JointDamping | Parameter::HingeViscous | Parameter::AirLinear)
+    };
+    let mut order = vec![experiment.clone()];
+    let longest = records.iter().max_by_key(|record| record.len());
+    let Some(seen) = longest.filter(|_| free.iter().any(begun_with)).and_then(Seen::of) else { return order };
+    order.extend(from_modes(experiment, free, &seen));
+    let springs = order.iter().map(|begun| spring_of(begun, free)).collect::<Option<Vec<_>>>();
+    let are_far = |springs: Vec<f64>| springs[1..].iter().all(|spring| is_far_off(*spring, springs[0]));
+    if springs.is_some_and(are_far) && seen.fast.is_some() {
+        order.rotate_left(1);
+    }
+    order
+}
+
+/// Whether the file's spring is far from the seen one.
+fn is_far_off(seen: f64, stated: f64) -> bool {
+    (seen / stated.max(f64::MIN_POSITIVE)).ln().abs() > FAR_OFF.ln()
+}
 
 /// The experiment with the free spring and linear dampers set to what the modes say, likeliest first; the same where they say nothing.
 pub fn from_modes(experiment: &Experiment, free: &[Parameter], seen: &Seen) -> Vec<Experiment> {

@@ -11,7 +11,7 @@
 //! | [`problem`] | what is fitted to what |
 //! | [`begin`] | where a fit begins: with the seen modes |
 //! | [`shooting`] | multiple shooting: start values that cannot be out of step |
-//! | `search` | several beginnings, the best end |
+//! | [`search`] | several beginnings, the best end: the robust fit of `fit` and of a diagnosis' base model |
 //! | [`descent`] | Levenberg–Marquardt with bounds |
 //! | [`straight`] | the variables in which a hysteresis is fitted |
 //! | [`interval`] | standard deviations and 95 % intervals |
@@ -30,7 +30,7 @@ pub mod pace;
 pub mod predict;
 pub mod problem;
 pub mod record;
-mod search;
+pub mod search;
 pub mod seen;
 pub mod shooting;
 pub mod straight;
@@ -153,7 +153,8 @@ pub fn fit_watched(
     progress: &dyn Progress,
 ) -> Result<Fit> {
     let noise_rad: Vec<Vec<f64>> = records.iter().map(noise::noise_rad).collect();
-    let (problem, first) = search::best_end(records, experiment, free, &noise_rad, progress)?;
+    let search::End { problem, outcome: first, .. } =
+        search::best_end(records, experiment, free, &noise_rad, progress)?;
     let (kept, outliers) = without_outliers(&problem, &first.x)?;
     let problem = Problem { records: &kept, ..problem };
     let descent = Descent { most_steps: 30, enough: 1e-3, ..Descent::default() };

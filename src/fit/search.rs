@@ -1,11 +1,13 @@
 //! Several beginnings, the best end.
 
 use super::descent::{Descent, Outcome};
-use super::{Problem, Record, Seen, begin, shooting, straight};
+use super::shooting::{self, Shot};
+use super::{Problem, Record, begin, straight};
 use crate::error::{Error, Result};
-use crate::experiment::{Experiment, Hysteresis};
+use crate::experiment::{Experiment, Hysteresis, SupportMotion};
 use crate::model::Parameter;
 use crate::progress::Progress;
+use crate::series::FEWEST_ROWS;
 
 /// Mean χ² that a descent may leave in the whole and in so many values in a row, before another beginning is tried. The noise is known to a tenth; of 40 values
 /// the mean scatters by 0.22. Outliers count no more than their bound.
@@ -15,37 +17,48 @@ const IN_A_ROW: usize = 40;
 const BOUND: f64 = 4.0;
 /// A descent that leaves more than this, over the variance of the noise, is tried from the values as they are, too.
 const ASTRAY: f64 = 25.0;
-/// A spring that differs from the seen one by more than this factor is not where to begin.
-const FAR_OFF: f64 = 1.5;
 /// Beginnings of a hysteresis: its yield angle as part of the largest bend, its share of the spring; and the part of the recordings that chooses.
 const YIELDS: [f64; 3] = [0.05, 0.2, 0.6];
 const SPRINGS: [f64; 2] = [0.4, 0.9];
 const BEGINNING: f64 = 0.15;
+/// Parts of the rows that are followed one after the other, before all of them.
+const PARTS: [f64; 4] = [0.1, 0.2, 0.35, 0.6];
+/// Frequencies of what is left are looked at this finely for the length of the recording, up to this one; and so many of the strongest are begun with.
+const FINENESS: f64 = 2.0;
+const HIGHEST_HZ: f64 = 20.0;
+const PEAKS: usize = 4;
 /// A start is read off values this near, in radians of the model's pace: wide enough to even out the noise, short enough for a cubic to follow the second mode.
 const STATE_NEAR: f64 = 0.35;
+/// Another end is better where it leaves less by this part.
+const BETTER: f64 = 1e-3;
 /// Beginnings, each of which is a stage.
-pub const STAGES: u64 = ORDERLY + 1;
-const ORDERLY: u64 = 3;
+pub const STAGES: u64 = begin::MOST + 1;
 
 /// What all beginnings share.
+#[derive(Clone, Copy)]
 struct Search<'a, 's> {
     records: &'a [Record],
     free: &'s [Parameter],
     noise_rad: &'s [Vec<f64>],
 }
 
-/// Beginnings that the recordings' modes say, and whether the second mode is among them: without it they come after the file's values, for they are vague, and a
-/// stiff joint with little damping ends on a line in the noise.
-struct Modes {
-    begun: Vec<Experiment>,
-    rings: bool,
+/// Where a descent ended.
+#[derive(Debug, Clone)]
+pub struct End<'a> {
+    /// What was fitted.
+    pub problem: Problem<'a>,
+    /// With which result.
+    pub outcome: Outcome,
+    /// Where it began: where short stretches led to.
+    pub shot: Shot,
+    /// The experiment with the values from which those began.
+    pub begun: Experiment,
 }
 
-/// Where a descent ended, and of what.
-type End<'a> = (Problem<'a>, Outcome);
-
-/// The best of the descents from the file's values, from those of the recordings' modes where these leave more than noise, and from those of a hysteresis. Where
-/// the file's spring is far from the seen one, the order is turned.
+/// The best of the descents from the file's values, from those of the recordings' modes where these leave more than noise, and from those of a hysteresis.
+///
+/// # Errors
+/// [`Error::Simulation`] where the specimen cannot swing, or no motion near any beginning follows the recordings.
 pub fn best_end<'a>(
     records: &'a [Record],
     experiment: &Experiment,
@@ -54,36 +67,42 @@ pub fn best_end<'a>(
     progress: &dyn Progress,
 ) -> Result<End<'a>> {
     let search = Search { records, free, noise_rad };
-    let Modes { begun, rings } = search.modes(experiment);
-    let mut order = vec![experiment];
-    order.extend(&begun);
-    let springs = order.iter().map(|begun| begin::spring_of(begun, free)).collect::<Option<Vec<_>>>();
-    if springs.is_some_and(|springs| springs[1..].iter().all(|spring| is_far_off(*spring, springs[0]))) && rings {
-        order.rotate_left(1);
-    }
-    let mut best: Option<End<'a>> = None;
-    for begun in order {
+    let order = begin::beginnings(records, experiment, free);
+    let (mut best, mut failed): (Option<End<'a>>, Option<Error>) = (None, None);
+    for begun in &order {
         if search.may_find_more(best.as_ref()) {
-            best = better(best, search.from(begun)?);
+            match search.from(begun) {
+                Ok(end) => best = better(best, end),
+                Err(error) => failed = failed.or(Some(error)),
+            }
         }
         progress.advance(1);
     }
-    progress.advance(ORDERLY.saturating_sub(1 + begun.len() as u64));
+    progress.advance(begin::MOST.saturating_sub(order.len() as u64));
     if free.contains(&Parameter::HysteresisTorque) && search.may_find_more(best.as_ref()) {
-        let yielding = search.with_hysteresis(begun.first().unwrap_or(experiment), best.as_ref())?;
+        let yielding = search.with_hysteresis(order.last().unwrap_or(experiment), best.as_ref())?;
         best = better(best, yielding.map_or(Ok(None), |begun| search.from(&begun))?);
     }
+    if free.contains(&Parameter::SupportFrequency) && search.may_find_more(best.as_ref()) {
+        for end in search.with_support(experiment)? {
+            best = better(best, Some(end));
+        }
+    }
+    if search.may_find_more(best.as_ref()) {
+        let continued = best.as_ref().and_then(|end| search.continued(end));
+        best = better(best, continued);
+    }
     progress.advance(1);
-    best.ok_or_else(refused)
+    best.ok_or_else(|| failed.unwrap_or_else(refused))
 }
 
-/// Whether the file's spring is far from the seen one.
-fn is_far_off(seen: f64, stated: f64) -> bool {
-    (seen / stated.max(f64::MIN_POSITIVE)).ln().abs() > FAR_OFF.ln()
-}
-
-fn better<'a>(a: Option<End<'a>>, b: Option<End<'a>>) -> Option<End<'a>> {
-    a.into_iter().chain(b).min_by(|a, b| a.1.cost.total_cmp(&b.1.cost))
+/// The end that leaves less; the first where there is next to no difference.
+fn better<'a>(first: Option<End<'a>>, other: Option<End<'a>>) -> Option<End<'a>> {
+    match (first, other) {
+        (Some(first), Some(other)) if other.outcome.cost < (1.0 - BETTER) * first.outcome.cost => Some(other),
+        (Some(first), _) => Some(first),
+        (None, other) => other,
+    }
 }
 
 /// What to say where nothing can be descended from.
@@ -104,8 +123,11 @@ impl<'a> Search<'a, '_> {
     fn from(&self, experiment: &Experiment) -> Result<Option<End<'a>>> {
         let mut problem = Problem::new(self.records, experiment, self.free)?;
         // without parameters nothing but the starts is sought, which the recording shows
-        let shot =
-            if self.free.is_empty() { seen_starts(&problem)? } else { shooting::multiple_shooting(&mut problem)?.x };
+        let shot = if self.free.is_empty() {
+            Shot { x: seen_starts(&problem)?, noise: problem.noise.clone(), residuals: Vec::new() }
+        } else {
+            shooting::multiple_shooting(&mut problem)?
+        };
         for (noise, sd_rad) in problem.noise.iter_mut().zip(self.noise_rad) {
             noise.sd_rad.clone_from(sd_rad);
         }
@@ -114,12 +136,13 @@ impl<'a> Search<'a, '_> {
         problem.accuracy = within;
         let robust = Descent { huber: 4.0, most_steps: 30, enough: 0.03, ..Descent::default() };
         // stretches that a model cannot follow may lead astray from values that were near
-        let stated = [problem.start_values()?, shot[self.free.len()..].to_vec()].concat();
-        let from_stretches = descend(&problem, &robust, shot);
+        let stated = [problem.start_values()?, shot.x[self.free.len()..].to_vec()].concat();
+        let from_stretches = descend(&problem, &robust, shot.x.clone());
         let astray = from_stretches.as_ref().is_none_or(|end| end.cost > ASTRAY * end.residuals() as f64);
         let from_stated = if astray && !self.free.is_empty() { descend(&problem, &robust, stated) } else { None };
         let ends = [from_stretches, from_stated].into_iter().flatten();
-        Ok(ends.min_by(|a, b| a.cost.total_cmp(&b.cost)).map(|end| (problem, end)))
+        let best = ends.min_by(|a, b| a.cost.total_cmp(&b.cost));
+        Ok(best.map(|outcome| End { problem, outcome, shot, begun: experiment.clone() }))
     }
 
     /// Whether another beginning may lead further: more is left than noise.
@@ -133,24 +156,12 @@ impl<'a> Search<'a, '_> {
                 mean(values) > LEFT || values.chunks_exact(IN_A_ROW).any(|few| mean(few) > LEFT_ANYWHERE)
             })
         };
-        end.is_none_or(|(_, end)| of_recordings(end))
-    }
-
-    /// The experiment as the modes of the longest recording have it, where a spring or a damper is free.
-    fn modes(&self, experiment: &Experiment) -> Modes {
-        let begun_with = |p: &Parameter| {
-            p.is_spring() || matches!(p, Parameter::JointDamping | Parameter::HingeViscous | Parameter::AirLinear)
-        };
-        let longest = self.records.iter().max_by_key(|record| record.len());
-        match longest.filter(|_| self.free.iter().any(begun_with)).and_then(Seen::of) {
-            Some(seen) => Modes { begun: begin::from_modes(experiment, self.free, &seen), rings: seen.fast.is_some() },
-            None => Modes { begun: Vec::new(), rings: false },
-        }
+        end.is_none_or(|end| of_recordings(&end.outcome))
     }
 
     /// The experiment with a hysteresis in place of a part of its spring: of several the one that follows the beginning of the recordings best.
     fn with_hysteresis(&self, experiment: &Experiment, best: Option<&End<'_>>) -> Result<Option<Experiment>> {
-        let Some((problem, end)) = best else { return Ok(None) };
+        let Some(End { problem, outcome: end, .. }) = best else { return Ok(None) };
         let beginning: Vec<Record> =
             self.records.iter().map(|record| record.until((BEGINNING * record.len() as f64) as usize)).collect();
         if beginning.iter().any(|record| record.values(0..record.len()) < 4 * end.x.len()) {
@@ -176,6 +187,81 @@ impl<'a> Search<'a, '_> {
         }
         Ok(found.map(|(_, begun)| begun))
     }
+}
+
+impl<'a> Search<'a, '_> {
+    /// Horizon continuation: the best end's own problem on the first part of the recordings, from there on the next, and so to the whole. The sum of squares of a
+    /// long recording has many false minima, that of its beginning few.
+    fn continued(&self, end: &End<'a>) -> Option<End<'a>> {
+        let free = self.free.len();
+        let mut x = [&end.outcome.x[..free], &end.shot.x[free..]].concat();
+        for part in PARTS {
+            let rows = |record: &Record| ((part * record.len() as f64) as usize).max(FEWEST_ROWS).min(record.len());
+            let early: Vec<Record> = self.records.iter().map(|record| record.until(rows(record))).collect();
+            let problem = Problem { records: &early, ..end.problem.clone() };
+            let robust = Descent { huber: 4.0, most_steps: 20, enough: 0.1, ..Descent::default() };
+            x = straight::descend(&problem, &robust, x)?.x;
+        }
+        let robust = Descent { huber: 4.0, most_steps: 30, enough: 0.03, ..Descent::default() };
+        let outcome = descend(&end.problem, &robust, x)?;
+        Some(End { outcome, ..end.clone() })
+    }
+
+    /// A support that moves, begun at the frequencies at which the fit without it leaves most: no derivative leads from one frequency to another.
+    fn with_support(&self, experiment: &Experiment) -> Result<Vec<End<'a>>> {
+        let of_support = |p: &Parameter| {
+            matches!(p, Parameter::SupportSine | Parameter::SupportCosine | Parameter::SupportFrequency)
+        };
+        let free: Vec<Parameter> = self.free.iter().copied().filter(|p| !of_support(p)).collect();
+        let mut still = experiment.clone();
+        still.model.effects.support_motion = None;
+        let without = Search { free: &free, ..*self };
+        let Some(end) = without.from(&still)? else { return Ok(Vec::new()) };
+        let mut ends = Vec::new();
+        for frequency_hz in strongest_hz(&end) {
+            let mut tried = end.begun.clone();
+            tried.model.effects.support_motion = Some(SupportMotion { amplitude_m: 0.0, frequency_hz, phase_rad: 0.0 });
+            let mut problem = Problem::new(self.records, &tried, self.free)?;
+            problem.noise.clone_from(&end.problem.noise);
+            problem.accuracy = end.problem.accuracy;
+            let mut x = problem.start_values()?;
+            for (value, parameter) in x.iter_mut().zip(self.free).filter(|(_, p)| !of_support(p)) {
+                *value = free.iter().position(|p| p == parameter).map_or(*value, |place| end.outcome.x[place]);
+            }
+            x.extend_from_slice(&end.outcome.x[free.len()..]);
+            let robust = Descent { huber: 4.0, most_steps: 30, enough: 0.03, damping: 1e-8, ..Descent::default() };
+            let outcome = descend(&problem, &robust, x.clone());
+            let shot = Shot { x, ..end.shot.clone() };
+            ends.extend(outcome.map(|outcome| End { problem, outcome, shot, begun: tried }));
+        }
+        Ok(ends)
+    }
+}
+
+/// The frequencies at which what is left of the first angle of the longest recording is strongest.
+fn strongest_hz(end: &End<'_>) -> Vec<f64> {
+    let records = end.problem.records;
+    let Some(longest) = (0..records.len()).max_by_key(|record| records[*record].len()) else { return Vec::new() };
+    let record = &records[longest];
+    let rows = (0..record.len()).filter(|row| record.theta_rad[0][*row].is_some());
+    let left: Vec<(f64, f64)> =
+        rows.map(|row| record.t_s[row]).zip(end.outcome.blocks[longest].residual.iter().copied()).collect();
+    let span_s = record.t_s[record.len() - 1] - record.t_s[0];
+    let nyquist_hz = 0.5 * record.len() as f64 / span_s;
+    let count = (FINENESS * span_s * HIGHEST_HZ.min(nyquist_hz)) as usize;
+    let power = |k: usize| {
+        let rate = std::f64::consts::TAU * k as f64 / (FINENESS * span_s);
+        let sum = left.iter().fold([0.0; 2], |sum, (t_s, r)| {
+            let (sin, cos) = (rate * t_s).sin_cos();
+            [sum[0] + r * sin, sum[1] + r * cos]
+        });
+        sum[0] * sum[0] + sum[1] * sum[1]
+    };
+    let powers: Vec<f64> = (0..count).map(power).collect();
+    let is_peak = |k: &usize| powers[*k] > powers[k - 1] && powers[*k] >= powers[k + 1];
+    let mut peaks: Vec<usize> = (1..count.max(2) - 1).filter(is_peak).collect();
+    peaks.sort_by(|a, b| powers[*b].total_cmp(&powers[*a]));
+    peaks.into_iter().take(PEAKS).map(|k| k as f64 / (FINENESS * span_s)).collect()
 }
 
 /// Each recording's start as its first values show it.

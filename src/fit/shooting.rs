@@ -11,6 +11,7 @@ use rayon::prelude::*;
 
 use super::descent::{Block, Descent};
 use super::predict::{Request, predict};
+use super::whitening::RecordNoise;
 use super::{Problem, Record};
 use crate::error::Result;
 use crate::model::Camera;
@@ -60,6 +61,8 @@ impl Stretch {
 pub struct Shot {
     /// The parameters, then each recording's start.
     pub x: Vec<f64>,
+    /// The noise by which it was found.
+    pub noise: Vec<RecordNoise>,
     /// What stretches with starts of their own leave, over the noise: (recording, link, residual) in order of time.
     pub residuals: Vec<(usize, usize, f64)>,
 }
@@ -71,11 +74,9 @@ pub struct Shot {
 pub fn multiple_shooting(problem: &mut Problem<'_>) -> Result<Shot> {
     let (model, _) = problem.model(0, &[])?;
     let pace_rad_s = model.pace_rad_s();
-    let length_s = PERIODS * std::f64::consts::TAU / pace_rad_s;
-    let stretches = stretches(problem, length_s);
+    let stretches = stretches(problem, PERIODS * std::f64::consts::TAU / pace_rad_s);
     let marks = problem.marks();
     let mut x = problem.start_values()?;
-    let free = x.len();
     // wide enough to even out the noise, short enough for a cubic to follow the second mode
     let reach_s = 0.35 / pace_rad_s;
     let mut left: Vec<Vec<Vec<f64>>> = vec![vec![Vec::new(); marks]; problem.records.len()];
@@ -88,6 +89,35 @@ pub fn multiple_shooting(problem: &mut Problem<'_>) -> Result<Shot> {
     for (noise, left) in problem.noise.iter_mut().flat_map(|n| &mut n.sd_rad).zip(left.iter_mut().flatten()) {
         *noise = median(left).unwrap_or(1e-3).clamp(1e-6, 0.05);
     }
+    Ok(drawn_together(problem, &stretches, x, pace_rad_s, true))
+}
+
+/// The same from a motion that follows the recordings already, whatever model it is of: the stretches begin where that motion is, so that no parameters near these
+/// fall out of step with it. `state` gives the angles between marks at a row of a recording, then their rates. The noise is taken as it is.
+///
+/// # Errors
+/// [`crate::Error::Simulation`] where the specimen cannot swing.
+pub fn shooting_along(
+    problem: &mut Problem<'_>,
+    parameters: &[f64],
+    state: impl Fn(usize, usize) -> Vec<f64>,
+) -> Result<Shot> {
+    let pace_rad_s = problem.model(0, parameters)?.0.pace_rad_s();
+    let stretches = stretches(problem, PERIODS * std::f64::consts::TAU / pace_rad_s);
+    let mut x = parameters.to_vec();
+    stretches.iter().for_each(|stretch| x.extend(state(stretch.record, stretch.rows.start)));
+    Ok(drawn_together(problem, &stretches, x, pace_rad_s, false))
+}
+
+/// Stretches with starts of their own, their seams ever tighter; `learns` the noise from what the loosest leave.
+fn drawn_together(
+    problem: &mut Problem<'_>,
+    stretches: &[Stretch],
+    mut x: Vec<f64>,
+    pace_rad_s: f64,
+    learns: bool,
+) -> Shot {
+    let (free, marks) = (problem.free.len(), problem.marks());
     let mut lower = problem.lower();
     lower.truncate(free);
     lower.resize(x.len(), f64::NEG_INFINITY);
@@ -97,13 +127,12 @@ pub fn multiple_shooting(problem: &mut Problem<'_>) -> Result<Shot> {
     let mut left_by_stretches = Vec::new();
     for (round, seam) in SEAMS.iter().enumerate() {
         let descent = Descent { huber: 4.0, most_steps: STEPS_EACH, enough: 0.3, ..Descent::default() };
-        let Some(outcome) = descent.run(x.clone(), &lower, |x| blocks(problem, &stretches, x, *seam, pace_rad_s))
-        else {
+        let Some(outcome) = descent.run(x.clone(), &lower, |x| blocks(problem, stretches, x, *seam, pace_rad_s)) else {
             break;
         };
         x = outcome.x;
-        if round == 0 {
-            left_by_stretches = residuals(problem, &stretches, &x);
+        if round == 0 && learns {
+            left_by_stretches = residuals(problem, stretches, &x);
             let variables = x.len();
             problem.learn_noise(&left_by_stretches, variables);
         }
@@ -118,7 +147,7 @@ pub fn multiple_shooting(problem: &mut Problem<'_>) -> Result<Shot> {
             }
         }
     }
-    Ok(Shot { x: whole, residuals: left_by_stretches })
+    Shot { x: whole, noise: problem.noise.clone(), residuals: left_by_stretches }
 }
 
 fn stretches(problem: &Problem<'_>, length_s: f64) -> Vec<Stretch> {

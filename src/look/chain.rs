@@ -54,16 +54,13 @@ fn of_look(things: &[Thing], belongs: &dyn Fn(&Thing) -> bool, hued: bool) -> Op
     movers.sort_by(|a, b| things[*b].presence.total_cmp(&things[*a].presence));
     let movers = distinct(things, &movers);
     let crowd = movers.len();
-    // every mover may be the one that the others are like; the largest set counts
-    let sets = movers.iter().map(|first| rigid_set(things, &movers, *first));
-    let mut marks = sets.max_by(|a, b| value(things, a).total_cmp(&value(things, b)))?;
-    order(things, &mut marks);
-    let path = |i: usize| things[i].path.iter().flatten().copied().collect::<Vec<_>>();
-    let on_arc = |arc: &Arc, i: usize| arc.residual_px < MOST_OFF_ARC * things[i].travel_px;
-    let arc = Arc::of(&path(marks[0])).filter(|arc| on_arc(arc, marks[0]));
-    if marks.len() == 1 && arc.is_none() {
-        return None;
-    }
+    // every mover may be the one that the others are like; the largest set that hangs from something counts
+    let sets = movers.iter().filter_map(|first| {
+        let mut marks = rigid_set(things, &movers, *first);
+        order(things, &mut marks);
+        hangs(things, &marks).map(|arc| (marks, arc))
+    });
+    let (mut marks, arc) = sets.max_by(|a, b| value(things, &a.0).total_cmp(&value(things, &b.0)))?;
     let mut hinge_marked = false;
     if let Some(arc) = arc
         && let Some(hinge) = hinge(things, belongs, &arc, marks[0])
@@ -75,6 +72,27 @@ fn of_look(things: &[Thing], belongs: &dyn Fn(&Thing) -> bool, hued: bool) -> Op
     let strays = crowd.saturating_sub(marks.len()) as f64;
     let worth = value(things, &marks) + if hued { 0.5 } else { 0.0 } - STRAY * strays;
     Some(Chain { marks, arc, hinge_marked, worth })
+}
+
+/// The circle on which the first mark swings; `Some(None)` where its path is so flat that it shows no centre. What
+/// hangs from a fixed point has no other path.
+fn hangs(things: &[Thing], marks: &[usize]) -> Option<Option<Arc>> {
+    let first = &things[*marks.first()?];
+    let path: Vec<[f64; 2]> = first.path.iter().flatten().copied().collect();
+    let most_px = MOST_OFF_ARC * first.travel_px;
+    match Arc::of(&path) {
+        Some(arc) => (arc.residual_px < most_px).then_some(Some(arc)),
+        None => (marks.len() > 1 && off_line_px(&path) < most_px).then_some(None),
+    }
+}
+
+/// Root mean square distance of points from the straight line through them.
+fn off_line_px(points: &[[f64; 2]]) -> f64 {
+    let n = points.len().max(1) as f64;
+    let mean = [0, 1].map(|k| points.iter().map(|p| p[k]).sum::<f64>() / n);
+    let moment = |i: usize, j: usize| points.iter().map(|p| (p[i] - mean[i]) * (p[j] - mean[j])).sum::<f64>() / n;
+    let (xx, yy, xy) = (moment(0, 0), moment(1, 1), moment(0, 1));
+    (0.5 * (xx + yy) - (0.25 * (xx - yy).powi(2) + xy * xy).sqrt()).max(0.0).sqrt()
 }
 
 /// More marks are better, seen in every frame.
@@ -192,6 +210,16 @@ mod tests {
         assert_eq!((chain.marks.clone(), chain.hinge_marked), (vec![1, 0], false));
         let centre = chain.arc.unwrap().centre_px;
         assert!((centre[0] - 400.0).abs() < 0.1 && (centre[1] - 50.0).abs() < 0.1, "{centre:?}");
+    }
+
+    #[test]
+    fn two_spots_that_keep_their_distance_but_swing_about_nothing_are_no_chain() {
+        let jumps = |t: f64| (7.0 * (13.0 * t).sin() * (3.0 * t).cos(), 6.0 * (29.0 * t).sin());
+        let things = [
+            thing(0, |t| [390.0 + jumps(t).0, 420.0 + jumps(t).1], true),
+            thing(0, |t| [810.0 + jumps(t).0, 520.0 + jumps(t).1], true),
+        ];
+        assert!(longest(&things, &["#c0b090".to_owned()]).is_none());
     }
 
     #[test]

@@ -22,8 +22,11 @@ impl Finding {
 /// The text of the file for a recording named `video`.
 pub fn to_toml(finding: &Finding, video: &str) -> String {
     let mut text = format!(
-        "# Written by `freeswing init {video}`: what the recording shows, and what only a ruler and a scale can tell.\n\
-         # Measure what is marked \"MEASURE\" and put the number there. `freeswing track` works without it.\n\n"
+        "# Written by `freeswing init {video}` from what the recording shows. Every line can be changed by hand.\n\
+         # Next: track {video} --config THIS_FILE --out angles.csv\n\
+         # then: freeswing identify angles.csv\n\
+         # Lengths and mass are marked \"MEASURE\": put numbers there before `freeswing fit` or `diagnose`; `track` and\n\
+         # `identify` without --config do not need them.\n\n"
     );
     specimen(&mut text, finding);
     rig(&mut text, finding);
@@ -36,12 +39,13 @@ fn specimen(text: &mut String, finding: &Finding) {
     text.push_str("name = \"unnamed\"              # for reports\n");
     let _ = writeln!(
         text,
-        "link_lengths_m = \"MEASURE\"    # {links} number{}, from the hinge down: [{}]",
+        "link_lengths_m = \"MEASURE\"    # {links} length{} in metres, from the hinge down, as in [{}]",
         if links == 1 { "" } else { "s" },
         vec!["0.1"; links].join(", ")
     );
-    text.push_str("mass_kg = \"MEASURE\"           # of the whole strip, marks included\n");
-    text.push_str("# length_m = 0.25             # of the whole strip, where it goes on beyond its last mark\n");
+    text.push_str("mass_kg = \"MEASURE\"           # kilograms, the whole strip or pendulum, marks included\n");
+    text.push_str("# length_m = 0.25             # metres, the whole strip, where it goes on beyond its last mark\n");
+    text.push_str("# width_m = 0.05              # metres, width of a strip, for the air's drag\n");
     text.push_str(
         "# for rigid arms or a bob give [[specimen.links]] with length_m, mass_kg, com_m, inertia_kg_m2 instead\n\n",
     );

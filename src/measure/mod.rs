@@ -269,10 +269,9 @@ impl<'a> Session<'a> {
             return Err(Error::Option { option: "--from".to_owned(), message });
         }
         let (mut tracks, found) = tracker.finish();
-        let rejected =
-            Rejected { path: &self.path, album: &self.album, hues: &self.hues, frames: self.stamps_s.len() as u64 };
+        let (rig, frames) = (&self.options.rig, self.stamps_s.len() as u64);
+        let rejected = Rejected { path: &self.path, album: &self.album, hues: &self.hues, frames, rig };
         rejected.check(&found, &tracks)?;
-        let rig = &self.options.rig;
         let file_t_s = tracks.t_s.clone();
         let file_timing = Timing::audit(&file_t_s, self.stream.nominal_rate_hz, self.stream.tick_s);
         let time_scale = match (rig.true_rate_hz, file_timing.real_rate_hz) {

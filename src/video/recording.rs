@@ -38,7 +38,10 @@ impl Recording {
             StillTimes::File(_) => "--times",
             StillTimes::Rate(_) => "--rate",
         };
-        let message = format!("is for a folder of stills; {} carries its own time stamps", path.display());
+        let message = format!(
+            "is for a folder of stills, and {} carries its own time stamps; leave it out, or say --true-rate for slow motion",
+            path.display()
+        );
         Err(Error::Option { option: option.to_owned(), message })
     }
 

@@ -4,15 +4,13 @@
 //! up to the border of the held-out proof, and the rest of both curves is prediction. Below, the torque that the base model lacks, against the angle
 //! it works on and against that one's rate: the shape of a law before it has a name.
 
-use std::f64::consts::TAU;
 use std::fmt::Write;
 use std::ops::Range;
 
 use crate::cli::svg::{Panel, line, text};
 use crate::cli::table::number;
-use crate::diagnose::{Cause, Diagnosis, Ground, MissingTorque, Place, Prepared, Refit, locate};
+use crate::diagnose::{Diagnosis, Drawn, MissingTorque, Place};
 use crate::error::{Error, Result};
-use crate::experiment::Experiment;
 use crate::fit::{Residual, Residuals};
 
 /// Swings in the upper panel.
@@ -50,60 +48,31 @@ const HEAD: &str = r##"<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 960 
 
 /// Both models beside the first recording.
 #[derive(Debug)]
-pub struct Figure<'a> {
+pub struct Figure<'d> {
     /// Of the specimen.
-    pub title: &'a str,
-    /// What the base model leaves.
-    pub before: Residuals,
-    /// The effects named, and what is left with them.
-    pub after: Option<(Vec<Cause>, Residuals)>,
-    /// From here on both are predictions.
-    pub border_s: Option<f64>,
-    /// Period of the swing.
-    pub swing_s: f64,
-    /// What the base model lacks, of the model and not of the camera.
-    pub torque: Option<MissingTorque>,
+    title: &'d str,
+    /// What it shows.
+    drawn: &'d Drawn,
 }
 
-impl<'a> Figure<'a> {
+impl<'d> Figure<'d> {
     /// Of a diagnosis.
     ///
     /// # Errors
     /// [`Error::Simulation`] where a model cannot be integrated.
-    pub fn of(diagnosis: &Diagnosis<'_>, prepared: &Prepared, experiment: &'a Experiment) -> Result<Self> {
-        let (null, named) = (diagnosis.null(), diagnosis.named());
-        let (model, _) = null.problem.model(0, &null.x[..null.problem.free.len()])?;
-        let ground = diagnosis.ground.plain();
+    pub fn of(diagnosis: &'d Diagnosis) -> Result<Self> {
         let not_drawn = || Error::Simulation { detail: "the fitted motion cannot be integrated to be drawn".into() };
-        let alone = prepared.records.len() == 1;
-        let border_s = diagnosis.held_out.as_ref().filter(|_| alone).map(|held_out| held_out.from_s);
-        let left = |fit: &Refit<'_>, border_s: Option<f64>| match border_s {
-            Some(border_s) => predicted(&ground, fit, border_s),
-            None => locate::residuals(fit, 0),
-        };
-        let both = |border_s| Some((left(null, border_s)?, left(named, border_s)?));
-        let (before, after, border_s) = match border_s.and_then(|border_s| both(Some(border_s))) {
-            Some((before, after)) => (before, after, border_s),
-            None => both(None).map(|(before, after)| (before, after, None)).ok_or_else(not_drawn)?,
-        };
-        let causes = named.hypothesis.causes.clone();
-        Ok(Self {
-            title: &experiment.specimen.name,
-            before,
-            after: (!causes.is_empty()).then_some((causes, after)),
-            border_s,
-            swing_s: TAU / model.pace_rad_s(),
-            torque: diagnosis.missing_torque.clone().filter(|t| !t.works_on.is_empty()),
-        })
+        let drawn = diagnosis.drawn.as_ref().ok_or_else(not_drawn)?;
+        Ok(Self { title: &diagnosis.specimen, drawn })
     }
 
     /// The page.
     pub fn svg(&self) -> String {
-        let mut svg = HEAD.replace("HEIGHT", &HEIGHT_PX[usize::from(self.torque.is_some())].to_string());
+        let mut svg = HEAD.replace("HEIGHT", &HEIGHT_PX[usize::from(self.drawn.torque.is_some())].to_string());
         self.legend(&mut svg);
         self.swing(&mut svg);
         self.left(&mut svg);
-        if let Some(torque) = &self.torque {
+        if let Some(torque) = &self.drawn.torque {
             law(&mut svg, torque);
         }
         svg.push_str("</svg>\n");
@@ -112,7 +81,7 @@ impl<'a> Figure<'a> {
 
     fn legend(&self, svg: &mut String) {
         text(svg, "title", [28.0, 42.0], self.title);
-        let fitted = match self.border_s {
+        let fitted = match self.drawn.border_s {
             Some(border_s) => format!("Fitted before {border_s:.2} s, predicted from there on"),
             None => "Fitted to all of it".to_owned(),
         };
@@ -127,29 +96,29 @@ impl<'a> Figure<'a> {
         };
         entry("measured", true, "measured");
         entry("before", false, "base model (before)");
-        if let Some((causes, _)) = &self.after {
-            let names: Vec<&str> = causes.iter().map(|c| c.id()).collect();
+        if let Some((effects, _)) = &self.drawn.after {
+            let names: Vec<&str> = effects.iter().map(|c| c.id()).collect();
             entry("after", false, &format!("with {} (after)", names.join(" and ")));
         }
     }
 
     /// The end of the first angle.
     fn swing(&self, svg: &mut String) {
-        let Some(values) = self.before.values.first().filter(|v| !v.is_empty()) else { return };
+        let Some(values) = self.drawn.before.values.first().filter(|v| !v.is_empty()) else { return };
         let (first_s, last_s) = (values[0].t_s, values[values.len() - 1].t_s);
-        let least_rad = SEEN * self.before.noise_rad.first().copied().unwrap_or(0.0);
+        let least_rad = SEEN * self.drawn.before.noise_rad.first().copied().unwrap_or(0.0);
         let seen_s = values.iter().rfind(|v| v.measured_rad.abs() > least_rad).map_or(last_s, |v| v.t_s);
-        let until_s = seen_s.max(first_s + SWINGS * self.swing_s).min(last_s);
-        let from_s = (until_s - SWINGS * self.swing_s).max(first_s);
+        let until_s = seen_s.max(first_s + SWINGS * self.drawn.swing_s).min(last_s);
+        let from_s = (until_s - SWINGS * self.drawn.swing_s).max(first_s);
         let shown = |of: &Residuals| -> Vec<Residual> {
             of.values[0].iter().filter(|v| from_s <= v.t_s && v.t_s <= until_s).copied().collect()
         };
-        let (before, after) = (shown(&self.before), self.after.as_ref().map(|(_, left)| shown(left)));
+        let (before, after) = (shown(&self.drawn.before), self.drawn.after.as_ref().map(|(_, left)| shown(left)));
         let angles = before.iter().flat_map(|v| [v.measured_rad, v.predicted_rad]);
         let largest_rad = 1.12 * angles.fold(0.0f64, |a, b| a.max(b.abs()));
         let panel = Panel { x_px: WHOLE_PX, y_px: UPPER_PX, x: from_s..until_s, y: -largest_rad..largest_rad };
         let curve = |of: &[Residual]| of.iter().map(|v| (v.t_s, v.predicted_rad, v.rate_rad_s)).collect::<Vec<_>>();
-        let gap_s = 0.5 * self.swing_s;
+        let gap_s = 0.5 * self.drawn.swing_s;
         self.ahead(svg, &panel);
         panel.axes(svg, true);
         panel.curve(svg, "before", &curve(&before), gap_s);
@@ -165,10 +134,10 @@ impl<'a> Figure<'a> {
 
     /// What is left of every angle, before and after, each with a scale of its own.
     fn left(&self, svg: &mut String) {
-        match &self.after {
-            None => self.column(svg, WHOLE_PX, "left-before", &self.before),
+        match &self.drawn.after {
+            None => self.column(svg, WHOLE_PX, "left-before", &self.drawn.before),
             Some((_, after)) => {
-                self.column(svg, BEFORE_PX, "left-before", &self.before);
+                self.column(svg, BEFORE_PX, "left-before", &self.drawn.before);
                 self.column(svg, AFTER_PX, "left-after", after);
             }
         }
@@ -211,7 +180,7 @@ impl<'a> Figure<'a> {
 
     /// The line from which on a panel shows predictions.
     fn border(&self, svg: &mut String, panel: &Panel, with_words: bool) {
-        let Some(border_px) = self.border_s.and_then(|border_s| panel.vertical(svg, "border", border_s)) else {
+        let Some(border_px) = self.drawn.border_s.and_then(|border_s| panel.vertical(svg, "border", border_s)) else {
             return;
         };
         let y_px = panel.y_px.start + 16.0;
@@ -225,11 +194,11 @@ impl<'a> Figure<'a> {
 
     /// Root mean squares, of the prediction where there is one.
     fn heading(&self, is_after: bool, left: &Residuals, link: usize) -> String {
-        let from_s = self.border_s.unwrap_or(f64::NEG_INFINITY);
+        let from_s = self.drawn.border_s.unwrap_or(f64::NEG_INFINITY);
         let counted = left.values[link].iter().filter(|v| v.t_s >= from_s);
         let (count, squares) = counted.fold((0usize, 0.0), |(n, sum), v| (n + 1, sum + v.left_rad().powi(2)));
         let rms = number(1e3 * (squares / count.max(1) as f64).sqrt(), 3);
-        let of = if self.border_s.is_some() { "prediction" } else { "fit" };
+        let of = if self.drawn.border_s.is_some() { "prediction" } else { "fit" };
         let noise = number(1e3 * left.noise_rad[link], 3);
         let when = if is_after { "After" } else { "Before" };
         format!("{when}, θ{}: {of} {rms} mrad rms, noise {noise}", link + 1)
@@ -237,19 +206,10 @@ impl<'a> Figure<'a> {
 
     /// A tint behind what was not fitted.
     fn ahead(&self, svg: &mut String, panel: &Panel) {
-        if let Some(border_s) = self.border_s {
+        if let Some(border_s) = self.drawn.border_s {
             panel.rectangle(svg, "ahead", &(border_s..panel.x.end), &panel.y);
         }
     }
-}
-
-/// What a model leaves of the whole first recording, fitted before a border only.
-fn predicted(ground: &Ground<'_>, fit: &Refit<'_>, border_s: f64) -> Option<Residuals> {
-    let record = ground.records.first()?;
-    let early = [record.until(record.t_s.partition_point(|t| *t < border_s))];
-    let x = ground.on(&early).refit(&fit.hypothesis, fit, &[])?.x;
-    let problem = ground.problem(&fit.hypothesis).ok()?;
-    locate::residuals(&Refit { problem, x, ..fit.clone() }, 0)
 }
 
 /// The torque against what it works on, and against its rate.

@@ -1,9 +1,7 @@
 //! `freeswing diagnose`: where simulation and recording differ, and what physics was left out.
 
 mod figure;
-mod file;
 mod page;
-mod words;
 
 use std::path::{Path, PathBuf};
 
@@ -11,7 +9,7 @@ use serde_json::json;
 
 use super::Bar;
 use super::table::number;
-use crate::diagnose::{self, Refit, locate};
+use crate::diagnose::{self, report::Limits};
 use crate::error::{Error, Result};
 use crate::experiment::Experiment;
 use crate::model::ForwardModel;
@@ -89,20 +87,22 @@ impl DiagnoseArgs {
         let json = self.json.as_deref().map(OutputFile::create).transpose()?;
         let figure = self.figure.as_deref().map(OutputFile::create).transpose()?;
         let bar = Bar::of_fits(self.quiet);
-        let prepared = diagnose::prepare(&records, &experiment)?;
-        let diagnosis = diagnose::diagnose(&prepared, &experiment, &self.options(), &bar)?;
+        let diagnosis = diagnose::diagnose(&records, &experiment, &self.options(), &bar)?;
         drop(bar);
-        let specimen = &experiment.specimen.name;
         let alone = figure.as_ref().is_some_and(OutputFile::is_standard_output);
-        let text = if self.quiet || alone { String::new() } else { page::page(&diagnosis, specimen) };
+        let text = if self.quiet || alone { String::new() } else { page::page(&diagnosis) };
         if let Some(file) = figure {
-            file.commit(Figure::of(&diagnosis, &prepared, &experiment)?.svg().as_bytes())?;
+            file.commit(Figure::of(&diagnosis)?.svg().as_bytes())?;
         }
-        super::deliver(&text, &file::diagnosis(&diagnosis, specimen), json)
+        super::deliver(&text, &json!(diagnosis), json)
     }
 
     fn options(&self) -> diagnose::Options {
-        diagnose::Options { bootstraps: self.bootstraps, predict_from_s: self.predict_from }
+        diagnose::Options {
+            bootstraps: self.bootstraps,
+            predict_from_s: self.predict_from,
+            ..diagnose::Options::default()
+        }
     }
 
     /// What a planned recording could show.
@@ -128,7 +128,7 @@ impl DiagnoseArgs {
             number(1e3 * plan.noise_rad, 3)
         );
         let text = if self.quiet { String::new() } else { heading + &page::limits_table(&limits) };
-        super::deliver(&text, &json!({"schema": "freeswing.diagnosis/1", "detectable": file::limits(&limits)}), json)
+        super::deliver(&text, &json!({"schema": "freeswing.diagnosis/1", "detectable": Limits(limits)}), json)
     }
 }
 
@@ -147,8 +147,4 @@ fn check_figure(path: &Path) -> Result<()> {
         svg.display()
     );
     Err(Error::Option { option: "--figure".to_owned(), message })
-}
-
-fn rmse_rad(fit: &Refit<'_>) -> Vec<f64> {
-    locate::residuals(fit, 0).map(|r| r.rmse_rad).unwrap_or_default()
 }

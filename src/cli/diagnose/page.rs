@@ -2,53 +2,60 @@
 
 use std::fmt::Write;
 
-use super::rmse_rad;
-use super::words::{Statements, names};
 use crate::cli::table::{Table, number, paragraph};
-use crate::diagnose::{Detectable, Diagnosis, Refit, Status, verdict};
-use crate::model::Parameter;
+use crate::diagnose::words::names;
+use crate::diagnose::{Detectable, Diagnosis, Status};
 
 /// Candidates listed.
 const LISTED: usize = 6;
 
 /// The page of a diagnosis.
-pub(super) fn page(diagnosis: &Diagnosis<'_>, specimen: &str) -> String {
-    let statements = Statements { diagnosis };
-    let mut text = format!("{specimen}\n\n");
-    text.push_str(&paragraph("", &statements.verdict()));
-    text.push_str(&paragraph("", &statements.place()));
-    if let Some(advice) = &diagnosis.verdict.to_decide {
+pub(super) fn page(diagnosis: &Diagnosis) -> String {
+    let verdict = &diagnosis.verdict;
+    let mut text = format!("{}\n\n", diagnosis.specimen);
+    text.push_str(&paragraph("", &verdict.statement));
+    text.push_str(&paragraph("", &diagnosis.location.statement));
+    if let Some(advice) = &verdict.to_decide {
         text.push_str(&paragraph("", &format!("To decide: {advice}.")));
+    }
+    if !diagnosis.undecided.is_empty() {
+        let rounds = diagnosis.undecided.join(", ");
+        text.push_str(&paragraph("", &format!("The search's budget did not allow these rounds: {rounds}.")));
     }
     text.push('\n');
     // where the names stand although more is missing, they are weighed among themselves
-    let among = verdict::is_beyond_noise(diagnosis.named());
-    let probability = if among { "among these" } else { "probability" };
-    let mut table = Table::new(["the base model and", probability, "left mrad", "coefficient", "sd", "unit"]);
-    for weighed in diagnosis.weighed.iter().take(LISTED) {
-        let left = rmse_rad(&weighed.fit).iter().map(|r| number(1e3 * r, 3)).collect::<Vec<_>>().join(" ");
-        let probability = if among { weighed.if_named } else { weighed.probability };
-        let mut first = [names(&weighed.fit.hypothesis.causes, "nothing else"), number(probability.max(0.0), 3), left];
-        for (parameter, value, sd) in coefficients(&weighed.fit) {
+    let among = verdict.among_themselves;
+    let heading = if among { "among these" } else { "probability" };
+    let mut table = Table::new(["the base model and", heading, "left mrad", "coefficient", "sd", "unit"]);
+    for candidate in diagnosis.candidates.iter().take(LISTED) {
+        let left = candidate.rmse_rad.iter().map(|r| number(1e3 * r, 3)).collect::<Vec<_>>().join(" ");
+        let probability = if among { candidate.probability_if_named } else { candidate.probability };
+        let mark = if candidate.fit.certified { "" } else { " *" };
+        let mut first = [names(&candidate.effects, "nothing else") + mark, number(probability.max(0.0), 3), left];
+        for (_, quantity) in &candidate.coefficients {
             let [name, probability, left] = std::mem::take(&mut first);
-            table.row([name, probability, left, number(value, 4), number(sd, 2), parameter.unit().to_owned()]);
+            let value = number(quantity.value.unwrap_or(0.0), 4);
+            table.row([name, probability, left, value, number(quantity.sd, 2), quantity.unit.to_owned()]);
         }
         if !first[0].is_empty() {
             let [name, probability, left] = first;
             table.row([name, probability, left]);
         }
     }
-    table.row(["something not in the table".to_owned(), number(diagnosis.verdict.unknown, 3)]);
+    table.row(["something not in the table".to_owned(), number(verdict.unknown_probability, 3)]);
     text.push_str(&table.text());
+    if diagnosis.candidates.iter().take(LISTED).any(|candidate| !candidate.fit.certified) {
+        text.push_str("  * not certified: it has not converged, too few starts agree, or fewer effects leave less\n");
+    }
     proof(diagnosis, &mut text);
     limits(diagnosis, &mut text);
     text
 }
 
 /// What was not fitted.
-fn proof(diagnosis: &Diagnosis<'_>, text: &mut String) {
-    let Some(held_out) = &diagnosis.held_out else { return };
-    let noise_rad = &diagnosis.ground.noise[held_out.record].sd_rad;
+fn proof(diagnosis: &Diagnosis, text: &mut String) {
+    let Some(held_out) = &diagnosis.heldout else { return };
+    let noise_rad = &held_out.noise_rad;
     let _ = writeln!(text, "\nFitted before {:.2} s, predicted from there on:", held_out.from_s);
     let mut table = Table::new(["", "noise mrad", "base model leaves", "with the effects named"]);
     for link in 0..noise_rad.len() {
@@ -56,20 +63,20 @@ fn proof(diagnosis: &Diagnosis<'_>, text: &mut String) {
         table.row([
             format!("θ{}", link + 1),
             milli(noise_rad[link]),
-            milli(held_out.baseline_rad[link]),
-            milli(held_out.augmented_rad[link]),
+            milli(held_out.baseline_rmse_rad[link]),
+            milli(held_out.augmented_rmse_rad[link]),
         ]);
     }
     text.push_str(&table.text());
 }
 
 /// What could have been seen, where nothing was.
-fn limits(diagnosis: &Diagnosis<'_>, text: &mut String) {
-    if diagnosis.verdict.status != Status::Adequate || diagnosis.detectable.is_empty() {
+fn limits(diagnosis: &Diagnosis, text: &mut String) {
+    if diagnosis.verdict.status != Status::Adequate || diagnosis.detectable.0.is_empty() {
         return;
     }
     text.push_str("\nThis recording would have shown\n");
-    text.push_str(&limits_table(&diagnosis.detectable));
+    text.push_str(&limits_table(&diagnosis.detectable.0));
 }
 
 /// From which amounts on each effect is seen and named.
@@ -78,7 +85,7 @@ pub(super) fn limits_table(limits: &[Detectable]) -> String {
     for limit in limits {
         let amount = |value: f64| if value.is_finite() { number(value, 2) } else { "never".to_owned() };
         table.row([
-            limit.cause.id().to_owned(),
+            limit.effect.id().to_owned(),
             amount(limit.smallest),
             amount(limit.named),
             limit.parameter.unit().to_owned(),
@@ -86,12 +93,4 @@ pub(super) fn limits_table(limits: &[Detectable]) -> String {
         ]);
     }
     table.text()
-}
-
-/// Coefficients of the added effects with their standard deviations.
-fn coefficients(fit: &Refit<'_>) -> Vec<(Parameter, f64, f64)> {
-    let added = fit.added();
-    let covariance = fit.covariance(&added);
-    let of = |(i, p): (usize, &Parameter)| (*p, fit.value(*p).unwrap_or(0.0), covariance[(i, i)].sqrt());
-    added.iter().enumerate().map(of).collect()
 }

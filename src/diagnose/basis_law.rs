@@ -13,11 +13,11 @@
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
-use super::Place;
+use super::effect::Place;
 use super::latent::{Form, Latent, SIZES};
+use super::linearisation::{Input, Linearisation, Row};
 use super::refit::Refit;
 use super::screen::Projection;
-use super::surroundings::{Input, Row, Surroundings};
 use crate::fit::Record;
 use crate::model::effects::air::stations;
 use crate::model::{ForwardModel, Motion};
@@ -57,14 +57,14 @@ struct Instant {
 
 /// A recording's motion, ready for any torque.
 struct Swing<'s> {
-    around: &'s Surroundings,
+    around: &'s Linearisation,
     instants: Vec<Instant>,
     /// From row to row, with a torque on each link.
     transitions: Vec<DMatrix<f64>>,
 }
 
 impl<'s> Swing<'s> {
-    fn of(around: &'s Surroundings, model: &ForwardModel) -> Self {
+    fn of(around: &'s Linearisation, model: &ForwardModel) -> Self {
         let middle = |a: &[f64], b: &[f64]| -> Vec<f64> { a.iter().zip(b).map(|(a, b)| 0.5 * (a + b)).collect() };
         let last = around.rows.len().max(2) - 1;
         let instant = |(k, pair): (usize, &[Row])| {
@@ -160,9 +160,9 @@ fn torques<const C: usize>(swing: &Swing<'_>, of: impl Fn(&Instant) -> Vec<[f64;
 
 /// A law of any form around a fit, at each place that can have one, of the likeliest of the place's sizes (N·m, of the camera rad); `variance` scales that of
 /// the noise.
-pub fn any_laws(
+pub fn basis_laws(
     fit: &Refit<'_>,
-    around: &[Surroundings],
+    around: &[Linearisation],
     variance: f64,
     sizes: impl Fn(Place) -> [f64; SIZES] + Sync,
 ) -> Vec<Latent> {

@@ -2,25 +2,26 @@
 
 use std::fmt::Write;
 
-use crate::cli::table::number;
-use crate::diagnose::{Cause, Diagnosis, MissingTorque, Phase, Place, Status, verdict};
+use super::effect::{Effect, Place};
+use super::findings::Findings;
+use super::misfit::is_beyond_noise;
+use super::torque::MissingTorque;
+use super::verdict::{self, Status};
+use crate::digits::number;
 use crate::model::Parameter;
 
+/// A change of a probability that is worth a sentence.
+const SLIGHT_CHANGE: f64 = 0.01;
 /// A joint that yields before this part of its largest bend is dry.
 const DRY_SHARE: f64 = 0.01;
 
-/// The statements of a diagnosis.
-pub(super) struct Statements<'a> {
-    /// Of which.
-    pub diagnosis: &'a Diagnosis<'a>,
-}
-
-impl Statements<'_> {
+impl Findings<'_> {
     /// What is missing, and how sure that is.
-    pub fn verdict(&self) -> String {
-        let verdict = &self.diagnosis.verdict;
+    pub fn verdict_statement(&self) -> String {
+        let verdict = &self.verdict;
         let percent = 1e2 * verdict.probability;
-        match verdict.status {
+        let reservation = self.reservation();
+        let statement = match verdict.status {
             Status::Adequate => format!(
                 "Nothing is missing that this recording could show: the base model leaves only noise ({percent:.0} %)."
             ),
@@ -40,52 +41,68 @@ impl Statements<'_> {
                 let (effects, remark, more) = (words(&verdict.effects), self.remark(), self.more());
                 format!("Missing: most likely {effects} ({percent:.0} %){others}.{remark}{more}")
             }
+        };
+        statement + &reservation
+    }
+
+    /// What rivals whose fits are not certified could change.
+    fn reservation(&self) -> String {
+        let [low, high] = self.probability_interval();
+        let rivals: Vec<String> = self.posterior.uncertified.iter().map(|rival| names(rival, "nothing else")).collect();
+        if high - low < SLIGHT_CHANGE || rivals.is_empty() {
+            return String::new();
         }
+        format!(
+            " Too few starts of the search agree on {}: if that fitted as well, the probability would be {:.0} %.",
+            rivals.join("; "),
+            1e2 * low
+        )
     }
 
     /// What of the table comes nearest to something that is not in it, and what is not told from that.
     fn nearest(&self) -> String {
-        let named = &self.diagnosis.weighed[0];
-        let causes = &named.fit.hypothesis.causes;
-        if causes.is_empty() {
+        let named = &self.posterior.candidates[0];
+        let effects = &named.fit.hypothesis.effects;
+        if effects.is_empty() {
             return "; no law of the table comes nearer than the base model".to_owned();
         }
-        let [comes, explains, them] = match causes.len() {
+        let [comes, explains, them] = match effects.len() {
             1 => ["comes", "it explains", "it"],
             _ => ["come", "they explain", "them"],
         };
-        let mut others = verdict::not_told_apart(&self.diagnosis.weighed, |w| w.if_named);
-        others.retain(|cause| !causes.contains(cause));
+        let settings = &self.context.settings.verdict;
+        let mut others = verdict::not_told_apart(&self.posterior.candidates, |w| w.if_named, settings.told_apart);
+        others.retain(|effect| !effects.contains(effect));
         let apart = match others.len() {
             0 => String::new(),
             _ => format!("; the recording does not tell {them} from {}", names(&others, "")),
         };
         format!(
             ". Of the table {} {comes} nearest ({:.0} % among the named): {explains} {:.1} % of what the base model leaves beyond the noise{apart}",
-            words(causes),
+            words(effects),
             1e2 * named.if_named,
-            1e2 * self.diagnosis.explained()
+            1e2 * self.explained()
         )
     }
 
     /// What names that leave far more than noise do not explain.
     fn more(&self) -> String {
-        let fit = self.diagnosis.named();
-        if !verdict::is_beyond_noise(fit) {
+        let fit = self.named();
+        if !is_beyond_noise(fit, &self.context.settings.noise) {
             return String::new();
         }
         format!(
             " Of the table they come nearest and explain {:.1} % of what the base model leaves, but what is left is still {:.0} times the noise: something that is \
              not in the table is missing beside them, or in their place.",
-            1e2 * self.diagnosis.explained(),
-            verdict::over_noise(fit)
+            1e2 * self.explained(),
+            fit.over_noise()
         )
     }
 
     /// What a law's coefficients say beside their values.
     fn remark(&self) -> &'static str {
-        let dry_rad = DRY_SHARE * self.diagnosis.ground.largest_bend_rad();
-        match self.diagnosis.named().value(Parameter::HysteresisYield) {
+        let dry_rad = DRY_SHARE * self.context.largest_bend_rad();
+        match self.named().value(Parameter::HysteresisYield) {
             Some(yield_rad) if yield_rad < dry_rad => {
                 " The joint yields at next to no angle: that is dry friction in it."
             }
@@ -93,22 +110,10 @@ impl Statements<'_> {
         }
     }
 
-    /// With what the missing torque goes.
-    pub fn phase(&self) -> Option<Phase> {
-        match self.diagnosis.verdict.status {
-            Status::Adequate => None,
-            Status::Unknown => {
-                let of_torque = self.diagnosis.missing_torque.as_ref().and_then(|t| t.phase);
-                of_torque.or(self.diagnosis.departure.goes_with)
-            }
-            _ => self.diagnosis.named_effects().first().copied().and_then(Phase::of),
-        }
-    }
-
     /// Where and when it acts.
-    pub fn place(&self) -> String {
-        let departure = &self.diagnosis.departure;
-        let Some(place) = self.diagnosis.place() else { return String::new() };
+    pub fn place_statement(&self, energy_shares: [f64; 3]) -> String {
+        let departure = &self.departure;
+        let Some(place) = self.place() else { return String::new() };
         let mut statement = match place {
             Place::Hinge => "It acts at the hinge",
             Place::Joint => "It acts in the joint",
@@ -125,10 +130,10 @@ impl Statements<'_> {
                 "; the base model departs from {from_s:.2} s to {until_s:.2} s, at amplitudes of {least:.3} to {most:.3} rad"
             );
         }
-        if let Some(torque) = self.diagnosis.missing_torque.as_ref().filter(|t| t.place != Place::Camera) {
+        if let Some(torque) = self.missing_torque.as_ref().filter(|t| t.place != Place::Camera) {
             let _ = write!(statement, ". {}", words_of_torque(torque));
         }
-        let shares = self.diagnosis.energy_shares;
+        let shares = energy_shares;
         if shares.iter().sum::<f64>() > 0.0 {
             let _ = write!(
                 statement,
@@ -163,12 +168,12 @@ fn words_of_torque(torque: &MissingTorque) -> String {
 }
 
 /// Identifiers, one after another.
-pub(super) fn names(causes: &[Cause], none: &str) -> String {
-    if causes.is_empty() { none.to_owned() } else { causes.iter().map(|c| c.id()).collect::<Vec<_>>().join(", ") }
+pub fn names(effects: &[Effect], none: &str) -> String {
+    if effects.is_empty() { none.to_owned() } else { effects.iter().map(|c| c.id()).collect::<Vec<_>>().join(", ") }
 }
 
-fn words(causes: &[Cause]) -> String {
-    let words: Vec<String> = causes.iter().map(|c| format!("{} ({})", c.words(), c.id())).collect();
+fn words(effects: &[Effect]) -> String {
+    let words: Vec<String> = effects.iter().map(|c| format!("{} ({})", c.words(), c.id())).collect();
     match &words[..] {
         [first @ .., before, last] => [first, &[format!("{before} and {last}")]].concat().join(", "),
         few => few.concat(),

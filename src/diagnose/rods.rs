@@ -5,33 +5,28 @@
 
 use rayon::prelude::*;
 
-use super::ground::Ground;
+use super::context::FitContext;
 use super::refit::{Refit, least_chi2};
+use super::settings::Settings;
 use crate::experiment::{Experiment, Model};
 
 /// Counts between two marks that are tried beside the usual one, and the bounds of what they may lead to.
 const TRIED: [usize; 2] = [6, 12];
 const FEWEST: usize = 5;
 const MOST: usize = 20;
-/// Another count must lower χ² by so many variances of the best fit.
-pub(super) const WORTH: f64 = 25.0;
-/// An effect must lower it by this to stand beside fewer.
-const OF_AN_EFFECT: f64 = 9.0;
-/// Where the best fit leaves this many variances of the noise, a wrong count may have led to it, and every effect is tried with other counts.
-const UNEXPLAINED: f64 = 1.2;
-
 /// How well each fit does, what it needs being paid for, over what the best of them leaves.
-struct Weights {
+struct Weights<'s> {
     scatter: f64,
+    settings: &'s Settings,
 }
 
-impl Weights {
-    fn of(ground: &Ground<'_>, fits: &[Refit<'_>]) -> Self {
-        Self { scatter: (least_chi2(fits) / ground.values() as f64).max(1.0) }
+impl<'s> Weights<'s> {
+    fn of(context: &FitContext<'s>, fits: &[Refit<'_>]) -> Self {
+        Self { scatter: (least_chi2(fits) / context.values() as f64).max(1.0), settings: context.settings }
     }
 
     fn weight(&self, fit: &Refit<'_>) -> f64 {
-        fit.chi2 / self.scatter + OF_AN_EFFECT * fit.hypothesis.causes.len() as f64
+        fit.chi2 / self.scatter + self.settings.misfit.counts * fit.hypothesis.effects.len() as f64
     }
 
     fn best<'f, 'a>(&self, fits: &'f [Refit<'a>]) -> Option<&'f Refit<'a>> {
@@ -40,20 +35,20 @@ impl Weights {
 }
 
 /// The number of rods between two marks that the recordings ask for, if it is not the usual one; `None` also where the file asks for another.
-pub fn preferred(ground: &Ground<'_>, fits: &[Refit<'_>]) -> Option<usize> {
+pub fn preferred(context: &FitContext<'_>, fits: &[Refit<'_>]) -> Option<usize> {
     let usual = Model::default().pieces;
-    if !ground.is_strip() || ground.experiment.model.pieces != usual {
+    if !context.is_strip() || context.experiment.model.pieces != usual {
         return None;
     }
-    let weights = Weights::of(ground, fits);
+    let weights = Weights::of(context, fits);
     let best = weights.best(fits)?;
-    let within = |fit: &Refit<'_>| fit.hypothesis.causes.iter().all(|c| best.hypothesis.causes.contains(c));
-    let simple = |fit: &Refit<'_>| fit.hypothesis.causes.len() < 2 && !fit.hypothesis.is_dear();
-    let unexplained = weights.scatter > UNEXPLAINED;
+    let within = |fit: &Refit<'_>| fit.hypothesis.effects.iter().all(|c| best.hypothesis.effects.contains(c));
+    let simple = |fit: &Refit<'_>| fit.hypothesis.effects.len() < 2 && !fit.hypothesis.is_dear();
+    let unexplained = weights.scatter > weights.settings.search.count_unexplained;
     let compared: Vec<&Refit<'_>> = fits.iter().filter(|fit| within(fit) || unexplained && simple(fit)).collect();
     let left_with = |fit: &Refit<'_>, pieces: usize| {
-        let experiment = with(ground.experiment, pieces);
-        let other = Ground { experiment: &experiment, ..ground.clone() };
+        let experiment = with(context.experiment, pieces);
+        let other = FitContext { experiment: &experiment, ..context.clone() };
         Some(weights.weight(&other.refit(&fit.hypothesis, fit, &[])?))
     };
     let promised = compared.par_iter().with_max_len(1).filter_map(|fit| {
@@ -67,15 +62,16 @@ pub fn preferred(ground: &Ground<'_>, fits: &[Refit<'_>]) -> Option<usize> {
         Some((pieces, if is_new { left_with(fit, pieces)? } else { left }))
     });
     let (pieces, value) = promised.min_by(|a, b| a.1.total_cmp(&b.1))?;
-    (pieces != usual && value < weights.weight(best) - WORTH).then_some(pieces)
+    (pieces != usual && value < weights.weight(best) - weights.settings.search.worth_a_count).then_some(pieces)
 }
 
 /// Whether fits with another count do better, as was promised. Each round has learnt a noise of its own; the first one's is the yardstick.
-pub fn is_kept(ground: &Ground<'_>, before: &[Refit<'_>], after: &[Refit<'_>]) -> bool {
-    let weights = Weights::of(ground, before);
+pub fn is_kept(context: &FitContext<'_>, before: &[Refit<'_>], after: &[Refit<'_>]) -> bool {
+    let weights = Weights::of(context, before);
     let (Some(old), Some(new)) = (weights.best(before), weights.best(after)) else { return false };
+    let Some(noise) = before.first().map(|fit| &fit.problem.noise) else { return false };
     let mut problem = new.problem.clone();
-    problem.noise.clone_from(&ground.noise);
+    problem.noise.clone_from(noise);
     let new = Refit { chi2: problem.cost(&new.x), ..new.clone() };
     weights.weight(&new) < weights.weight(old)
 }
@@ -88,7 +84,7 @@ pub fn with(experiment: &Experiment, pieces: usize) -> Experiment {
 }
 
 /// The count, of at least `fewest`, at which what three counts leave promises to be least, and how much that is.
-pub(super) fn likeliest_count(left: &[(usize, f64)], fewest: usize) -> Option<(usize, f64)> {
+pub fn likeliest_count(left: &[(usize, f64)], fewest: usize) -> Option<(usize, f64)> {
     let points: Vec<(f64, f64)> = left.iter().map(|(pieces, left)| (epsilon(*pieces), *left)).collect();
     let (lowest, left) = lowest_point(&points, epsilon(MOST)..=epsilon(fewest))?;
     Some(((1.0 / lowest.sqrt()).round() as usize, left))

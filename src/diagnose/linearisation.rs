@@ -1,4 +1,4 @@
-//! A fitted motion's surroundings: what a small torque at any instant would have done to the angles.
+//! A fitted motion's linearisation: what a small torque at any instant would have done to the angles.
 //!
 //! The balance of torques linearised along the motion (`δ` of state and parameters, `u` an input torque),
 //!
@@ -11,7 +11,7 @@
 
 use nalgebra::{DMatrix, DVector};
 
-use super::Place;
+use super::effect::Place;
 use super::refit::Refit;
 use crate::fit::whitening::Whitening;
 use crate::model::observe::{chord_angles_rad, chord_slopes};
@@ -54,7 +54,7 @@ impl Input {
 
 /// One recording's motion, linearised.
 #[derive(Debug, Clone)]
-pub struct Surroundings {
+pub struct Linearisation {
     /// The links.
     pub chain: Chain,
     /// Stamps of the rows.
@@ -90,7 +90,7 @@ pub struct Row {
     pub sd_rad: Vec<f64>,
 }
 
-impl Surroundings {
+impl Linearisation {
     /// Of one recording of a fit; `None` where the motion cannot be integrated.
     pub fn of(fit: &Refit<'_>, record: usize) -> Option<Self> {
         let problem = &fit.problem;

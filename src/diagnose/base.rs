@@ -1,0 +1,140 @@
+//! The base model: its parameters, what is known of them, and its fit.
+
+use rayon::prelude::*;
+
+use super::context::FitContext;
+use super::effect::Effect;
+use super::hypothesis::Hypothesis;
+use super::learnt_noise::learnt_noise;
+use super::preparation::Prepared;
+use super::refit::Refit;
+use super::settings::{SearchSettings, Settings};
+use crate::error::{Error, Result};
+use crate::experiment::Experiment;
+use crate::fit::{Belief, Problem, Record, base_parameters};
+use crate::model::{ForwardModel, Parameter};
+
+/// Dampers to start the base model from, over the one it found.
+const WEAKER: [f64; 2] = [0.1, 0.01];
+
+/// How the file is taken.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Taken {
+    /// At its word: the geometry is what it states, and one link has a damper where it states one.
+    AtItsWord,
+    /// Loosely: inertias and centres of mass of general links were measured to about a tenth, and whatever swings has a damper.
+    Loosely,
+}
+
+/// The base model's parameters and what is known of them.
+///
+/// # Errors
+/// [`Error::Simulation`] for a specimen that cannot swing.
+pub fn base_of(
+    experiment: &Experiment,
+    marks: usize,
+    taken: Taken,
+    settings: &SearchSettings,
+) -> Result<(Vec<Parameter>, Vec<Belief>)> {
+    let mut base = base_parameters(experiment, marks);
+    if taken == Taken::AtItsWord {
+        if lacks_a_damper(experiment, marks) {
+            base.retain(|parameter| *parameter != Parameter::HingeViscous);
+        }
+        return Ok((base, Vec::new()));
+    }
+    let mut beliefs = Vec::new();
+    if !experiment.specimen.links.is_empty() {
+        let model = ForwardModel::of(experiment)?;
+        let uncertain: &[Parameter] = match marks {
+            1 => &[Parameter::FirstInertia],
+            _ => &[Parameter::FirstInertia, Parameter::FirstCom, Parameter::SecondInertia, Parameter::SecondCom],
+        };
+        for parameter in uncertain {
+            let value = model.value(*parameter).unwrap_or(0.0);
+            base.push(*parameter);
+            beliefs.push(Belief { parameter: *parameter, value, sd: settings.geometry_share * value.abs().max(1e-12) });
+        }
+    }
+    Ok((base, beliefs))
+}
+
+/// Whether taking the file loosely frees anything: a geometry, or a damper that it does not state.
+pub fn has_slack(experiment: &Experiment, marks: usize) -> bool {
+    !experiment.specimen.links.is_empty() || lacks_a_damper(experiment, marks)
+}
+
+/// Whether the file of a single link, which has no joint, states no damper: neither the hinge's nor a C.
+fn lacks_a_damper(experiment: &Experiment, marks: usize) -> bool {
+    marks == 1 && !experiment.model.states_damping && experiment.model.effects.hinge_viscous.is_none()
+}
+
+/// The effects that may be missing from a context's base model.
+pub fn candidates(context: &FitContext<'_>) -> Vec<Effect> {
+    let may_be = |effect: &Effect| effect.may_be_missing(context.experiment, &context.base, context.marks());
+    Effect::ALL.into_iter().filter(may_be).collect()
+}
+
+/// The context of a diagnosis with the file taken in some way.
+///
+/// # Errors
+/// As [`base_of`].
+pub fn context<'a>(
+    prepared: &'a Prepared,
+    experiment: &'a Experiment,
+    taken: Taken,
+    settings: &'a Settings,
+) -> Result<FitContext<'a>> {
+    let records = &prepared.records;
+    let marks = records.first().map_or(0, Record::links);
+    let (base, beliefs) = base_of(experiment, marks, taken, &settings.search)?;
+    let begun = beginning(prepared, &prepared.begun, experiment, &base)?;
+    let step_error_rad = prepared.step_error_rad;
+    Ok(FitContext { records, experiment, settings, base, beliefs, step_error_rad, begun, fine_strip: None })
+}
+
+/// Where a base model's descent begins: what was not free when the start was sought, where the file has it.
+fn beginning(prepared: &Prepared, x: &[f64], experiment: &Experiment, base: &[Parameter]) -> Result<Vec<f64>> {
+    let stated = Problem::new(&prepared.records, experiment, base)?.start_values()?;
+    let sought = |parameter: &Parameter| prepared.base.iter().position(|p| p == parameter);
+    let parameters = base.iter().zip(stated).map(|(parameter, stated)| sought(parameter).map_or(stated, |at| x[at]));
+    Ok(parameters.chain(x[prepared.base.len()..].iter().copied()).collect())
+}
+
+/// The base model's fit, with the noise that it leaves.
+///
+/// # Errors
+/// [`Error::Simulation`] where no motion near the start values follows the recordings.
+pub fn fitted<'a>(context: &FitContext<'a>, prepared: &Prepared) -> Result<Refit<'a>> {
+    let refused = || Error::Simulation {
+        detail: "no motion near the start values follows the recording; check [specimen] and [model]".into(),
+    };
+    let (nothing, most_steps) = (Hypothesis::default(), context.settings.descent.most_steps);
+    // from where short stretches led, and from where `fit` ended from there
+    let ended = beginning(prepared, &prepared.ended, context.experiment, &context.base)?;
+    let from = |x: Vec<f64>| context.descend_from(&nothing, &prepared.noise, x, most_steps);
+    let (first, other) = rayon::join(|| from(context.begun.clone()), || from(ended));
+    let first = context.best_of([first, other]).ok_or_else(refused)?;
+    let fit = from_weaker_dampers(context, first);
+    match learnt_noise(context, &fit) {
+        Some(noise) => context.judged_by(&noise, &fit, most_steps).ok_or_else(refused),
+        None => Ok(fit),
+    }
+}
+
+/// The base model anew from weaker dampers, where it leaves much: what it lacks can have driven its own damper so high that a mode is gone, and no
+/// descent leads back.
+fn from_weaker_dampers<'a>(context: &FitContext<'a>, fit: Refit<'a>) -> Refit<'a> {
+    let damper = Parameter::JointDamping;
+    let leaves_much = fit.left_share() > context.settings.misfit.much;
+    let Some(strong) = fit.value(damper).filter(|_| leaves_much) else { return fit };
+    let weaker = WEAKER
+        .par_iter()
+        .with_max_len(1)
+        .filter_map(|part| context.refit_below(fit.chi2, &fit.hypothesis, &fit, &[(damper, part * strong)]));
+    let best = weaker.min_by(|a, b| a.chi2.total_cmp(&b.chi2));
+    match best {
+        Some(best) if best.chi2 < fit.chi2 => best,
+        _ => fit,
+    }
+}

@@ -1,0 +1,136 @@
+//! The fit context: what every fit of one diagnosis shares, none of which changes.
+//!
+//! The noise is not among it. It is learnt from fits, and each fit owns the noise by which it was judged ([`super::refit::Refit`]).
+
+use super::effect::SetUp;
+use super::hypothesis::Hypothesis;
+use super::settings::Settings;
+use crate::error::Result;
+use crate::experiment::Experiment;
+use crate::fit::whitening::RecordNoise;
+use crate::fit::{Belief, Problem, Record};
+use crate::model::Parameter;
+
+/// A yield angle of the joint's hysteresis to expect, as a part of the largest bend, and how far from it that may be, as a part of itself.
+const YIELD: (f64, f64) = (0.2, 2.5);
+/// The same of a joint that has no spring: a bearing, whose friction is dry.
+const DRY_YIELD: (f64, f64) = (1e-3, 0.5);
+/// Rods between two marks while bending all along the strip is only a candidate.
+const CANDIDATE_RODS: usize = 3;
+
+/// What every fit of one diagnosis shares.
+#[derive(Debug, Clone)]
+pub struct FitContext<'a> {
+    /// The recordings.
+    pub records: &'a [Record],
+    /// Specimen, rig and start values.
+    pub experiment: &'a Experiment,
+    /// Thresholds.
+    pub settings: &'a Settings,
+    /// The base model's parameters.
+    pub base: Vec<Parameter>,
+    /// What is known of them.
+    pub beliefs: Vec<Belief>,
+    /// Of the integration.
+    pub step_error_rad: f64,
+    /// Where the base model's descent began: parameters and starts that short stretches led to. Empty where that is not known.
+    pub begun: Vec<f64>,
+    /// Rods between two marks of a strip that bends everywhere, which may then start in as many shapes as one that is the base model: it is dear, and worth it
+    /// where such a strip is the answer. Few, and no further shapes, where it is only a candidate.
+    pub fine_strip: Option<usize>,
+}
+
+impl<'a> FitContext<'a> {
+    /// The problem of a hypothesis, judged by some noise.
+    ///
+    /// # Errors
+    /// As [`Problem::new`].
+    pub fn problem(&self, hypothesis: &Hypothesis, noise: &[RecordNoise]) -> Result<Problem<'a>> {
+        let mut free = self.base.clone();
+        let mut beliefs = self.beliefs.clone();
+        let mut experiment = self.experiment.clone();
+        let mut set_up = SetUp {
+            free: &mut free,
+            beliefs: &mut beliefs,
+            experiment: &mut experiment,
+            yield_rad: self.yield_rad(),
+            rods: self.fine_strip.unwrap_or(CANDIDATE_RODS),
+        };
+        hypothesis.effects.iter().for_each(|effect| effect.set_up(&mut set_up));
+        let mut problem = Problem::new(self.records, &experiment, &free)?;
+        problem.noise = noise.to_vec();
+        problem.beliefs = beliefs;
+        if free.contains(&Parameter::BendingStiffness) && !self.is_strip() && self.fine_strip.is_none() {
+            // no more is free at its start than in the rods it is compared with
+            problem.further_shapes = 0;
+        }
+        problem.accuracy = problem.accuracy_of(problem.longest_s(), self.step_error_rad);
+        if let Some((record, at_s)) = hypothesis.dropped {
+            problem.dropped_at_s[record] = at_s;
+        }
+        Ok(problem)
+    }
+
+    /// The same with other recordings of it.
+    #[must_use]
+    pub fn on<'b>(&self, records: &'b [Record]) -> FitContext<'b>
+    where
+        'a: 'b,
+    {
+        let begun = if records.len() == self.records.len() { self.begun.clone() } else { Vec::new() };
+        FitContext { records, begun, ..self.clone() }
+    }
+
+    /// Largest measured difference of two neighbouring angles; of one link the largest angle.
+    pub fn largest_bend_rad(&self) -> f64 {
+        let of = |record: &Record| {
+            let rows = 0..record.len();
+            let bend = |row: usize| match &record.theta_rad[..] {
+                [first, second, ..] => Some((second[row]? - first[row]?).abs()),
+                [only] => only[row].map(f64::abs),
+                [] => None,
+            };
+            rows.filter_map(bend).fold(0.0, f64::max)
+        };
+        self.records.iter().map(of).fold(1e-6, f64::max)
+    }
+
+    /// Whether the base model's joint has a spring.
+    pub fn has_spring(&self) -> bool {
+        self.base.iter().any(|parameter| parameter.is_spring())
+    }
+
+    /// What is believed of a hysteresis' yield angle, and its standard deviation.
+    pub fn yield_rad(&self) -> (f64, f64) {
+        let (share, scatter) = if self.has_spring() { YIELD } else { DRY_YIELD };
+        let yield_rad = share * self.largest_bend_rad();
+        (yield_rad, scatter * yield_rad)
+    }
+
+    /// Whether the base model bends all along the strip.
+    pub fn is_strip(&self) -> bool {
+        self.base.contains(&Parameter::BendingStiffness)
+    }
+
+    /// Number of angles.
+    pub fn marks(&self) -> usize {
+        self.records.first().map_or(0, Record::links)
+    }
+
+    /// Number of values.
+    pub fn values(&self) -> usize {
+        self.records.iter().map(|r| r.values(0..r.len())).sum()
+    }
+}
+
+/// The first part of each recording.
+pub fn first_part(records: &[Record], part: f64) -> Vec<Record> {
+    let rows =
+        |record: &Record| ((part * record.len() as f64) as usize).max(crate::series::FEWEST_ROWS).min(record.len());
+    records.iter().map(|record| record.until(rows(record))).collect()
+}
+
+/// Noise without errors in step with the swing: what a model lacks is in step as well, and no descent must be told not to mind it.
+pub fn without_errors_in_step(noise: &[RecordNoise]) -> Vec<RecordNoise> {
+    noise.iter().map(|noise| RecordNoise { in_step: 0.0, ..noise.clone() }).collect()
+}

@@ -1,0 +1,245 @@
+//! The ways to fit a hypothesis: near another fit, anew from short stretches, or on from where it stands.
+
+use nalgebra::DVector;
+
+use super::context::FitContext;
+use super::hypothesis::Hypothesis;
+use super::refit::Refit;
+use crate::experiment::Experiment;
+use crate::fit::descent::Descent;
+use crate::fit::shooting::{multiple_shooting, shooting_along};
+use crate::fit::whitening::RecordNoise;
+use crate::fit::{Problem, straight};
+use crate::model::Parameter;
+use crate::model::observe::{chord_angles_rad, chord_slopes};
+
+/// Losses imitate each other closely: only a weakly damped step goes along the valley between them.
+const FIRST_DAMPING: f64 = 1e-8;
+
+/// Values of some coefficients to start from.
+pub type Start = [(Parameter, f64)];
+
+impl<'a> FitContext<'a> {
+    /// Fits a hypothesis from the parameters of another fit, judged by the same noise; `start` gives values of further ones.
+    pub fn refit(&self, hypothesis: &Hypothesis, near: &Refit<'_>, start: &Start) -> Option<Refit<'a>> {
+        self.refit_by(self.descent(self.settings.descent.few_steps), hypothesis, near, start)
+    }
+
+    /// The same, which ends after its first steps unless they lead below `bound`.
+    pub fn refit_below(
+        &self,
+        bound: f64,
+        hypothesis: &Hypothesis,
+        near: &Refit<'_>,
+        start: &Start,
+    ) -> Option<Refit<'a>> {
+        self.refit_by(self.descent_below(bound), hypothesis, near, start)
+    }
+
+    fn refit_by(
+        &self,
+        descent: Descent,
+        hypothesis: &Hypothesis,
+        near: &Refit<'_>,
+        start: &Start,
+    ) -> Option<Refit<'a>> {
+        let (problem, x) = self.start(hypothesis, near, start)?;
+        // a score is linear: where it overshoots, start from nothing
+        let mut careful = x.clone();
+        let given = hypothesis.effects.iter().flat_map(|effect| effect.parameters());
+        let given = given.filter(|p| p.is_proportional() && start.iter().any(|(given, _)| given == *p));
+        for place in given.filter_map(|p| problem.free.iter().position(|free| free == p)) {
+            careful[place] = 0.0;
+        }
+        if careful == x {
+            return self.descend_by(descent, hypothesis, problem, x);
+        }
+        // without what is given it is the fit nearby
+        let is_near = near.is_part_of(hypothesis, &problem) && start.iter().all(|(p, _)| near.value(*p).is_none());
+        let worst_start = if is_near { near.chi2 } else { problem.cost(&careful) };
+        self.descend_by(Descent { worst_start, ..descent }, hypothesis, problem.clone(), x)
+            .or_else(|| self.descend_by(descent, hypothesis, problem, careful))
+    }
+
+    /// The first steps of a refit.
+    pub fn begin(&self, hypothesis: &Hypothesis, near: &Refit<'_>, start: &Start) -> Option<Refit<'a>> {
+        let (problem, x) = self.start(hypothesis, near, start)?;
+        self.descend(hypothesis, problem, x, self.settings.descent.first_steps)
+    }
+
+    /// Σr² where a refit would start.
+    pub fn cost_at(&self, hypothesis: &Hypothesis, near: &Refit<'_>, start: &Start) -> f64 {
+        self.start(hypothesis, near, start).map_or(f64::INFINITY, |(problem, x)| problem.cost(&x))
+    }
+
+    /// The problem of a hypothesis, and its variables from another fit and some given values.
+    fn start(&self, hypothesis: &Hypothesis, near: &Refit<'_>, start: &Start) -> Option<(Problem<'a>, Vec<f64>)> {
+        let problem = self.problem(hypothesis, &self.noise_of(near)).ok()?;
+        let mut x = problem.start_values().ok()?;
+        for (value, parameter) in x.iter_mut().zip(&problem.free) {
+            let given = start.iter().find(|(p, _)| p == parameter).map(|(_, v)| *v);
+            let inherited = near.value(*parameter);
+            *value = given.or(inherited).unwrap_or(*value);
+        }
+        // a strip that bends everywhere begins as stiff as the joint it replaces
+        let bending = problem.free.iter().position(|p| *p == Parameter::BendingStiffness);
+        let begins = bending.filter(|_| near.value(Parameter::BendingStiffness).is_none());
+        if let (Some(k), Some(place)) = (near.value(Parameter::JointStiffness), begins) {
+            let lengths_m = self.experiment.specimen.lengths_m();
+            x[place] = k * lengths_m.iter().sum::<f64>() / lengths_m.len() as f64;
+        }
+        let lower = problem.lower();
+        x.iter_mut().zip(&lower).for_each(|(x, low)| *x = x.max(*low));
+        x.extend(problem.starts_from(&near.problem, &near.x));
+        Some((problem, x))
+    }
+
+    /// The noise by which a fit was judged, of these recordings.
+    pub fn noise_of(&self, fit: &Refit<'_>) -> Vec<RecordNoise> {
+        let of = &fit.problem;
+        if of.records.iter().map(|record| &record.path).eq(self.records.iter().map(|record| &record.path)) {
+            return of.noise.clone();
+        }
+        let place = |path: &std::path::Path| of.records.iter().position(|own| own.path == path).unwrap_or(0);
+        self.records.iter().map(|record| of.noise[place(&record.path)].clone()).collect()
+    }
+
+    /// Fits a hypothesis from the start values of the experiment, by multiple shooting first: for a base model whose motion is out of step.
+    /// It ends after its first steps unless they lead below a multiple of what is left without, by `beside`.
+    pub fn refit_anew(&self, hypothesis: &Hypothesis, start: &Start, beside: &Refit<'_>) -> Option<Refit<'a>> {
+        let noise = self.noise_of(beside);
+        let mut problem = self.problem(hypothesis, &noise).ok()?;
+        for (parameter, value) in start {
+            set(&mut problem.experiment, *parameter, *value);
+        }
+        let accuracy = problem.accuracy;
+        let x = multiple_shooting(&mut problem).ok()?.x;
+        problem.noise = noise;
+        problem.accuracy = accuracy;
+        let bound = self.settings.descent.beyond_hope * beside.chi2;
+        self.descend_by(self.descent_below(bound), hypothesis, problem, x)
+    }
+
+    /// A restart along another fit's motion, which follows the recordings, whatever hypothesis it is of: stretches begin where that motion is, with its
+    /// parameters, and are drawn together.
+    pub fn refit_along(&self, hypothesis: &Hypothesis, leader: &Refit<'_>, start: &Start) -> Option<Refit<'a>> {
+        let (mut problem, x) = self.start(hypothesis, leader, start)?;
+        let (noise, accuracy) = (problem.noise.clone(), problem.accuracy);
+        let motions: Vec<Vec<Vec<f64>>> =
+            (0..self.records.len()).map(|record| states_along(leader, record)).collect::<Option<_>>()?;
+        let parameters = &x[..problem.free.len()];
+        let x = shooting_along(&mut problem, parameters, |record, row| motions[record][row].clone()).ok()?.x;
+        (problem.noise, problem.accuracy) = (noise, accuracy);
+        self.descend_by(self.descent(self.settings.descent.most_steps), hypothesis, problem, x)
+    }
+
+    /// The best of some fits of one hypothesis, with the number of those that agree with it.
+    pub fn best_of(&self, fits: impl IntoIterator<Item = Option<Refit<'a>>>) -> Option<Refit<'a>> {
+        fits.into_iter().flatten().reduce(|mut best, other| {
+            best.meet(other, self.settings.certificate.agrees);
+            best
+        })
+    }
+
+    /// Further steps of a fit.
+    pub fn go_on(&self, fit: &Refit<'a>, steps: usize) -> Option<Refit<'a>> {
+        let again = self.descend(&fit.hypothesis, fit.problem.clone(), fit.x.clone(), steps)?;
+        Some(Refit { certificate: fit.certificate, ..again })
+    }
+
+    /// The same judged by another noise.
+    pub fn judged_by(&self, noise: &[RecordNoise], fit: &Refit<'a>, steps: usize) -> Option<Refit<'a>> {
+        let mut problem = fit.problem.clone();
+        problem.noise = noise.to_vec();
+        let again = self.descend(&fit.hypothesis, problem, fit.x.clone(), steps)?;
+        Some(Refit { certificate: fit.certificate, ..again })
+    }
+
+    /// Descends from given variables of a hypothesis.
+    pub fn descend_from(
+        &self,
+        hypothesis: &Hypothesis,
+        noise: &[RecordNoise],
+        x: Vec<f64>,
+        most_steps: usize,
+    ) -> Option<Refit<'a>> {
+        self.descend(hypothesis, self.problem(hypothesis, noise).ok()?, x, most_steps)
+    }
+
+    /// The same with a problem at hand.
+    pub fn descend(
+        &self,
+        hypothesis: &Hypothesis,
+        problem: Problem<'a>,
+        x: Vec<f64>,
+        most_steps: usize,
+    ) -> Option<Refit<'a>> {
+        self.descend_by(self.descent(most_steps), hypothesis, problem, x)
+    }
+
+    fn descend_by(
+        &self,
+        descent: Descent,
+        hypothesis: &Hypothesis,
+        problem: Problem<'a>,
+        x: Vec<f64>,
+    ) -> Option<Refit<'a>> {
+        let outcome = straight::descend(&problem, &descent, x)?;
+        Some(Refit::of(hypothesis.clone(), problem, outcome))
+    }
+
+    /// A fit whose motions start as short stretches show them to, whatever it makes of them.
+    pub fn seen_to_start<'b>(&self, fit: &Refit<'b>) -> Refit<'b> {
+        let mut fit = fit.clone();
+        let starts = fit.x.len() - fit.problem.free.len();
+        if let Some(seen) = self.begun.len().checked_sub(starts) {
+            fit.x.truncate(fit.problem.free.len());
+            fit.x.extend_from_slice(&self.begun[seen..]);
+        }
+        fit
+    }
+
+    fn descent(&self, most_steps: usize) -> Descent {
+        let enough = self.settings.descent.enough;
+        Descent { most_steps, enough, damping: FIRST_DAMPING, ..Descent::default() }
+    }
+
+    /// One that ends after its first steps unless they lead below a bound.
+    fn descent_below(&self, bound: f64) -> Descent {
+        let settings = &self.settings.descent;
+        Descent { judged: Some((settings.first_steps, bound)), ..self.descent(settings.few_steps) }
+    }
+}
+
+/// Angles between marks and their rates at every row of a recording, along a fit's motion.
+fn states_along(fit: &Refit<'_>, record: usize) -> Option<Vec<Vec<f64>>> {
+    let (model, swing, true_s) = fit.motion(record)?;
+    let of_row = |t_s: &f64| {
+        let state = swing.at(*t_s);
+        let mut seen = chord_angles_rad(model.chain(), &state.theta_rad);
+        let rates = chord_slopes(model.chain(), &state.theta_rad) * DVector::from_column_slice(&state.omega_rad_s);
+        seen.extend(rates.iter());
+        seen
+    };
+    Some(true_s.iter().map(of_row).collect())
+}
+
+/// Sets a start value where the experiment holds it.
+fn set(experiment: &mut Experiment, parameter: Parameter, value: f64) {
+    let model = &mut experiment.model;
+    match parameter {
+        Parameter::JointStiffness => model.k_eq_n_m_per_rad = value,
+        Parameter::JointDamping => model.c_eq_n_m_s_per_rad = value,
+        Parameter::HysteresisYield => {
+            if let Some(law) = &mut model.effects.joint_hysteretic {
+                law.yield_rad = value;
+            }
+        }
+        Parameter::SupportFrequency => {
+            if let Some(law) = &mut model.effects.support_motion {
+                law.frequency_hz = value;
+            }
+        }
+        _ => {}
+    }
+}

@@ -1,0 +1,424 @@
+//! What a base model may lack: the table of effects. All that is particular to a law and needs no fit stands in its entry; how it is sought, in
+//! [`super::laws`].
+
+use std::fmt;
+
+use crate::experiment::{Experiment, Hysteresis};
+use crate::fit::Belief;
+use crate::model::Parameter;
+
+/// An effect of the table, by the identifier it has in files.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub enum Effect {
+    /// True time runs faster or slower than the stamps.
+    TimeBase,
+    /// Frames are missing at one instant.
+    DroppedFrames,
+    /// A common offset of the angles.
+    CameraTilt,
+    /// A common gain of the angles.
+    AngleGain,
+    /// θ₂ is sampled later than θ₁.
+    DifferentialLag,
+    /// Viscous friction of the hinge.
+    HingeViscous,
+    /// Dry friction of the hinge.
+    HingeCoulomb,
+    /// A spring at the hinge.
+    HingeStiffness,
+    /// A joint that stiffens or softens with the bend.
+    JointCubicStiffness,
+    /// A loss in the joint that does not depend on frequency.
+    JointHysteretic,
+    /// A joint that rests bent.
+    RestCurl,
+    /// Drag in proportion to speed.
+    AirLinear,
+    /// Drag in proportion to speed squared.
+    AirQuadratic,
+    /// Air carried along.
+    AddedMass,
+    /// A steady sideways acceleration.
+    SideForce,
+    /// The pivot moves to and fro.
+    SupportMotion,
+    /// The strip bends everywhere.
+    DistributedFlexibility,
+}
+
+/// Where an effect acts.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, serde::Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Place {
+    /// The hinge, and the pivot that carries it.
+    Hinge,
+    /// The joint between two links, or the strip's own bending.
+    Joint,
+    /// Along the strip, from outside.
+    Air,
+    /// The camera.
+    Camera,
+}
+
+impl Place {
+    /// The places of losses.
+    pub const OF_LOSSES: [Self; 3] = [Self::Hinge, Self::Joint, Self::Air];
+
+    /// The name in files.
+    pub fn id(self) -> &'static str {
+        match self {
+            Self::Hinge => "hinge",
+            Self::Joint => "joint",
+            Self::Air => "air",
+            Self::Camera => "camera",
+        }
+    }
+}
+
+/// Whether a torque acts with the position or with the velocity.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Phase {
+    /// It stores energy.
+    Position,
+    /// It takes energy away, or gives it.
+    Velocity,
+}
+
+impl Phase {
+    /// The name in files.
+    pub fn id(self) -> &'static str {
+        match self {
+            Self::Position => "position",
+            Self::Velocity => "velocity",
+        }
+    }
+}
+
+/// What makes an effect cost more than one motion a step.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Cost {
+    /// Nothing.
+    Ordinary,
+    /// It is looked for at every instant, but a motion serves them all.
+    EveryInstant,
+    /// It is looked for at every frequency.
+    EveryFrequency,
+    /// Every corner of its law ends a step of the integration.
+    Corners,
+    /// It makes the specimen a chain of many rods.
+    ManyRods,
+}
+
+/// What an effect does to a swing before anything else.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Acts {
+    /// It takes energy away, as the base model's own damper does.
+    Loss,
+    /// It changes the frequency, and so can put the base model out of step.
+    Pace,
+    /// Neither.
+    Otherwise,
+    /// It is a motion from outside, and exerts no torque of its own.
+    Motion,
+}
+
+/// What a specimen must have for an effect to mean anything.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Needs {
+    /// Nothing.
+    Nothing,
+    /// A joint.
+    Joint,
+    /// A joint with a spring.
+    Spring,
+    /// A joint with a spring that stands for the bending of a strip.
+    Strip,
+}
+
+/// One row of the table.
+#[derive(Debug)]
+pub struct Entry {
+    /// The identifier in files.
+    pub id: &'static str,
+    /// Its coefficients, the one in proportion to which it acts first.
+    pub parameters: &'static [Parameter],
+    /// Where it acts.
+    pub place: Place,
+    /// With what it goes.
+    pub phase: Option<Phase>,
+    /// What it costs.
+    pub cost: Cost,
+    /// What it does.
+    pub acts: Acts,
+    /// Whether it means anything.
+    pub needs: Needs,
+    /// The part of its own torque by which its law may be wrong before something unknown is suspected beside it. That of a hysteresis is larger: how it goes
+    /// over from spring to slip has as many forms as there are authors.
+    pub law_error: f64,
+    /// Whether it can stop a swing, at an instant that no derivative foretells.
+    pub can_stop: bool,
+    /// What a problem needs beyond its coefficients being free.
+    set_up: fn(&mut SetUp<'_>),
+    /// In words, with an article.
+    pub words: &'static str,
+}
+
+/// A problem that is being set up, and what of the recordings that may depend on.
+pub struct SetUp<'s> {
+    /// Free parameters.
+    pub free: &'s mut Vec<Parameter>,
+    /// What is known of them.
+    pub beliefs: &'s mut Vec<Belief>,
+    /// The model.
+    pub experiment: &'s mut Experiment,
+    /// A yield angle to expect, and its standard deviation.
+    pub yield_rad: (f64, f64),
+    /// Rods between two marks of a strip.
+    pub rods: usize,
+}
+
+impl SetUp<'_> {
+    /// A strip that bends everywhere takes the place of the joint's spring, and begins as stiff.
+    fn bend(&mut self) {
+        self.free.retain(|p| *p != Parameter::JointStiffness);
+        let model = &mut self.experiment.model;
+        model.pieces = self.rods;
+        let lengths_m = self.experiment.specimen.lengths_m();
+        let mark_m = lengths_m.iter().sum::<f64>() / lengths_m.len() as f64;
+        model.effects.distributed_flexibility = Some(model.k_eq_n_m_per_rad * mark_m);
+    }
+
+    /// A hysteresis yields somewhere near a usual angle.
+    fn yields(&mut self) {
+        let (yield_rad, sd) = self.yield_rad;
+        self.beliefs.push(Belief { parameter: Parameter::HysteresisYield, value: yield_rad, sd });
+        self.experiment.model.effects.joint_hysteretic = Some(Hysteresis { torque_n_m: 0.0, yield_rad });
+    }
+}
+
+/// Of a law that is right to this part of its torque.
+const EXACT: f64 = 0.002;
+
+const fn entry(parameters: &'static [Parameter], place: Place, acts: Acts, words: &'static str) -> Entry {
+    let (cost, needs, law_error) = (Cost::Ordinary, Needs::Nothing, EXACT);
+    let set_up: fn(&mut SetUp<'_>) = |_| {};
+    Entry { id: "", parameters, place, phase: None, cost, acts, needs, law_error, can_stop: false, set_up, words }
+}
+
+const fn position(entry: Entry) -> Entry {
+    Entry { phase: Some(Phase::Position), ..entry }
+}
+
+const fn velocity(entry: Entry) -> Entry {
+    Entry { phase: Some(Phase::Velocity), ..entry }
+}
+
+/// The table, those of the camera first: an error of measurement is not to be blamed on physics.
+static TABLE: [Entry; 17] = {
+    use Acts::{Loss, Motion, Otherwise, Pace};
+    use Parameter as P;
+    use Place::{Air, Camera, Hinge, Joint};
+    [
+        velocity(entry(&[P::TimeBase], Camera, Pace, "a camera clock that runs wrong")),
+        Entry {
+            cost: Cost::EveryInstant,
+            ..velocity(entry(&[P::DroppedFrames], Camera, Otherwise, "frames missing at one instant"))
+        },
+        entry(&[P::CameraTilt], Camera, Otherwise, "a tilted camera"),
+        position(entry(
+            &[P::AngleGain],
+            Camera,
+            Otherwise,
+            "a common gain of the angles (oblique view, pixels that are not square)",
+        )),
+        Entry {
+            needs: Needs::Joint,
+            ..velocity(entry(
+                &[P::DifferentialLag],
+                Camera,
+                Otherwise,
+                "a lag of θ2 behind θ1 (rolling shutter, filter)",
+            ))
+        },
+        velocity(entry(&[P::HingeViscous], Hinge, Loss, "viscous friction of the hinge")),
+        Entry { can_stop: true, ..velocity(entry(&[P::HingeCoulomb], Hinge, Loss, "dry friction of the hinge")) },
+        position(entry(&[P::HingeStiffness], Hinge, Pace, "a spring at the hinge")),
+        Entry {
+            needs: Needs::Joint,
+            ..position(entry(&[P::JointCubicStiffness], Joint, Pace, "a joint whose stiffness changes with the bend"))
+        },
+        Entry {
+            id: "joint_hysteretic",
+            cost: Cost::Corners,
+            needs: Needs::Joint,
+            law_error: 0.05,
+            set_up: |problem| problem.yields(),
+            ..velocity(entry(&[P::HysteresisTorque, P::HysteresisYield], Joint, Loss, "hysteresis of the joint"))
+        },
+        Entry {
+            needs: Needs::Spring,
+            ..position(entry(&[P::RestCurl], Joint, Otherwise, "a strip that is curled at rest"))
+        },
+        velocity(entry(&[P::AirLinear], Air, Loss, "air drag in proportion to speed")),
+        velocity(entry(&[P::AirQuadratic], Air, Loss, "air drag in proportion to speed squared")),
+        position(entry(&[P::AddedMass], Air, Pace, "air that swings along")),
+        entry(&[P::SideForce], Air, Otherwise, "a steady side force (light, a draught)"),
+        Entry {
+            id: "support_motion",
+            cost: Cost::EveryFrequency,
+            ..entry(&[P::SupportSine, P::SupportCosine, P::SupportFrequency], Hinge, Motion, "a support that moves")
+        },
+        Entry {
+            cost: Cost::ManyRods,
+            needs: Needs::Strip,
+            set_up: |problem| problem.bend(),
+            ..position(entry(&[P::BendingStiffness], Joint, Otherwise, "bending all along the strip"))
+        },
+    ]
+};
+
+impl Effect {
+    /// Every effect, in the order of the table.
+    pub const ALL: [Self; 17] = [
+        Self::TimeBase,
+        Self::DroppedFrames,
+        Self::CameraTilt,
+        Self::AngleGain,
+        Self::DifferentialLag,
+        Self::HingeViscous,
+        Self::HingeCoulomb,
+        Self::HingeStiffness,
+        Self::JointCubicStiffness,
+        Self::JointHysteretic,
+        Self::RestCurl,
+        Self::AirLinear,
+        Self::AirQuadratic,
+        Self::AddedMass,
+        Self::SideForce,
+        Self::SupportMotion,
+        Self::DistributedFlexibility,
+    ];
+
+    /// Its row of the table.
+    pub fn entry(self) -> &'static Entry {
+        &TABLE[self as usize]
+    }
+
+    /// The identifier in files: that of its coefficient, unless it has several.
+    pub fn id(self) -> &'static str {
+        let entry = self.entry();
+        if entry.id.is_empty() { entry.parameters[0].id() } else { entry.id }
+    }
+
+    /// Its coefficients, the one in proportion to which it acts first.
+    pub fn parameters(self) -> &'static [Parameter] {
+        self.entry().parameters
+    }
+
+    /// Where it acts.
+    pub fn place(self) -> Place {
+        self.entry().place
+    }
+
+    /// In words, with an article.
+    pub fn words(self) -> &'static str {
+        self.entry().words
+    }
+
+    /// Whether it has no derivative at the outset and is looked for at every instant, or frequency: the best of many gains by chance alone.
+    pub fn is_scanned(self) -> bool {
+        matches!(self.entry().cost, Cost::EveryInstant | Cost::EveryFrequency)
+    }
+
+    /// Whether a motion with it costs many times what others do.
+    pub fn is_dear(self) -> bool {
+        matches!(self.entry().cost, Cost::Corners | Cost::ManyRods)
+    }
+
+    /// Whether its score costs many times what others do.
+    pub fn is_dear_to_score(self) -> bool {
+        matches!(self.entry().cost, Cost::Corners | Cost::EveryFrequency)
+    }
+
+    /// Whether every corner of its law ends a step.
+    pub fn has_corners(self) -> bool {
+        self.entry().cost == Cost::Corners
+    }
+
+    /// Whether it makes another chain of the specimen, of which the base model is no special case.
+    pub fn changes_chain(self) -> bool {
+        self.entry().cost == Cost::ManyRods
+    }
+
+    /// Makes a problem ready for it.
+    pub fn set_up(self, problem: &mut SetUp<'_>) {
+        (self.entry().set_up)(problem);
+        problem.free.extend(self.parameters());
+    }
+
+    /// Whether it is missing from the base model of an experiment with this many angles, and can be missing at all.
+    pub fn may_be_missing(self, experiment: &Experiment, base: &[Parameter], marks: usize) -> bool {
+        let strip = experiment.specimen.links.is_empty();
+        let meaningful = match self.entry().needs {
+            Needs::Nothing => true,
+            Needs::Joint => marks > 1,
+            Needs::Spring => base.iter().any(|parameter| parameter.is_spring()),
+            Needs::Strip => marks > 1 && strip && base.contains(&Parameter::JointStiffness),
+        };
+        // a camera that misses frames, and the first coefficient of a named effect
+        meaningful && !self.parameters().iter().any(|p| base.contains(p)) && !self.is_set(experiment)
+    }
+
+    fn is_set(self, experiment: &Experiment) -> bool {
+        self == Self::DroppedFrames && experiment.model.effects.dropped_frames.is_some()
+    }
+
+    /// The laws that take energy away, the joint's own damper among them, and where.
+    pub fn losses() -> Vec<(Parameter, Place)> {
+        let of_table = Self::ALL.into_iter().filter(|effect| effect.entry().acts == Acts::Loss);
+        let of_table = of_table.map(|effect| (effect.parameters()[0], effect.place()));
+        std::iter::once((Parameter::JointDamping, Place::Joint)).chain(of_table).collect()
+    }
+}
+
+impl fmt::Display for Effect {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(self.id())
+    }
+}
+
+impl serde::Serialize for Effect {
+    fn serialize<S: serde::Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        serializer.serialize_str(self.id())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_effect_finds_its_own_row_by_its_identifier() {
+        let expected = [
+            "time_base",
+            "dropped_frames",
+            "camera_tilt",
+            "angle_gain",
+            "differential_lag",
+            "hinge_viscous",
+            "hinge_coulomb",
+            "hinge_stiffness",
+            "joint_cubic_stiffness",
+            "joint_hysteretic",
+            "rest_curl",
+            "air_linear",
+            "air_quadratic",
+            "added_mass",
+            "side_force",
+            "support_motion",
+            "distributed_flexibility",
+        ];
+        assert_eq!(Effect::ALL.map(Effect::id), expected);
+    }
+}

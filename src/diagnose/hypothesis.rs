@@ -1,0 +1,56 @@
+//! What is assumed: the base model with some effects.
+
+use super::effect::Effect;
+
+/// The base model with some effects.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Hypothesis {
+    /// The effects added, in the order of the table.
+    pub effects: Vec<Effect>,
+    /// From which stamp on frames are missing, and in which recording.
+    pub dropped: Option<(usize, f64)>,
+}
+
+impl Hypothesis {
+    /// Whether it holds an effect.
+    pub fn has(&self, effect: Effect) -> bool {
+        self.effects.contains(&effect)
+    }
+
+    /// Whether its motion costs many times what others do.
+    pub fn is_dear(&self) -> bool {
+        self.effects.iter().any(|effect| effect.is_dear())
+    }
+
+    /// Whether every corner of a law of it ends a step.
+    pub fn has_corners(&self) -> bool {
+        self.effects.iter().any(|effect| effect.has_corners())
+    }
+
+    /// Whether another one has all of its effects.
+    pub fn is_within(&self, other: &Self) -> bool {
+        self.effects.iter().all(|effect| other.has(*effect))
+    }
+
+    /// Whether another one has all of its effects, and more, about the same chain: it can leave no less than that one does.
+    pub fn nests_in(&self, other: &Self) -> bool {
+        let chain = |of: &Self| of.effects.iter().copied().filter(|e| e.changes_chain()).collect::<Vec<_>>();
+        self.effects.len() < other.effects.len() && self.is_within(other) && chain(self) == chain(other)
+    }
+
+    /// With one effect more.
+    #[must_use]
+    pub fn and(&self, effect: Effect, dropped: Option<(usize, f64)>) -> Self {
+        let mut effects = self.effects.clone();
+        effects.push(effect);
+        effects.sort_unstable();
+        Self { effects, dropped: if effect == Effect::DroppedFrames { dropped } else { self.dropped } }
+    }
+
+    /// Without one of its effects.
+    #[must_use]
+    pub fn without(&self, effect: Effect) -> Self {
+        let effects = self.effects.iter().copied().filter(|other| *other != effect).collect();
+        Self { effects, dropped: self.dropped }
+    }
+}

@@ -1,0 +1,137 @@
+//! The joint's hysteresis needs starts of its own, beside variables of its own ([`crate::fit::straight`]).
+
+use rayon::prelude::*;
+
+use super::super::context::{FitContext, first_part};
+use super::super::effect::Effect;
+use super::super::refit::Refit;
+use super::super::screen::{Score, Screen};
+use super::super::settings::PriorSettings;
+use super::{Coefficients, Law, Sought};
+use crate::model::Parameter;
+
+/// Yield angles at which it is scored, as parts of the largest bend.
+const SCORED: [f64; 3] = [0.03, 0.15, 0.6];
+/// Starts: yield angles as parts of the largest bend, and the hysteresis' part of the spring.
+const YIELD_SHARES: [f64; 3] = [0.05, 0.2, 0.6];
+const SPRING_SHARES: [f64; 2] = [0.4, 0.9];
+/// The same where everything else has failed, and how much stiffer the joint may then be; how many of them begin a descent, and how many end it.
+const EVERY_YIELD: [f64; 5] = [0.03, 0.1, 0.25, 0.5, 0.9];
+const EVERY_SHARE: [f64; 4] = [0.1, 0.4, 0.7, 0.95];
+const STIFFER: [f64; 3] = [1.0, 2.0, 8.0];
+const BEGUN: usize = 12;
+const ENDED: usize = 3;
+/// Parts of the recordings that are followed before the whole is.
+const PARTS: [f64; 2] = [0.15, 0.5];
+
+/// The law.
+pub struct Hysteresis;
+
+impl Law for Hysteresis {
+    /// From every start that may lead to its minimum: where the score points, as a part of the spring where there is something to explain, and from short
+    /// stretches, which do not know what the base model has given up, where nothing else explains it.
+    fn beside<'a>(&self, sought: &Sought<'_, 'a>) -> Option<Refit<'a>> {
+        let Sought { context, base, effect, score, misfit } = *sought;
+        let hypothesis = base.hypothesis.and(effect, None);
+        let near = || score.and_then(|score| context.refit_below(misfit.leads, &hypothesis, base, &score.start));
+        let softened = || (misfit.unexplained || misfit.seen).then(|| softened(context, base, misfit.leads)).flatten();
+        // in every joint of a strip, and from no memory in each stretch, it is too dear
+        let is_worth_it = misfit.unsolved && !context.is_strip();
+        let anew = || is_worth_it.then(|| context.refit_anew(&hypothesis, &[], base)).flatten();
+        let (near, (softened, anew)) = rayon::join(near, || rayon::join(softened, anew));
+        context.best_of([near, softened, anew])
+    }
+
+    fn anywhere<'a>(&self, context: &FitContext<'a>, base: &Refit<'a>) -> Option<Refit<'a>> {
+        anywhere(context, base)
+    }
+
+    /// The best of several yield angles.
+    fn scan(&self, screen: &Screen<'_, '_>) -> Option<Score> {
+        let context = screen.context;
+        let yields_rad = if context.has_spring() {
+            SCORED.map(|share| share * context.largest_bend_rad()).to_vec()
+        } else {
+            vec![context.yield_rad().0]
+        };
+        let of_yield = |yield_rad: &f64| {
+            let mut score = screen.of_coefficients(&[Effect::JointHysteretic], Some(*yield_rad))?.pop()?;
+            score.start.push((Parameter::HysteresisYield, *yield_rad));
+            Some(score)
+        };
+        let scores: Vec<Score> = yields_rad.par_iter().with_max_len(1).filter_map(of_yield).collect();
+        scores.into_iter().max_by(|a, b| a.gain.total_cmp(&b.gain))
+    }
+
+    /// Any yield angle that the recording does not tell from its own.
+    fn ln_kinds(&self, _fit: &Refit<'_>, _effect: Effect, of: &Coefficients<'_>, settings: &PriorSettings) -> f64 {
+        let (yield_rad, sd) = of(Parameter::HysteresisYield);
+        (yield_rad * settings.yields).ln().max(sd.ln())
+    }
+}
+
+/// The hysteresis where it makes up a part of what the base model takes for the spring: from the best of several such starts, if that leads below `bound`.
+fn softened<'a>(context: &FitContext<'a>, null: &Refit<'a>, bound: f64) -> Option<Refit<'a>> {
+    let hypothesis = null.hypothesis.and(Effect::JointHysteretic, None);
+    let starts = starts(context, null, &YIELD_SHARES, &SPRING_SHARES, &[1.0])?;
+    let costed = starts.into_iter().map(|start| (context.cost_at(&hypothesis, null, &start), start));
+    let (_, best) = costed.min_by(|a, b| a.0.total_cmp(&b.0))?;
+    if context.is_strip() {
+        return context.begin(&hypothesis, null, &best);
+    }
+    context.refit_below(bound, &hypothesis, null, &best)
+}
+
+/// Where a hysteresis beside a fit may start: with these yield angles, as parts of the largest bend, as these parts of the spring, the spring being as many times
+/// as stiff before it yields as that fit has it.
+fn starts(
+    context: &FitContext<'_>,
+    fit: &Refit<'_>,
+    yield_shares: &[f64],
+    spring_shares: &[f64],
+    stiffer: &[f64],
+) -> Option<Vec<Vec<(Parameter, f64)>>> {
+    let spring = fit.problem.free.iter().copied().find(|parameter| parameter.is_spring())?;
+    let stiffness = fit.problem.model(0, &fit.x[..fit.problem.free.len()]).ok()?.0.value(Parameter::JointStiffness)?;
+    // a base model that has locked its joint is no guide to the damper
+    let damping = fit.value(Parameter::JointDamping).unwrap_or(0.0).min(context.experiment.model.c_eq_n_m_s_per_rad);
+    let mut starts = Vec::new();
+    for yield_rad in yield_shares.iter().map(|share| share * context.largest_bend_rad()) {
+        for (share, scale) in spring_shares.iter().flat_map(|share| stiffer.iter().map(move |scale| (share, scale))) {
+            starts.push(vec![
+                (spring, (1.0 - share) * scale * fit.value(spring).unwrap_or(0.0)),
+                // what it loses the base model took for the damper's
+                (Parameter::JointDamping, (1.0 - share) * damping),
+                (Parameter::HysteresisTorque, share * scale * stiffness * yield_rad),
+                (Parameter::HysteresisYield, yield_rad),
+            ]);
+        }
+    }
+    Some(starts)
+}
+
+/// The hysteresis beside a fit from wherever it may be: its sum of squares has many false minima, of a whole recording far more than of its beginning.
+fn anywhere<'a>(context: &FitContext<'a>, fit: &Refit<'a>) -> Option<Refit<'a>> {
+    let hypothesis = fit.hypothesis.and(Effect::JointHysteretic, None);
+    let starts = starts(context, fit, &EVERY_YIELD, &EVERY_SHARE, &STIFFER)?;
+    let fit = &context.seen_to_start(fit);
+    let (settings, noise) = (&context.settings.descent, &fit.problem.noise);
+    let [beginning, first_half] = PARTS.map(|part| first_part(context.records, part));
+    let (beginning, first_half) = (context.on(&beginning), context.on(&first_half));
+    let cost = |start: Vec<(Parameter, f64)>| (beginning.cost_at(&hypothesis, fit, &start), start);
+    let mut costed: Vec<_> = starts.into_par_iter().with_max_len(1).map(cost).collect();
+    costed.sort_by(|a, b| a.0.total_cmp(&b.0));
+    costed.truncate(BEGUN);
+    let begun = costed.par_iter().with_max_len(1).filter_map(|(_, start)| {
+        let begun = beginning.begin(&hypothesis, fit, start)?;
+        beginning.go_on(&begun, settings.few_steps)
+    });
+    let mut begun: Vec<(f64, Vec<f64>)> = begun.map(|begun| (begun.chi2, begun.x)).collect();
+    begun.sort_by(|a, b| a.0.total_cmp(&b.0));
+    begun.truncate(ENDED);
+    let ended = begun.into_par_iter().with_max_len(1).filter_map(|(_, x)| {
+        let half = first_half.descend_from(&hypothesis, noise, x, settings.few_steps)?;
+        context.descend_from(&hypothesis, noise, half.x, settings.most_steps)
+    });
+    ended.min_by(|a, b| a.chi2.total_cmp(&b.chi2))
+}

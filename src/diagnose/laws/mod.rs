@@ -1,0 +1,120 @@
+//! How each law of the table is sought: what it promises beside a fit, the starts from which it is fitted, and what it costs to be one of its kind.
+//!
+//! | file | holds |
+//! |---|---|
+//! | `ordinary` | a law in proportion to its coefficient |
+//! | [`missing_frames`] | at which instant frames are missing |
+//! | [`moving_support`] | at which frequency a support moves |
+//! | [`hysteresis`] | where its fit starts |
+//! | [`bending`] | a strip that bends everywhere, as finely as it needs |
+
+pub mod bending;
+pub mod hysteresis;
+pub mod missing_frames;
+pub mod moving_support;
+mod ordinary;
+
+use rayon::prelude::*;
+
+use super::context::FitContext;
+use super::effect::Effect;
+use super::misfit::Misfit;
+use super::refit::Refit;
+use super::screen::{Score, Screen};
+use super::settings::{PriorSettings, Settings};
+use crate::model::Parameter;
+
+/// One effect to be sought beside a fit.
+#[derive(Debug, Clone, Copy)]
+pub struct Sought<'q, 'a> {
+    /// What all fits share.
+    pub context: &'q FitContext<'a>,
+    /// The fit beside which it is sought.
+    pub base: &'q Refit<'a>,
+    /// Which.
+    pub effect: Effect,
+    /// What it promises.
+    pub score: Option<&'q Score>,
+    /// How much that fit lacks.
+    pub misfit: Misfit,
+}
+
+/// Value and standard deviation of each coefficient of a fit.
+pub type Coefficients<'c> = dyn Fn(Parameter) -> (f64, f64) + 'c;
+
+/// What is particular to a law.
+pub trait Law: Sync {
+    /// The best fit of it beside another one, from every start that may lead to its minimum.
+    fn beside<'a>(&self, sought: &Sought<'_, 'a>) -> Option<Refit<'a>>;
+
+    /// The best fit of it beside another one from wherever it may be, where all else has failed: of a law with more false minima than its starts come by.
+    fn anywhere<'a>(&self, _context: &FitContext<'a>, _base: &Refit<'a>) -> Option<Refit<'a>> {
+        None
+    }
+
+    /// What it promises at a fit, of a law that is scanned for.
+    fn scan(&self, _screen: &Screen<'_, '_>) -> Option<Score> {
+        None
+    }
+
+    /// A fit with what no derivative tells set anew, for as long as that moves it.
+    fn settled<'a>(&self, _context: &FitContext<'a>, fit: Refit<'a>) -> Refit<'a> {
+        fit
+    }
+
+    /// Its strength and that one's standard deviation, in a fit that has it; `None` of a law that takes the place of one of the base model, and has no size
+    /// to be told from none.
+    fn strength(&self, effect: Effect, of: &Coefficients<'_>) -> Option<(f64, f64)> {
+        Some(of(effect.parameters()[0]))
+    }
+
+    /// Whether a fit has it as nature can.
+    fn is_possible(&self, _fit: &Refit<'_>) -> bool {
+        true
+    }
+
+    /// ln of how many kinds of it there are beyond its strength: signs, phases, frequencies, instants.
+    fn ln_kinds(&self, fit: &Refit<'_>, effect: Effect, of: &Coefficients<'_>, settings: &PriorSettings) -> f64;
+
+    /// The odds that it is what it seems to be, in a fit among others, and stands for nothing else.
+    fn odds(&self, _fit: &Refit<'_>, _others: &[&Refit<'_>], _settings: &Settings) -> f64 {
+        1.0
+    }
+}
+
+/// The law of an effect.
+pub fn law_of(effect: Effect) -> &'static dyn Law {
+    match effect {
+        Effect::DroppedFrames => &missing_frames::MissingFrames,
+        Effect::SupportMotion => &moving_support::MovingSupport,
+        Effect::JointHysteretic => &hysteresis::Hysteresis,
+        Effect::DistributedFlexibility => &bending::Bending,
+        _ => &ordinary::Ordinary,
+    }
+}
+
+/// A fit, each of its laws settled.
+pub fn settled<'a>(context: &FitContext<'a>, fit: Refit<'a>) -> Refit<'a> {
+    let effects = fit.hypothesis.effects.clone();
+    effects.into_iter().fold(fit, |fit, effect| law_of(effect).settled(context, fit))
+}
+
+/// The score of each effect that says anything; effects of the fit's own hypothesis are left out.
+pub fn scores(screen: &Screen<'_, '_>, effects: &[Effect]) -> Vec<Score> {
+    let further: Vec<Effect> = effects.iter().copied().filter(|e| !screen.fit.hypothesis.has(*e)).collect();
+    // what is scanned for, or has corners that the others need not suffer, has a motion of its own
+    let (alone, together): (Vec<Effect>, Vec<Effect>) =
+        further.into_iter().partition(|effect| effect.is_scanned() || effect.is_dear());
+    let (together, alone) = rayon::join(
+        || screen.of_coefficients(&together, None).unwrap_or_default(),
+        || alone.par_iter().with_max_len(1).filter_map(|effect| law_of(*effect).scan(screen)).collect::<Vec<_>>(),
+    );
+    let mut scores = together;
+    scores.extend(alone);
+    scores
+}
+
+/// The effects that are screened: a hysteresis in each joint of a strip of many links costs more than all others, and is only fitted alone.
+pub fn cheap_to_score(context: &FitContext<'_>, effects: &[Effect]) -> Vec<Effect> {
+    effects.iter().copied().filter(|effect| !(context.is_strip() && effect.has_corners())).collect()
+}

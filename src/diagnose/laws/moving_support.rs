@@ -1,0 +1,170 @@
+//! A support that moves to and fro: at which frequency.
+//!
+//! A support's sine and cosine have derivatives at every frequency, none of which leads to another. So all of them are looked at along the linearised motion, and the
+//! highest peaks are fitted.
+
+use nalgebra::DMatrix;
+
+use super::super::effect::{Effect, Place};
+use super::super::hypothesis::Hypothesis;
+use super::super::linearisation::Linearisation;
+use super::super::noise;
+use super::super::refit::Refit;
+use super::super::screen::{Score, Screen};
+use super::super::settings::{PriorSettings, Settings};
+use super::ordinary::Ordinary;
+use super::{Coefficients, Law, Sought};
+use crate::model::Parameter;
+use crate::model::observe::chord_angles_rad;
+
+/// Frequencies: this fine for the length of the recording.
+const PER_RESOLUTION: f64 = 1.0;
+/// Frequencies that are followed side by side.
+const AT_ONCE: usize = 8;
+/// Peaks over the frequency that are kept beside the highest.
+const FURTHER_PEAKS: usize = 4;
+/// Lowest and highest frequency, in units of the swing's. A slower one only leans, and has to move by metres to do so.
+const LOWEST: f64 = 0.1;
+const HIGHEST: f64 = 8.0;
+/// Power of the motion at a frequency, over its largest, from which on a torque of that frequency is in step with it.
+const POWER_IN_STEP: f64 = 1e-5;
+
+/// The law.
+pub struct MovingSupport;
+
+impl Law for MovingSupport {
+    fn beside<'a>(&self, sought: &Sought<'_, 'a>) -> Option<Refit<'a>> {
+        Ordinary.beside(sought)
+    }
+
+    fn scan(&self, screen: &Screen<'_, '_>) -> Option<Score> {
+        scanned(screen)
+    }
+
+    fn strength(&self, _effect: Effect, of: &Coefficients<'_>) -> Option<(f64, f64)> {
+        let ((sine, sd), (cosine, _)) = (of(Parameter::SupportSine), of(Parameter::SupportCosine));
+        Some((sine.hypot(cosine), sd))
+    }
+
+    fn is_possible(&self, fit: &Refit<'_>) -> bool {
+        !only_leans(fit)
+    }
+
+    /// Any direction of the phase, and any frequency up to a multiple of the swing's.
+    fn ln_kinds(&self, _fit: &Refit<'_>, effect: Effect, of: &Coefficients<'_>, settings: &PriorSettings) -> f64 {
+        let amplitude_m = self.strength(effect, of).map_or(0.0, |strength| strength.0);
+        (std::f64::consts::TAU * amplitude_m.abs()).ln() + settings.frequencies.ln()
+    }
+
+    /// In step with the swing it can be what it seems to be, or stand for a torque that is not known.
+    fn odds(&self, fit: &Refit<'_>, others: &[&Refit<'_>], settings: &Settings) -> f64 {
+        let Some(hz) = fit.value(Parameter::SupportFrequency) else { return 1.0 };
+        let prior = &settings.prior;
+        let fit_of = |hypothesis: &Hypothesis| others.iter().find(|f| f.hypothesis.effects == hypothesis.effects);
+        let rest = fit.hypothesis.without(Effect::SupportMotion);
+        let is_slight = fit_of(&rest).is_some_and(|without| without.chi2 - fit.chi2 < prior.slight * prior.slight);
+        if is_slight && rest.effects.iter().any(|e| e.place() != Place::Camera) {
+            return prior.support_beside_a_law;
+        }
+        let base = fit_of(&Hypothesis::default());
+        if base.is_some_and(|base| is_in_step(base, hz)) { prior.support_in_step } else { 1.0 }
+    }
+}
+
+/// A support that moves at each frequency in turn.
+fn scanned(screen: &Screen<'_, '_>) -> Option<Score> {
+    let problem = &screen.fit.problem;
+    let records = problem.records.len();
+    let mut around = Vec::with_capacity(records);
+    for record in 0..records {
+        let (model, _) = problem.model(record, &screen.fit.x[..problem.free.len()]).ok()?;
+        let linearisation = Linearisation::of(screen.fit, record)?;
+        let transitions = linearisation.transitions_of_inputs(|k| {
+            let theta_rad = &linearisation.rows[k].theta_rad;
+            DMatrix::from_fn(theta_rad.len(), 1, |i, _| -linearisation.chain.static_moment_kg_m(i) * theta_rad[i].cos())
+        });
+        around.push((linearisation, transitions, model.pace_rad_s()));
+    }
+    let span_s = around.iter().map(|(a, _, _)| a.t_s[a.t_s.len() - 1] - a.t_s[0]).fold(0.0, f64::max);
+    let swing_hz = around[0].2 / std::f64::consts::TAU;
+    let nyquist_hz = 0.5 * around.iter().map(|(a, _, _)| a.t_s.len() as f64).fold(0.0, f64::max) / span_s;
+    let count = (PER_RESOLUTION * span_s * (HIGHEST * swing_hz).min(0.9 * nyquist_hz)) as usize;
+    let hz = |k: usize| (k as f64 + 0.5) / (PER_RESOLUTION * span_s);
+    let first = ((PER_RESOLUTION * span_s * LOWEST * swing_hz) as usize).max(1);
+    let frequencies_hz: Vec<f64> = (first..count).map(hz).collect();
+    let of_several = |several: &[f64]| {
+        let columns = at_frequencies(screen, &around, several);
+        let promised = |(k, hz): (usize, &f64)| Some((screen.promise(&columns.columns(2 * k, 2))?, *hz));
+        several.iter().enumerate().filter_map(promised).collect::<Vec<_>>()
+    };
+    let promises: Vec<(f64, f64)> = frequencies_hz.chunks(AT_ONCE).flat_map(of_several).collect();
+    let is_peak = |k: &usize| {
+        let near = promises[k.saturating_sub(1)..promises.len().min(k + 2)].iter();
+        near.map(|p| p.0).fold(f64::NEG_INFINITY, f64::max) <= promises[*k].0
+    };
+    let mut peaks: Vec<(f64, f64)> = (0..promises.len()).filter(is_peak).map(|k| promises[k]).collect();
+    peaks.sort_by(|a, b| b.0.total_cmp(&a.0));
+    let at = |hz: f64| {
+        let columns = at_frequencies(screen, &around, &[hz]).columns(0, 2).into_owned();
+        let parameters = [Parameter::SupportSine, Parameter::SupportCosine];
+        let mut score = screen.score(Effect::SupportMotion, columns, &parameters, None)?;
+        score.start.push((Parameter::SupportFrequency, hz));
+        Some(score)
+    };
+    let mut score = at(peaks.first()?.1)?;
+    let further = peaks.iter().skip(1).take(FURTHER_PEAKS).filter_map(|(_, hz)| at(*hz));
+    score.further = further.map(|other| other.start).collect();
+    Some(score)
+}
+
+/// Two columns each of a few frequencies.
+fn at_frequencies(
+    screen: &Screen<'_, '_>,
+    around: &[(Linearisation, Vec<DMatrix<f64>>, f64)],
+    frequencies_hz: &[f64],
+) -> DMatrix<f64> {
+    let mut columns = DMatrix::zeros(screen.projection.residual.len(), 2 * AT_ONCE);
+    let mut first = 0;
+    for (linearisation, transitions, _) in around {
+        // the pivot's acceleration for one metre of sine, and of cosine
+        let course = |pair: &[f64]| {
+            let mut course = [0.0; 2 * AT_ONCE];
+            for (both, frequency_hz) in course.chunks_exact_mut(2).zip(frequencies_hz) {
+                let rate = std::f64::consts::TAU * frequency_hz;
+                let (sin, cos) = (rate * 0.5 * (pair[0] + pair[1])).sin_cos();
+                both.copy_from_slice(&[-rate * rate * sin, -rate * rate * cos]);
+            }
+            [course]
+        };
+        let held: Vec<[[f64; 2 * AT_ONCE]; 1]> = linearisation.t_s.windows(2).map(course).collect();
+        let seen = linearisation.seen(&linearisation.responses(transitions, &held));
+        columns.rows_mut(first, seen.nrows()).copy_from(&seen);
+        first += seen.nrows();
+    }
+    columns
+}
+
+/// Whether the support of a fit moves so slowly beside the swing that nothing moves but the angles' zero.
+fn only_leans(fit: &Refit<'_>) -> bool {
+    let Ok((model, _)) = fit.problem.model(0, &fit.x[..fit.problem.free.len()]) else { return false };
+    let swing_hz = model.pace_rad_s() / std::f64::consts::TAU;
+    fit.value(Parameter::SupportFrequency).is_some_and(|hz| hz < LOWEST * swing_hz)
+}
+
+/// Whether a support would move at a frequency at which the base model's own motion has power. Such a support can stand for any torque in step with
+/// the swing, so it names nothing.
+fn is_in_step(null: &Refit<'_>, frequency_hz: f64) -> bool {
+    (0..null.problem.records.len()).any(|record| {
+        let Some((model, swing, true_s)) = null.motion(record) else { return false };
+        let chords: Vec<Vec<f64>> =
+            true_s.iter().map(|t| chord_angles_rad(model.chain(), &swing.at(*t).theta_rad)).collect();
+        let span_s = true_s[true_s.len() - 1] - true_s[0];
+        let bin = (frequency_hz * span_s).round() as usize;
+        (0..null.problem.marks()).any(|link| {
+            let power = noise::spectrum(&chords.iter().map(|c| c[link]).collect::<Vec<f64>>());
+            let strongest = power[1..].iter().copied().fold(0.0, f64::max);
+            let near = bin.saturating_sub(1)..(bin + 2).min(power.len());
+            power[near.start.min(power.len())..near.end].iter().any(|p| *p > POWER_IN_STEP * strongest)
+        })
+    })
+}

@@ -1,0 +1,46 @@
+//! A law in proportion to its coefficient.
+
+use super::super::effect::{Acts, Effect, Needs};
+use super::super::misfit::is_out_of_step;
+use super::super::refit::Refit;
+use super::super::settings::PriorSettings;
+use super::{Coefficients, Law, Sought};
+
+/// Any of them.
+pub struct Ordinary;
+
+impl Law for Ordinary {
+    /// From where the score points. Where the base model is out of step, or has damped away what a better one keeps, from short stretches as well.
+    fn beside<'a>(&self, sought: &Sought<'_, 'a>) -> Option<Refit<'a>> {
+        let Sought { context, base, effect, score, misfit } = *sought;
+        let entry = effect.entry();
+        let mut tries = Vec::new();
+        if let Some(score) = score {
+            let hypothesis = score.hypothesis(&base.hypothesis);
+            let near = context.refit(&hypothesis, base, &score.start);
+            let still = |fit: &Refit<'_>| is_out_of_step(fit, &context.settings.misfit);
+            let lost = misfit.out_of_step && entry.acts == Acts::Pace && near.as_ref().is_none_or(still);
+            let slow =
+                misfit.unexplained && entry.acts == Acts::Loss && near.as_ref().is_none_or(|near| !near.converged);
+            if lost || slow {
+                tries.push(context.refit_anew(&hypothesis, &score.start, base));
+            }
+            if misfit.unexplained && near.as_ref().is_none_or(|near| near.chi2 > misfit.too_much) {
+                let others = score.further.iter();
+                tries.extend(others.map(|start| context.refit_below(misfit.leads, &hypothesis, base, start)));
+            }
+            tries.push(near);
+        }
+        let unsolved = misfit.unexplained && tries.iter().flatten().all(|fit| fit.chi2 > misfit.too_much);
+        if entry.needs == Needs::Spring && unsolved {
+            // what bends a joint at rest: a base model that has given its second mode up is no place to start from
+            tries.push(context.refit_anew(&base.hypothesis.and(effect, None), &[], base));
+        }
+        context.best_of(tries)
+    }
+
+    /// Either sign, where it may have either.
+    fn ln_kinds(&self, _fit: &Refit<'_>, effect: Effect, _of: &Coefficients<'_>, _settings: &PriorSettings) -> f64 {
+        if effect.parameters()[0].is_not_negative() { 0.0 } else { std::f64::consts::LN_2 }
+    }
+}

@@ -1,0 +1,56 @@
+//! The noise of the recordings, learnt anew from what a fit leaves where the motion has no power.
+
+use super::context::FitContext;
+use super::noise;
+use super::refit::Refit;
+use crate::fit::whitening::{Colour, RecordNoise};
+use crate::model::observe::chord_angles_rad;
+
+/// What a fit leaves where the motion has no power, if it differs from the noise by which that fit was judged in anything that counts: all fits that are to be
+/// compared must then be judged by it.
+pub fn learnt_noise(context: &FitContext<'_>, by: &Refit<'_>) -> Option<Vec<RecordNoise>> {
+    let settings = &context.settings.noise;
+    let mut all = context.noise_of(by);
+    let mut changed = false;
+    for (record, known) in all.iter_mut().enumerate() {
+        let prediction = by.problem.predict(record, &by.x, false).ok()?;
+        let (model, swing, true_s) = by.motion(record)?;
+        let data = &context.records[record];
+        let ticks = noise::ticks(&data.t_s);
+        // the motion's own lines, without what a jump of the stamps would make of them
+        let last = data.len() - 1;
+        let tick_s = (true_s[last] - true_s[0]) / ticks[last] as f64;
+        let chords: Vec<Vec<f64>> = (0..=ticks[last])
+            .map(|k| chord_angles_rad(model.chain(), &swing.at(true_s[0] + tick_s * k as f64).theta_rad))
+            .collect();
+        let mut angles = vec![(vec![0.0; chords.len()], Vec::new()); data.links()];
+        for value in &prediction.values {
+            let measured_rad = data.theta_rad[value.link][value.row].unwrap_or(value.predicted_rad);
+            angles[value.link].0[ticks[value.row]] =
+                (measured_rad - value.predicted_rad) / data.relative_sd[value.link][value.row];
+        }
+        for (link, (left, motion)) in angles.iter_mut().enumerate() {
+            motion.extend(chords.iter().map(|chord| chord[link]));
+            let (known_rad, known_colour) = (&mut known.sd_rad[link], &mut known.colour[link]);
+            let whole = noise::of_all(left);
+            let noise = match noise::off_the_lines(left, motion, settings) {
+                // a fit that has lost step leaves something at every frequency
+                Some(noise) if !by.hypothesis.effects.is_empty() && noise.sd > settings.grows * *known_rad => continue,
+                Some(noise) => noise,
+                // a motion with power everywhere, as one with a jump has: what is left at most
+                None if whole.sd < *known_rad => whole,
+                None => continue,
+            };
+            // where far more is left its colour is no weight for the rows
+            let colour = if whole.sd > settings.beyond * noise.sd { Colour::default() } else { noise.colour };
+            changed |= (noise.sd / *known_rad - 1.0).abs() > settings.changes || colour.differs_from(*known_colour);
+            (*known_rad, *known_colour) = (noise.sd, colour);
+        }
+        if let [first, second] = &angles[..] {
+            let across = noise::across([first, second].map(|(left, motion)| (&left[..], &motion[..])), settings);
+            changed |= (across - known.across).abs() > settings.changes;
+            known.across = across;
+        }
+    }
+    changed.then_some(all)
+}

@@ -1,0 +1,165 @@
+//! The posterior: how probable each hypothesis is, beside the others and beside something that no table holds.
+
+use super::effect::{Effect, Place};
+use super::energy::added_torque_n_m;
+use super::evidence::{self, Scatter, normalised};
+use super::latent::{Assumed, Latent};
+use super::laws::law_of;
+use super::refit::{self, Refit};
+use super::settings::Settings;
+use super::unknowns::unknowns;
+use crate::fit::whitening::RecordNoise;
+
+/// Probabilities below this change nothing.
+const NEGLIGIBLE: f64 = 1e-4;
+
+/// A hypothesis with its probability.
+#[derive(Debug, Clone)]
+pub struct Candidate<'a> {
+    /// Fitted.
+    pub fit: Refit<'a>,
+    /// ln of evidence and prior.
+    pub ln_posterior: f64,
+    /// Posterior.
+    pub probability: f64,
+    /// Posterior where nothing outside the table is at work.
+    pub if_named: f64,
+}
+
+/// Hypotheses beside the unknown.
+#[derive(Debug)]
+pub struct Posterior<'a> {
+    /// With their probabilities, likeliest first.
+    pub candidates: Vec<Candidate<'a>>,
+    /// The probability of something else.
+    pub unknown: f64,
+    /// The probability of the likeliest one if every rival whose fit is not certified, and which is within reach, fitted as well.
+    pub lowest: f64,
+    /// Those rivals.
+    pub uncertified: Vec<Vec<Effect>>,
+    /// That something around the likeliest fit, at each place.
+    pub unknowns: Vec<Latent>,
+}
+
+/// Weighs the hypotheses of some fits, out of so many candidate effects, beside the unknown around the likeliest of them.
+pub fn weigh<'a>(fits: Vec<Refit<'a>>, effects: usize, settings: &Settings) -> Posterior<'a> {
+    let values = fits.first().map_or(0, Refit::values);
+    let least = refit::least(&fits);
+    let scatter = least.map_or(Scatter::NOISE, |best| Scatter::of(best, values));
+    let least_without = |effect: Effect| {
+        let others = fits.iter().filter(|f| !f.hypothesis.effects.contains(&effect));
+        others.map(|f| f.chi2).fold(f64::INFINITY, f64::min)
+    };
+    let ln = |f: &Refit<'_>| {
+        evidence::ln_evidence(f, scatter, least_without, &settings.prior, settings.misfit.counts)
+            + evidence::ln_prior(&f.hypothesis, effects, &settings.prior)
+    };
+    let mut posterior: Vec<f64> = fits.iter().map(ln).collect();
+    let best = (0..fits.len()).max_by(|a, b| posterior[*a].total_cmp(&posterior[*b])).unwrap_or(0);
+    let latents = unknowns(&fits[best], fits[best].chi2 / values as f64, Assumed::BESIDE);
+    let law_error_n_m = law_error_n_m(&fits[best], added_torque_n_m(&fits[best]));
+    let gain = unknown_gain(&latents, law_error_n_m, slow_errors_rad(&fits[best]), settings.noise.coloured);
+    posterior.push(posterior[best] + settings.prior.unknown.ln() + gain);
+    let rivals = uncertified_within_reach(&fits, best, settings);
+    let mut at_best = posterior.clone();
+    let ln_prior = |fit: &Refit<'_>| evidence::ln_prior(&fit.hypothesis, effects, &settings.prior);
+    for rival in &rivals {
+        at_best[*rival] = at_best[*rival].max(posterior[best] + ln_prior(&fits[*rival]) - ln_prior(&fits[best]));
+    }
+    let others: Vec<&Refit<'_>> = fits.iter().collect();
+    let lowest = normalised(&at_best)[best] * genuine(&fits[best], &others, settings);
+    let uncertified = rivals.iter().map(|rival| fits[*rival].hypothesis.effects.clone()).collect();
+    let if_named = normalised(&posterior[..fits.len()]);
+    let mut probability = normalised(&posterior);
+    let mut unknown = probability.pop().unwrap_or(0.0);
+    // a name, above all a support that moves, may be a stand-in for what is not known
+    for (fit, probability) in fits.iter().zip(&mut probability).filter(|(_, p)| **p > NEGLIGIBLE) {
+        let genuine = genuine(fit, &others, settings);
+        unknown += (1.0 - genuine) * *probability;
+        *probability *= genuine;
+    }
+    let mut candidates: Vec<Candidate<'a>> = (fits
+        .into_iter()
+        .zip(posterior)
+        .zip(probability.into_iter().zip(if_named)))
+    .map(|((fit, ln_posterior), (probability, if_named))| Candidate { fit, ln_posterior, probability, if_named })
+    .collect();
+    // where the unknown takes all, or next to all, their order among themselves still counts
+    candidates
+        .sort_by(|a, b| (b.probability.total_cmp(&a.probability)).then(b.ln_posterior.total_cmp(&a.ln_posterior)));
+    Posterior { candidates, unknown, lowest, uncertified, unknowns: latents }
+}
+
+/// The rivals of the likeliest fit that are not certified, and leave so little more that a better fit of theirs might count.
+fn uncertified_within_reach(fits: &[Refit<'_>], best: usize, settings: &Settings) -> Vec<usize> {
+    let settings = (&settings.certificate, settings.misfit.counts);
+    let variance = (fits[best].chi2 / fits[best].values().max(1) as f64).max(1.0);
+    let needs = |fit: &Refit<'_>| fit.chi2 / variance + settings.1 * fit.hypothesis.effects.len() as f64;
+    let is_rival = |place: &usize| {
+        let fit = &fits[*place];
+        *place != best && !fit.is_certified(settings.0) && needs(fit) < needs(&fits[best]) + settings.0.within
+    };
+    (0..fits.len()).filter(is_rival).collect()
+}
+
+/// The odds that a fit's effects are what has been filmed, and stand for nothing else.
+fn genuine(fit: &Refit<'_>, others: &[&Refit<'_>], settings: &Settings) -> f64 {
+    let effects = &fit.hypothesis.effects;
+    if effects.is_empty() {
+        return 1.0;
+    }
+    let odds: f64 = effects.iter().map(|effect| law_of(*effect).odds(fit, others, settings)).product();
+    let beyond_two = effects.len().saturating_sub(settings.search.main_effects) as i32;
+    odds * (1.0 - settings.prior.imitated) * settings.prior.beyond_two.powi(beyond_two)
+}
+
+/// By how much the torque of a fit's laws may be wrong.
+fn law_error_n_m(fit: &Refit<'_>, added_n_m: f64) -> f64 {
+    let part = |effect: &Effect| effect.entry().law_error;
+    fit.hypothesis.effects.iter().map(part).fold(0.0, f64::max) * added_n_m
+}
+
+/// The errors that tracked angles may have from one swing to the next, as large as those in step with it.
+fn slow_errors_rad(fit: &Refit<'_>) -> f64 {
+    let of_record = |noise: &RecordNoise| noise.in_step * noise.sd_rad.iter().copied().fold(0.0, f64::max);
+    fit.problem.noise.iter().map(of_record).fold(0.0, f64::max)
+}
+
+/// How much likelier an unknown of any size makes the recordings than one that a law's own error, or the tracker's, allows.
+fn unknown_gain(latents: &[Latent], law_error_n_m: f64, slow_errors_rad: f64, coloured: f64) -> f64 {
+    let within =
+        |latent: &Latent, allowed: f64| latent.tried.iter().filter(|t| t.0 <= allowed).map(|t| t.1).fold(0.0, f64::max);
+    let is_camera = |latent: &&Latent| latent.place() == Place::Camera;
+    let wander = latents.iter().find(is_camera).map_or(0.0, |camera| within(camera, slow_errors_rad));
+    let of = |latent: &Latent| {
+        // an offset that wanders may be noise of another colour than was learnt
+        let own = if is_camera(&latent) { coloured } else { within(latent, law_error_n_m) };
+        latent.gain - own.max(wander)
+    };
+    // any size is as likely as any other, at any place
+    let looks: usize = latents.iter().map(|l| l.tried.len()).sum();
+    latents.iter().map(of).fold(f64::NEG_INFINITY, f64::max) - (looks.max(1) as f64).ln()
+}
+
+impl<'a> Posterior<'a> {
+    /// The likeliest fit.
+    pub fn best(&self) -> &Refit<'a> {
+        &self.candidates[0].fit
+    }
+
+    /// The base model's fit, which every search holds.
+    pub fn base(&self) -> &Refit<'a> {
+        self.candidates.iter().find(|c| c.fit.hypothesis.effects.is_empty()).map_or(self.best(), |c| &c.fit)
+    }
+
+    /// A fit's effects, the one that explains most first: without which it would be worst.
+    pub fn by_what_they_explain(&self, fit: &Refit<'_>) -> Vec<Effect> {
+        let mut effects = fit.hypothesis.effects.clone();
+        let left_without = |effect: &Effect| {
+            let others = fit.hypothesis.without(*effect).effects;
+            self.candidates.iter().find(|c| c.fit.hypothesis.effects == others).map_or(f64::INFINITY, |c| c.fit.chi2)
+        };
+        effects.sort_by(|a, b| left_without(b).total_cmp(&left_without(a)));
+        effects
+    }
+}

@@ -1,0 +1,94 @@
+//! Horizon continuation: fits that begin with the beginning of each recording and follow it as it grows, where the best leave far more than noise.
+//!
+//! The sum of squares of a long recording has many false minima, that of its beginning few. Where each part leads is where the next begins, so that no
+//! motion has to lose step. What two effects leave there may be a third one's: a real rig has several.
+
+use rayon::prelude::*;
+
+use super::super::context::{FitContext, first_part};
+use super::super::effect::Effect;
+use super::super::hypothesis::Hypothesis;
+use super::super::refit::{self, Refit, best_of_each_count, merged};
+use super::super::settings::SearchSettings;
+use super::beside::with_one_more;
+use crate::fit::whitening::RecordNoise;
+use crate::model::Parameter;
+
+/// Parts of the rows, one after the other; then all of them.
+const PARTS: [f64; 4] = [0.1, 0.2, 0.35, 0.6];
+
+/// The hypotheses of some fits from the beginning of the recordings on, those of each number of coefficients that keep up with the best; and beside the best
+/// of each part other effects.
+pub fn continued<'a>(context: &FitContext<'a>, fits: &[Refit<'a>], effects: &[Effect]) -> Vec<Refit<'a>> {
+    let Some(noise) = fits.first().map(|fit| fit.problem.noise.clone()) else { return Vec::new() };
+    let (settings, steps) = (&context.settings.search, &context.settings.descent);
+    let most = settings.most_coefficients;
+    let mut followed: Vec<(Hypothesis, Vec<f64>)> = Vec::new();
+    for part in PARTS.into_iter().filter(|part| part * swings(fits) > settings.fewest_swings) {
+        let records = first_part(context.records, part);
+        let early = context.on(&records);
+        let there: Vec<Refit<'_>> = if followed.is_empty() {
+            let mut chosen = refit::best(fits, settings.begun, |_| true, Refit::left_share);
+            chosen.extend((0..fits.len()).filter(|place| fits[*place].hypothesis.effects.is_empty()));
+            chosen.sort_unstable();
+            chosen.dedup();
+            let begun = |place: &usize| on_the_beginning(context, &early, &fits[*place]);
+            chosen.par_iter().with_max_len(1).filter_map(begun).collect()
+        } else {
+            descended(&early, &noise, followed, steps.few_steps)
+        };
+        let more: Vec<Refit<'_>> = best_of_each_count(&there, most)
+            .into_iter()
+            .flat_map(|best| with_one_more(&early, best, effects))
+            .collect();
+        followed = foremost(merged(there, more, context.settings.certificate.agrees), settings)
+            .into_iter()
+            .map(|fit| (fit.hypothesis, fit.x))
+            .collect();
+    }
+    descended(context, &noise, followed, steps.most_steps)
+}
+
+/// A hypothesis by itself from the beginning of the recordings on.
+pub fn continued_alone<'a>(context: &FitContext<'a>, fit: &Refit<'a>) -> Option<Refit<'a>> {
+    continued(context, std::slice::from_ref(fit), &[]).pop()
+}
+
+/// How often the longest recording swings.
+fn swings(fits: &[Refit<'_>]) -> f64 {
+    let of = |fit: &Refit<'_>| {
+        let (model, _) = fit.problem.model(0, &[]).ok()?;
+        Some(fit.problem.longest_s() * model.pace_rad_s() / std::f64::consts::TAU)
+    };
+    fits.first().and_then(of).unwrap_or(0.0)
+}
+
+/// The best of each number of coefficients: what is free to move a support anywhere must not displace a law.
+fn foremost<'b>(fits: Vec<Refit<'b>>, settings: &SearchSettings) -> Vec<Refit<'b>> {
+    let of_count = |count: usize| {
+        let mut best = refit::best(&fits, settings.followed, |fit| fit.coefficients() == count, |fit| fit.chi2);
+        let most = settings.keeps_up * best.first().map_or(0.0, |place| fits[*place].left_share());
+        best.retain(|place| fits[*place].left_share() <= most);
+        best
+    };
+    let kept: Vec<usize> = (0..=settings.most_coefficients).flat_map(of_count).collect();
+    fits.into_iter().enumerate().filter(|(place, _)| kept.contains(place)).map(|(_, fit)| fit).collect()
+}
+
+fn descended<'b>(
+    context: &FitContext<'b>,
+    noise: &[RecordNoise],
+    from: Vec<(Hypothesis, Vec<f64>)>,
+    most_steps: usize,
+) -> Vec<Refit<'b>> {
+    let descend = |(hypothesis, x)| context.descend_from(&hypothesis, noise, x, most_steps);
+    from.into_par_iter().with_max_len(1).filter_map(descend).collect()
+}
+
+/// A fit's hypothesis on the beginning, from its own parameters or from those that short stretches led to, whichever leads further.
+fn on_the_beginning<'b>(context: &FitContext<'_>, early: &FitContext<'b>, fit: &Refit<'_>) -> Option<Refit<'b>> {
+    let fit = context.seen_to_start(fit);
+    let stretches: Vec<(Parameter, f64)> = context.base.iter().copied().zip(context.begun.iter().copied()).collect();
+    let from = |start: &[(Parameter, f64)]| early.refit(&fit.hypothesis, &fit, start);
+    [from(&[]), from(&stretches)].into_iter().flatten().min_by(|a, b| a.chi2.total_cmp(&b.chi2))
+}

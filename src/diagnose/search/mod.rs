@@ -1,0 +1,338 @@
+//! The search: propose, fit, keep.
+//!
+//! Each round proposes fits from those there are, all of its proposals are fitted, and of each hypothesis the better fit is kept. What is left by the best of them is
+//! then learnt as the noise of all. A round is begun while the budget lasts; the names of those that were not are told with the answer.
+//!
+//! | file | holds |
+//! |---|---|
+//! | [`rounds`] | the rounds, in order, and what each proposes |
+//! | [`proposal`] | what can be proposed, and how it is fitted |
+//! | [`beside`] | an effect beside a fit |
+//! | [`horizon`] | horizon continuation: fits that follow a recording from its beginning |
+
+pub mod beside;
+pub mod horizon;
+pub mod proposal;
+pub mod rounds;
+
+use std::sync::OnceLock;
+
+use rayon::prelude::*;
+
+use super::base::{self, Taken};
+use super::context::{FitContext, without_errors_in_step};
+use super::effect::Effect;
+use super::laws::{self, bending};
+use super::learnt_noise::learnt_noise;
+use super::misfit::{Misfit, leaves_more_than_noise};
+use super::preparation::Prepared;
+use super::refit::{Refit, least, least_chi2, merged};
+use super::rods;
+use super::screen::{Score, Screen};
+use super::settings::Settings;
+use crate::error::Result;
+use crate::experiment::Experiment;
+use crate::fit::whitening::RecordNoise;
+use crate::progress::Progress;
+use beside::Beside;
+use proposal::Proposal;
+use rounds::{Learns, Round, Tried};
+
+/// What a round came to.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize)]
+pub struct RoundEnd {
+    /// Its name.
+    pub round: &'static str,
+    /// Fits that it proposed.
+    pub proposed: usize,
+    /// Hypotheses that were new with it, or whose χ² it lowered by more than one.
+    pub bettered: usize,
+}
+
+/// A search: what it knows.
+pub struct Search<'a, 'p> {
+    prepared: &'a Prepared,
+    /// What all fits share.
+    pub context: FitContext<'a>,
+    /// The effects that may be missing.
+    pub effects: Vec<Effect>,
+    /// The best fit of each hypothesis, all judged by the same noise; the base model first.
+    pub fits: Vec<Refit<'a>>,
+    /// What each round came to.
+    pub rounds: Vec<RoundEnd>,
+    /// Rounds that the budget did not allow.
+    pub undecided: Vec<&'static str>,
+    /// What the effects promise at the base model.
+    scores: Vec<Score>,
+    /// Proposals fitted.
+    spent: usize,
+    progress: &'p dyn Progress,
+}
+
+impl<'a, 'p> Search<'a, 'p> {
+    /// Begins with the base model's fit to some recordings.
+    ///
+    /// # Errors
+    /// [`crate::error::Error::Simulation`] where the specimen cannot swing, or no motion near the start values follows the recordings.
+    pub fn of_base_model(
+        prepared: &'a Prepared,
+        experiment: &'a Experiment,
+        taken: Taken,
+        settings: &'a Settings,
+        progress: &'p dyn Progress,
+    ) -> Result<Self> {
+        let context = base::context(prepared, experiment, taken, settings)?;
+        let fit = base::fitted(&context, prepared)?;
+        let effects = base::candidates(&context);
+        let scored = laws::cheap_to_score(&context, &effects);
+        let scores = Screen::at(&context, &fit).map(|screen| laws::scores(&screen, &scored)).unwrap_or_default();
+        Ok(Self {
+            prepared,
+            context,
+            effects,
+            fits: vec![fit],
+            rounds: Vec::new(),
+            undecided: Vec::new(),
+            scores,
+            spent: 0,
+            progress,
+        })
+    }
+
+    /// Searches for what the base model lacks, the file taken at its word.
+    pub fn run(&mut self) {
+        self.usual();
+        self.restarts();
+        self.allow_errors_in_step();
+        self.certify();
+    }
+
+    /// Searches again with the number of rods that the recordings of a strip ask for, where that does better.
+    ///
+    /// # Errors
+    /// As [`Self::of_base_model`].
+    pub fn recounted(self, counted: &'a OnceLock<Experiment>) -> Result<Self> {
+        let Some(count) = rods::preferred(&self.context, &self.fits) else { return Ok(self) };
+        let counted = counted.get_or_init(|| rods::with(self.context.experiment, count));
+        let settings = self.context.settings;
+        let mut again = Self::of_base_model(self.prepared, counted, Taken::AtItsWord, settings, self.progress)?;
+        again.run();
+        let is_kept = rods::is_kept(&self.context, &self.fits, &again.fits);
+        Ok(if is_kept { again.after(self) } else { self.after(again) })
+    }
+
+    /// The same with what another search has spent before, or in vain.
+    fn after(mut self, other: Self) -> Self {
+        self.spent += other.spent;
+        self.rounds.splice(0..0, other.rounds);
+        self.undecided.extend(other.undecided);
+        self
+    }
+
+    /// Searches on: with the file taken loosely where it may be doubted, from the beginning of the recordings on where far more than noise is left, and with more
+    /// effects. A strip's fits are too dear for it.
+    #[must_use]
+    pub fn doubted(self) -> Self {
+        let loosened = || {
+            let has_slack = base::has_slack(self.context.experiment, self.context.marks());
+            (has_slack && self.leaves_more_than_noise()).then_some(())?;
+            let (experiment, settings) = (self.context.experiment, self.context.settings);
+            let mut loosened =
+                Self::of_base_model(self.prepared, experiment, Taken::Loosely, settings, self.progress).ok()?;
+            loosened.usual();
+            Some(loosened)
+        };
+        let mut search = match loosened() {
+            Some(loosened) => loosened.after(self),
+            None => self,
+        };
+        search.further();
+        search.allow_errors_in_step();
+        search.certify();
+        search
+    }
+
+    /// The base model's fit.
+    pub fn base(&self) -> &Refit<'a> {
+        &self.fits[0]
+    }
+
+    /// Whether the best of the fits leaves so much that the noise does not matter.
+    pub fn leaves_more_than_noise(&self) -> bool {
+        least(&self.fits).is_some_and(|best| leaves_more_than_noise(best, &self.context.settings.noise))
+    }
+
+    /// Singles and pairs, a strip as finely as it needs.
+    fn usual(&mut self) {
+        Round::USUAL.into_iter().for_each(|round| self.round(round, &mut Tried::default()));
+        self.refine_strip();
+    }
+
+    /// Restarts where the best fit leaves more than noise. A strip's fits are too dear for it.
+    fn restarts(&mut self) {
+        if !self.context.is_strip() && self.misfit().is_some_and(|misfit| misfit.unexplained) {
+            Round::RESTARTS.into_iter().for_each(|round| self.round(round, &mut Tried::default()));
+        }
+    }
+
+    /// Further starts for the fits that may count; of each it is then known whether it leaves no more than those within it.
+    fn certify(&mut self) {
+        self.round(Round::Certify, &mut Tried::default());
+        self.round(Round::Nested, &mut Tried::default());
+        let nested_ok: Vec<bool> = self.fits.iter().map(|fit| self.best_within(fit).is_none()).collect();
+        self.fits.iter_mut().zip(nested_ok).for_each(|(fit, nested_ok)| fit.certificate.nested_ok = nested_ok);
+    }
+
+    /// More effects and fewer, by turns, until nothing new leads the way; from the beginning of the recordings first where far more than noise is left.
+    fn further(&mut self) {
+        self.judge_by(&without_errors_in_step(&self.base().problem.noise), 0);
+        let mut tried = Tried::default();
+        if self.leaves_more_than_noise() {
+            self.round(Round::FromTheBeginning, &mut tried);
+        }
+        for turn in 0..self.context.settings.search.turns {
+            let led = tried.more.len();
+            self.round(Round::OneMore, &mut tried);
+            if turn > 0 && tried.more.len() == led {
+                break;
+            }
+            self.round(Round::OneFewer, &mut tried);
+            if turn > 0 && !self.leaves_more_than_noise() {
+                break;
+            }
+        }
+    }
+
+    /// One round: propose, fit, keep.
+    fn round(&mut self, round: Round, tried: &mut Tried) {
+        if self.spent >= self.context.settings.search.budget {
+            self.undecided.push(round.name());
+            return;
+        }
+        let before = least_chi2(&self.fits);
+        let proposals = round.proposals(self, tried);
+        let count = proposals.len();
+        self.progress.begin(round.name(), Some(count as u64));
+        let found = self.fitted(&proposals);
+        self.spent += count;
+        let bettered = self.bettered_by(&found);
+        self.rounds.push(RoundEnd { round: round.name(), proposed: count, bettered });
+        self.keep(found);
+        if round == Round::DearSingles {
+            self.fits[1..].sort_by(|a, b| a.hypothesis.effects.cmp(&b.hypothesis.effects));
+        }
+        match round.learns() {
+            Learns::Always => self.learn_noise(),
+            Learns::IfLower if least_chi2(&self.fits) < before => self.learn_noise(),
+            _ => {}
+        }
+    }
+
+    fn fitted(&self, proposals: &[Proposal<'_, 'a>]) -> Vec<Refit<'a>> {
+        let of = |proposal: &Proposal<'_, 'a>| {
+            let fits = proposal.fitted(&self.context);
+            self.progress.advance(1);
+            fits
+        };
+        proposals.par_iter().with_max_len(1).flat_map_iter(of).collect()
+    }
+
+    fn keep(&mut self, found: Vec<Refit<'a>>) {
+        self.fits = merged(std::mem::take(&mut self.fits), found, self.context.settings.certificate.agrees);
+    }
+
+    /// How many hypotheses some fits are new to, or do better.
+    fn bettered_by(&self, found: &[Refit<'a>]) -> usize {
+        let known = |fit: &Refit<'a>| self.fits.iter().find(|own| own.hypothesis.effects == fit.hypothesis.effects);
+        found.iter().filter(|fit| known(fit).is_none_or(|known| fit.chi2 < known.chi2 - 1.0)).count()
+    }
+
+    fn misfit(&self) -> Option<Misfit> {
+        least(&self.fits).map(|best| Misfit::of(&self.context, best, &[]))
+    }
+
+    /// A strip that bends everywhere, where it explains most, with as many rods as the recording asks for; and everything beside it sought again, in that context.
+    fn refine_strip(&mut self) {
+        let bends = |fit: &Refit<'a>| fit.hypothesis.has(Effect::DistributedFlexibility);
+        let sought = self.effects.contains(&Effect::DistributedFlexibility) && !self.fits.iter().any(bends);
+        if sought && self.misfit().is_some_and(|misfit| misfit.unexplained) {
+            // from the base model's motion its own may not be found
+            let found = self.fitted(&[Proposal::Anew(bending::alone(), self.base())]);
+            self.keep(found);
+        }
+        let asked_for = least(&self.fits).is_some_and(bends);
+        let coarse = self.fits.iter().find(|fit| asked_for && fit.hypothesis == bending::alone());
+        let Some((context, fine)) = coarse.and_then(|coarse| bending::finer(&self.context, coarse)) else { return };
+        self.context = context;
+        self.progress.begin("strip", Some(self.effects.len() as u64));
+        let beside = Beside::every(&self.context, &fine, &self.effects);
+        let proposals: Vec<Proposal<'_, 'a>> = beside.into_iter().map(Proposal::Beside).collect();
+        let found = self.fitted(&proposals);
+        drop(proposals);
+        self.fits.retain(|fit| !bends(fit));
+        self.fits.push(fine);
+        self.keep(found);
+        self.learn_noise();
+    }
+
+    /// Judges all fits by the noise that the best of them leaves; those that have not yet converged, and are worth it, go on. Where that led far down, the noise is
+    /// what is left there.
+    fn learn_noise(&mut self) {
+        let before = least_chi2(&self.fits);
+        self.learn_noise_once();
+        if self.context.settings.search.far_down * least_chi2(&self.fits) < before {
+            self.learn_noise_once();
+        }
+    }
+
+    fn learn_noise_once(&mut self) {
+        let context = &self.context;
+        let best = least(&self.fits);
+        let learnt = best.and_then(|best| learnt_noise(context, best));
+        let (least, base) = (best.map_or(0.0, |best| best.chi2), self.base().chi2);
+        let most_steps = context.settings.descent.most_steps;
+        let again = |fit: Refit<'a>| {
+            let worth = is_worth_more(context, &fit, least, base);
+            match (&learnt, worth) {
+                (Some(noise), _) => context.judged_by(noise, &fit, if worth { most_steps } else { 0 }).unwrap_or(fit),
+                (None, true) if !fit.converged => context.go_on(&fit, most_steps).unwrap_or(fit),
+                _ => fit,
+            }
+        };
+        let fits = std::mem::take(&mut self.fits);
+        self.fits = fits.into_par_iter().with_max_len(1).map(again).collect();
+    }
+
+    /// The same fits beside the errors in step with the swing that a tracked angle may have; those that are near the noise go on from where they are.
+    fn allow_errors_in_step(&mut self) {
+        let mut noise = self.base().problem.noise.clone();
+        for (noise, record) in noise.iter_mut().zip(self.context.records) {
+            noise.in_step = record.in_step;
+        }
+        self.judge_by(&noise, self.context.settings.descent.few_steps);
+    }
+
+    fn judge_by(&mut self, noise: &[RecordNoise], steps: usize) {
+        if self.base().problem.noise == noise {
+            return;
+        }
+        let (context, least) = (&self.context, least_chi2(&self.fits));
+        let hopeless = context.settings.search.hopeless;
+        let again = |fit: Refit<'a>| {
+            let worth = fit.chi2 < hopeless * (least + hopeless);
+            context.judged_by(noise, &fit, if worth { steps } else { 0 }).unwrap_or(fit)
+        };
+        let fits = std::mem::take(&mut self.fits);
+        self.fits = fits.into_par_iter().with_max_len(1).map(again).collect();
+    }
+}
+
+/// Whether a fit is worth further steps beside the best and the base model's.
+fn is_worth_more(context: &FitContext<'_>, fit: &Refit<'_>, least: f64, base: f64) -> bool {
+    let settings = context.settings;
+    let (hopeless, dear) = (settings.search.hopeless, fit.hypothesis.has_corners());
+    // in every joint of a strip it has only begun
+    let bound = if dear && context.is_strip() { settings.descent.hopeful } else { hopeless };
+    fit.hypothesis.effects.is_empty()
+        || fit.chi2 < bound * (least + hopeless) && !(dear && fit.chi2 > base - settings.misfit.counts)
+}

@@ -1,0 +1,151 @@
+//! What the search proposes to fit, and how each proposal is fitted.
+
+use super::super::context::FitContext;
+use super::super::effect::Effect;
+use super::super::hypothesis::Hypothesis;
+use super::super::laws::{self, law_of};
+use super::super::refit::{Certificate, Refit};
+use super::super::screen::{Score, Screen};
+use super::beside::Beside;
+use super::horizon;
+use crate::fit::Record;
+use crate::model::Parameter;
+
+/// One thing to fit.
+#[derive(Debug, Clone)]
+pub enum Proposal<'f, 'a> {
+    /// An effect beside a fit, from every start of its law.
+    Beside(Beside<'f, 'a>),
+    /// An effect beside a fit, from where its score points.
+    Scored(&'f Refit<'a>, Score),
+    /// An effect beside a fit from wherever it may be.
+    Anywhere(&'f Refit<'a>, Effect),
+    /// A hypothesis that has a fit, from where another one stands.
+    FromLeader {
+        /// The fit that it has.
+        fit: &'f Refit<'a>,
+        /// The hypothesis.
+        hypothesis: Hypothesis,
+        /// Where to begin.
+        leader: &'f Refit<'a>,
+    },
+    /// A restart: a fit anew from where the first part of each recording leads. When a dry hinge stops, and where, no derivative tells, and early on it has not.
+    Restart(&'f Refit<'a>),
+    /// A restart along the motion of another fit, which follows the recordings: the hypothesis cannot fall out of step with them.
+    Along(Hypothesis, &'f Refit<'a>),
+    /// A hypothesis from a fit that has fewer of its effects, the others being nothing: it cannot leave more than that one does.
+    Nested(Hypothesis, &'f Refit<'a>),
+    /// A hypothesis from the base model's fit, followed from the beginning of the recordings on.
+    FromTheBeginning(Hypothesis, &'f Refit<'a>),
+    /// A fit without one of its effects, and with another one of these in its place.
+    Instead(&'f Refit<'a>, Effect, &'f [Effect]),
+    /// A hypothesis anew from short stretches, beside what is left without.
+    Anew(Hypothesis, &'f Refit<'a>),
+    /// The hypotheses of these fits from the beginning of the recordings on, and beside the best of each part other effects.
+    Continued(&'f [Refit<'a>], &'f [Effect]),
+}
+
+impl<'a> Proposal<'_, 'a> {
+    /// The fits that it leads to.
+    pub fn fitted(&self, context: &FitContext<'a>) -> Vec<Refit<'a>> {
+        match self {
+            Self::Beside(beside) => beside.fitted(context).into_iter().collect(),
+            Self::Scored(base, score) => {
+                let fit = context.refit(&score.hypothesis(&base.hypothesis), base, &score.start);
+                fit.map(|fit| laws::settled(context, fit)).into_iter().collect()
+            }
+            Self::Anywhere(base, effect) => law_of(*effect).anywhere(context, base).into_iter().collect(),
+            Self::FromLeader { fit, hypothesis, leader } => {
+                from_leader(context, fit, hypothesis, leader).into_iter().collect()
+            }
+            Self::Restart(fit) => restarted(context, fit).into_iter().collect(),
+            Self::Along(hypothesis, leader) => context.refit_along(hypothesis, leader, &[]).into_iter().collect(),
+            Self::Nested(hypothesis, within) => context.refit(hypothesis, within, &[]).into_iter().collect(),
+            Self::FromTheBeginning(hypothesis, base) => {
+                let begun = Refit { hypothesis: hypothesis.clone(), ..(*base).clone() };
+                horizon::continued_alone(context, &begun).into_iter().collect()
+            }
+            Self::Instead(fit, effect, others) => instead(context, fit, *effect, others),
+            Self::Anew(hypothesis, without) => context.refit_anew(hypothesis, &[], without).into_iter().collect(),
+            Self::Continued(fits, effects) => horizon::continued(context, fits, effects),
+        }
+    }
+}
+
+/// A fit anew from where another one is, with its own coefficients, if that is a better place to begin from than where it ended.
+fn from_leader<'a>(
+    context: &FitContext<'a>,
+    fit: &Refit<'a>,
+    hypothesis: &Hypothesis,
+    leader: &Refit<'a>,
+) -> Option<Refit<'a>> {
+    let added = fit.added();
+    let own: Vec<(Parameter, f64)> =
+        added.iter().filter(|p| leader.value(**p).is_none()).filter_map(|p| Some((*p, fit.value(*p)?))).collect();
+    if !(context.cost_at(hypothesis, leader, &own) < fit.chi2) {
+        return None;
+    }
+    context.refit(hypothesis, leader, &own).filter(|again| again.chi2 < fit.chi2 - 1.0)
+}
+
+fn restarted<'a>(context: &FitContext<'a>, fit: &Refit<'a>) -> Option<Refit<'a>> {
+    let early = first_parts(context)?;
+    let x = context.on(&early).refit(&fit.hypothesis, fit, &[])?.x;
+    let again = context.descend_from(&fit.hypothesis, &fit.problem.noise, x, context.settings.descent.most_steps)?;
+    // it has begun where that fit is
+    let certificate = Certificate { starts_agreeing: 0, ..again.certificate };
+    Some(Refit { certificate, ..again })
+}
+
+/// The first part of each recording: half of it, or as much of it as still swings.
+fn first_parts(context: &FitContext<'_>) -> Option<Vec<Record>> {
+    let early: Vec<Record> = context.records.iter().map(|r| r.until(swinging_rows(context, r))).collect();
+    early.iter().all(|record| record.len() >= crate::series::FEWEST_ROWS).then_some(early)
+}
+
+/// Whether the swing has died away long before a recording ends.
+pub fn comes_to_rest(context: &FitContext<'_>, record: &Record) -> bool {
+    swinging_rows(context, record) + 1 < (context.settings.search.first_part * record.len() as f64) as usize
+}
+
+fn swinging_rows(context: &FitContext<'_>, record: &Record) -> usize {
+    let settings = &context.settings.search;
+    let still = settings.still * record.largest_angle_rad();
+    let swings =
+        |row: usize| record.theta_rad.iter().any(|angles| angles[row].is_some_and(|angle| angle.abs() > still));
+    let last = (0..record.len()).rev().find(|row| swings(*row)).unwrap_or(0);
+    last.min((settings.first_part * record.len() as f64) as usize)
+}
+
+/// A fit without one of its effects, and with another one of some in its place.
+fn instead<'a>(context: &FitContext<'a>, fit: &Refit<'a>, effect: Effect, others: &[Effect]) -> Vec<Refit<'a>> {
+    let Some(fewer) = without(context, fit, effect) else { return Vec::new() };
+    let mut found = if others.is_empty() { Vec::new() } else { in_its_place(context, fit, &fewer, others) };
+    found.push(fewer);
+    found
+}
+
+/// A fit without one of its effects, from where it is or from the beginning.
+fn without<'a>(context: &FitContext<'a>, fit: &Refit<'a>, effect: Effect) -> Option<Refit<'a>> {
+    let fewer = Refit { hypothesis: fit.hypothesis.without(effect), ..fit.clone() };
+    let near = context.refit(&fewer.hypothesis, &fewer, &[]);
+    let continued = horizon::continued_alone(context, &fewer);
+    let best = near.into_iter().chain(continued).min_by(|a, b| a.chi2.total_cmp(&b.chi2))?;
+    if best.converged { Some(best) } else { context.go_on(&best, context.settings.descent.most_steps) }
+}
+
+/// A fit with fewer effects and another one instead, where that promises most of what the one left out would from there.
+fn in_its_place<'a>(
+    context: &FitContext<'a>,
+    fit: &Refit<'a>,
+    fewer: &Refit<'a>,
+    effects: &[Effect],
+) -> Vec<Refit<'a>> {
+    let scores = Screen::at(context, fewer).map(|screen| laws::scores(&screen, effects)).unwrap_or_default();
+    let (own, others): (Vec<Score>, Vec<Score>) =
+        scores.into_iter().partition(|score| fit.hypothesis.has(score.effect));
+    let promised = own.iter().map(|score| score.gain).fold(0.0, f64::max);
+    let other = |score: Score| context.refit(&score.hypothesis(&fewer.hypothesis), fewer, &score.start);
+    let most_of = context.settings.search.most_of;
+    others.into_iter().filter(|score| score.gain > most_of * promised).filter_map(other).collect()
+}

@@ -1,0 +1,324 @@
+//! The rounds of the search, in order: what each proposes, when it is worth it, and whether the noise is learnt from what it found.
+
+use rayon::prelude::*;
+
+use super::super::effect::{Cost, Effect};
+use super::super::hypothesis::Hypothesis;
+use super::super::laws;
+use super::super::misfit::{Misfit, leaves_more_than_noise};
+use super::super::refit::{Refit, best, best_of_each_count, least, least_chi2};
+use super::super::screen::{Score, Screen};
+use super::Search;
+use super::beside::Beside;
+use super::proposal::{Proposal, comes_to_rest};
+
+/// One round.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Round {
+    /// Every effect alone, beside the base model.
+    Singles,
+    /// Those that are dear to fit: sought the longer the less the others explain.
+    DearSingles,
+    /// The others from where one effect stands that explains most of what the base model leaves, with another spring or damper.
+    FromTheLeader,
+    /// Pairs that promise most, each from the better of its two singles.
+    Pairs,
+    /// Simpler hypotheses from where a richer one has found a better minimum.
+    Stragglers,
+    /// Single effects, and none, along the motion of the best fit, where they leave more.
+    AlongTheLeader,
+    /// Hypotheses that leave more than one with fewer of their effects, which proves a failed fit: from that one.
+    Nested,
+    /// The likeliest hypotheses from further starts, until enough of them agree.
+    Certify,
+    /// The best single effects anew from the first part of the recordings.
+    RestartedLeaders,
+    /// Every effect beside the best single ones, from all its starts.
+    BesideLeaders,
+    /// The best fits anew from the first part of the recordings.
+    RestartedBest,
+    /// The best fits from the beginning of the recordings on.
+    FromTheBeginning,
+    /// One effect more beside the best of each number of coefficients.
+    OneMore,
+    /// One effect fewer, and another in its place.
+    OneFewer,
+}
+
+/// When the noise is learnt anew after a round.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Learns {
+    /// Not.
+    Never,
+    /// Where the best fit leaves less than before.
+    IfLower,
+    /// Always.
+    Always,
+}
+
+impl Round {
+    /// The rounds that every recording has.
+    pub const USUAL: [Self; 6] =
+        [Self::Singles, Self::DearSingles, Self::FromTheLeader, Self::AlongTheLeader, Self::Pairs, Self::Stragglers];
+    /// Those where the best of the usual ones leaves more than noise: it may stand in a false minimum, or its partner have been sought from the wrong place.
+    pub const RESTARTS: [Self; 3] = [Self::RestartedLeaders, Self::BesideLeaders, Self::RestartedBest];
+
+    /// The name, of which progress tells.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Singles => "effects",
+            Self::DearSingles => "dear effects",
+            Self::FromTheLeader => "from the best",
+            Self::Pairs => "pairs",
+            Self::Stragglers => "from better minima",
+            Self::AlongTheLeader => "along the best",
+            Self::Nested => "nested",
+            Self::Certify => "further starts",
+            Self::RestartedLeaders => "restarts of the leaders",
+            Self::RestartedBest => "restarts of the best",
+            Self::BesideLeaders => "beside the leaders",
+            Self::FromTheBeginning => "from the beginning",
+            Self::OneMore => "more effects",
+            Self::OneFewer => "fewer effects",
+        }
+    }
+
+    /// When the noise is learnt anew.
+    pub fn learns(self) -> Learns {
+        match self {
+            Self::AlongTheLeader | Self::Pairs | Self::RestartedBest | Self::OneFewer => Learns::Always,
+            Self::Stragglers => Learns::IfLower,
+            _ => Learns::Never,
+        }
+    }
+
+    /// What it proposes.
+    pub fn proposals<'f, 'a>(self, search: &'f Search<'a, '_>, tried: &mut Tried) -> Vec<Proposal<'f, 'a>> {
+        match self {
+            Self::Singles => search.singles(false),
+            Self::DearSingles => search.singles(true),
+            Self::FromTheLeader => search.from_the_leader(),
+            Self::Pairs => search.pairs(),
+            Self::Stragglers => search.stragglers(),
+            Self::AlongTheLeader => search.along_the_leader(),
+            Self::Nested => search.nested(),
+            Self::Certify => search.further_starts(),
+            Self::RestartedLeaders => search.leaders().into_iter().map(Proposal::Restart).collect(),
+            Self::BesideLeaders => search.beside_leaders(),
+            Self::RestartedBest => search.restarted_best(),
+            Self::FromTheBeginning => vec![Proposal::Continued(&search.fits, &search.effects)],
+            Self::OneMore => search.one_more(tried),
+            Self::OneFewer => search.one_fewer(tried),
+        }
+    }
+}
+
+/// Effects that have had their turn.
+#[derive(Debug, Default)]
+pub struct Tried {
+    /// Those beside which another one was sought.
+    pub more: Vec<Vec<Effect>>,
+    /// Those of which one was left out.
+    pub fewer: Vec<Vec<Effect>>,
+}
+
+impl<'a> Search<'a, '_> {
+    /// Every effect beside the base model: those of ordinary cost, or the others.
+    fn singles(&self, dear: bool) -> Vec<Proposal<'_, 'a>> {
+        let base = self.base();
+        let misfit = Misfit::of(&self.context, base, &self.scores);
+        let misfit = if dear { misfit.beside(&self.fits[1..]) } else { misfit };
+        let of_kind = |effect: &&Effect| (effect.entry().cost != Cost::Ordinary) == dear;
+        let beside = |effect: &Effect| Proposal::Beside(Beside::of(base, misfit, *effect, &self.scores));
+        self.effects.iter().filter(of_kind).map(beside).collect()
+    }
+
+    fn from_the_leader(&self) -> Vec<Proposal<'_, 'a>> {
+        let (settings, base) = (&self.context.settings.search, self.base());
+        let Some(leader) = least(&self.fits).filter(|best| best.chi2 < settings.leader_leaves * base.chi2) else {
+            return Vec::new();
+        };
+        let moved = |parameter: &_| {
+            let (before, after) = (base.value(*parameter).unwrap_or(0.0), leader.value(*parameter).unwrap_or(0.0));
+            (after - before).abs() > settings.elsewhere * before.abs()
+        };
+        if !self.context.base.iter().any(moved) {
+            return Vec::new();
+        }
+        let others = self.fits.iter().filter(|fit| !fit.hypothesis.is_dear() && !std::ptr::eq(*fit, leader));
+        others.map(|fit| Proposal::FromLeader { fit, hypothesis: fit.hypothesis.clone(), leader }).collect()
+    }
+
+    /// Where the base model leaves more than noise: a rival in a false minimum would count as evidence for the best. A strip's fits are too dear for it.
+    fn along_the_leader(&self) -> Vec<Proposal<'_, 'a>> {
+        let misfit = Misfit::of(&self.context, self.base(), &self.scores);
+        let Some(leader) = least(&self.fits).filter(|_| misfit.unexplained && !self.context.is_strip()) else {
+            return Vec::new();
+        };
+        let behind = leader.chi2 + self.context.settings.misfit.counts;
+        let is_behind = |fit: &&Refit<'a>| !fit.hypothesis.is_dear() && fit.chi2 > behind;
+        self.fits.iter().filter(is_behind).map(|fit| Proposal::Along(fit.hypothesis.clone(), leader)).collect()
+    }
+
+    fn nested(&self) -> Vec<Proposal<'_, 'a>> {
+        let of = |fit: &Refit<'a>| {
+            let within = self.best_within(fit)?;
+            let dropped = within.hypothesis.dropped.or(fit.hypothesis.dropped);
+            Some(Proposal::Nested(Hypothesis { dropped, ..fit.hypothesis.clone() }, within))
+        };
+        self.fits.iter().filter_map(of).collect()
+    }
+
+    /// The best fit of a hypothesis within another fit's own that leaves less than that one does.
+    pub fn best_within(&self, fit: &Refit<'a>) -> Option<&Refit<'a>> {
+        let variance = (least_chi2(&self.fits) / self.context.values() as f64).max(1.0);
+        let bound = fit.chi2 - self.context.settings.certificate.agrees * variance;
+        let within = self.fits.iter().filter(|own| own.chi2 < bound && own.hypothesis.nests_in(&fit.hypothesis));
+        within.min_by(|a, b| a.chi2.total_cmp(&b.chi2))
+    }
+
+    /// Of those fits that may count the ones that too few starts have led to: along the motion of the best other one, from short stretches, and from the
+    /// beginning of the recordings on. A strip's fits are too dear for it.
+    fn further_starts(&self) -> Vec<Proposal<'_, 'a>> {
+        let (settings, base) = (&self.context.settings.certificate, self.base());
+        let variance = (least_chi2(&self.fits) / self.context.values() as f64).max(1.0);
+        let needs = |fit: &Refit<'a>| {
+            fit.chi2 / variance + self.context.settings.misfit.counts * fit.hypothesis.effects.len() as f64
+        };
+        let order = best(&self.fits, usize::MAX, |_| !self.context.is_strip(), needs);
+        let enough = order.first().map_or(0.0, |first| needs(&self.fits[*first])) + settings.within;
+        let counts = order.iter().map(|place| &self.fits[*place]).filter(|fit| needs(fit) < enough).take(settings.most);
+        let lacking = counts.filter(|fit| fit.certificate.starts_agreeing < settings.starts);
+        let of = |fit: &Refit<'a>| {
+            let hypothesis = &fit.hypothesis;
+            let leader = order.iter().map(|place| &self.fits[*place]).find(|other| other.hypothesis != *hypothesis);
+            let along = leader.map(|leader| Proposal::Along(hypothesis.clone(), leader));
+            let anew = Proposal::Anew(hypothesis.clone(), base);
+            let begun = Proposal::FromTheBeginning(hypothesis.clone(), base);
+            along.into_iter().chain([anew, begun]).collect::<Vec<_>>()
+        };
+        lacking.flat_map(of).collect()
+    }
+
+    fn pairs(&self) -> Vec<Proposal<'_, 'a>> {
+        let (settings, counts) = (&self.context.settings.search, self.context.settings.misfit.counts);
+        let base = self.base();
+        let further = laws::cheap_to_score(&self.context, &self.effects);
+        let mut seeds: Vec<&Refit<'a>> = self.fits[1..].iter().filter(|s| s.chi2 < base.chi2 - 4.0).collect();
+        seeds.sort_by(|a, b| a.chi2.total_cmp(&b.chi2));
+        seeds.truncate(settings.pair_seeds);
+        let least = seeds.first().map_or(0.0, |s| s.chi2);
+        seeds.retain(|s| s.chi2 < settings.far * least);
+        let scored = |(rank, seed): (usize, &&'_ Refit<'a>)| {
+            let few = further.iter().copied().filter(|e| rank < settings.dear_seeds || !e.is_dear_to_score());
+            Some(laws::scores(&Screen::at(&self.context, seed)?, &few.collect::<Vec<_>>()))
+        };
+        let scored: Vec<Option<Vec<Score>>> = seeds.par_iter().with_max_len(1).enumerate().map(scored).collect();
+        let mut pairs: Vec<(f64, &Refit<'a>, Hypothesis, Score)> = Vec::new();
+        for (seed, score) in seeds.into_iter().zip(scored).flat_map(|(seed, all)| {
+            all.unwrap_or_default().into_iter().filter(|s| s.gain > 4.0).map(move |score| (seed, score))
+        }) {
+            // a promise from afar is worth little
+            let promised = (seed.chi2 - score.gain).max(settings.afar * seed.chi2);
+            let hypothesis = score.hypothesis(&seed.hypothesis);
+            match pairs.iter_mut().find(|p| p.2.effects == hypothesis.effects) {
+                Some(known) if promised < known.0 => *known = (promised, seed, hypothesis, score),
+                Some(_) => {}
+                None => pairs.push((promised, seed, hypothesis, score)),
+            }
+        }
+        // what has corners is dear: only where it promises what a further effect must gain
+        let alone = least_chi2(&self.fits);
+        pairs.retain(|(promised, _, hypothesis, _)| !hypothesis.has_corners() || *promised < alone - counts);
+        pairs.sort_by(|a, b| a.0.total_cmp(&b.0));
+        pairs.truncate(settings.most_pairs);
+        let least = pairs.first().map_or(0.0, |p| p.0);
+        let is_kept = |(rank, pair): &(usize, (f64, _, _, _))| {
+            *rank < settings.fewest_pairs || pair.0 < settings.promising * least + 100.0
+        };
+        let kept = pairs.into_iter().enumerate().filter(is_kept);
+        kept.map(|(_, (_, seed, _, score))| Proposal::Scored(seed, score)).collect()
+    }
+
+    /// Where a pair has found a better minimum of a simpler hypothesis, one of its effects being next to nothing, that hypothesis starts anew from it.
+    fn stragglers(&self) -> Vec<Proposal<'_, 'a>> {
+        let counts = self.context.settings.misfit.counts;
+        let of = |fit: &'_ Refit<'a>| {
+            let richer = |other: &&Refit<'a>| {
+                let (few, many) = (&fit.hypothesis, &other.hypothesis);
+                many.effects.len() > few.effects.len() && few.is_within(many) && other.chi2 < fit.chi2 - counts
+            };
+            let leader = self.fits.iter().filter(richer).min_by(|a, b| a.chi2.total_cmp(&b.chi2))?;
+            Some(Hypothesis { dropped: leader.hypothesis.dropped, ..fit.hypothesis.clone() }).map(|h| (h, leader))
+        };
+        let proposed = self.fits.iter().filter_map(|fit| of(fit).map(|(hypothesis, leader)| (fit, hypothesis, leader)));
+        proposed.map(|(fit, hypothesis, leader)| Proposal::FromLeader { fit, hypothesis, leader }).collect()
+    }
+
+    /// The single effects that leave least; where that is far more than noise, its colour does not count.
+    fn leaders(&self) -> Vec<&Refit<'a>> {
+        let settings = self.context.settings;
+        let beyond = settings.noise.beyond * settings.noise.beyond * self.context.values() as f64;
+        let beyond_noise = least_chi2(&self.fits) > beyond;
+        let left = |fit: &Refit<'_>| if beyond_noise { fit.left_share() } else { fit.chi2 };
+        let count = settings.search.restart_seeds;
+        let chosen = best(&self.fits, count, |fit| fit.hypothesis.effects.len() == 1, left);
+        chosen.into_iter().map(|i| &self.fits[i]).collect()
+    }
+
+    fn beside_leaders(&self) -> Vec<Proposal<'_, 'a>> {
+        let leaders = self.leaders();
+        let beside = leaders.iter().flat_map(|leader| Beside::every(&self.context, leader, &self.effects));
+        let mut proposals: Vec<Proposal<'_, 'a>> = beside.map(Proposal::Beside).collect();
+        // corners make false minima
+        for effect in self.effects.iter().filter(|effect| effect.has_corners()) {
+            let lacking = leaders.iter().filter(|leader| !leader.hypothesis.has(*effect));
+            let bases = lacking.copied().chain(self.fits.first());
+            proposals.extend(bases.map(|base| Proposal::Anywhere(base, *effect)));
+        }
+        proposals
+    }
+
+    fn restarted_best(&self) -> Vec<Proposal<'_, 'a>> {
+        let mut chosen = best(&self.fits, self.context.settings.search.restarted, |_| true, |fit| fit.chi2);
+        if self.context.records.iter().any(|record| comes_to_rest(&self.context, record)) {
+            let can_stop = |fit: &Refit<'a>| fit.hypothesis.effects.iter().any(|effect| effect.entry().can_stop);
+            chosen.extend((0..self.fits.len()).filter(|i| can_stop(&self.fits[*i])));
+        }
+        chosen.sort_unstable();
+        chosen.dedup();
+        chosen.into_iter().map(|i| Proposal::Restart(&self.fits[i])).collect()
+    }
+
+    fn one_more(&self, tried: &mut Tried) -> Vec<Proposal<'_, 'a>> {
+        let settings = &self.context.settings.search;
+        let best_of_all = least(&self.fits).map_or(0.0, Refit::left_share);
+        let mut leading = best_of_each_count(&self.fits, settings.most_coefficients);
+        leading.retain(|fit| fit.left_share() <= settings.leads * best_of_all);
+        let seeds = not_yet(leading, &mut tried.more);
+        let more = seeds.into_iter().flat_map(|seed| Beside::most_promising(&self.context, seed, &self.effects));
+        more.map(Proposal::Beside).collect()
+    }
+
+    /// Pairs have been sought from every side, and where far more than noise is left nothing does as well: only of three is another put in the place of one.
+    fn one_fewer(&self, tried: &mut Tried) -> Vec<Proposal<'_, 'a>> {
+        let settings = self.context.settings;
+        let seeds = not_yet(best_of_each_count(&self.fits, settings.search.most_coefficients), &mut tried.fewer);
+        let rivals = |seed: &'_ Refit<'a>| -> &[Effect] {
+            let many = seed.hypothesis.effects.len() > settings.search.main_effects;
+            if many && !leaves_more_than_noise(seed, &settings.noise) { &self.effects } else { &[] }
+        };
+        let of = |seed| {
+            let others = rivals(seed);
+            seed.hypothesis.effects.iter().map(move |effect| Proposal::Instead(seed, *effect, others))
+        };
+        seeds.into_iter().flat_map(of).collect()
+    }
+}
+
+/// The fits whose effects have not yet had their turn, which then have.
+fn not_yet<'f, 'a>(fits: Vec<&'f Refit<'a>>, had: &mut Vec<Vec<Effect>>) -> Vec<&'f Refit<'a>> {
+    let new: Vec<&Refit<'a>> = fits.into_iter().filter(|fit| !had.contains(&fit.hypothesis.effects)).collect();
+    had.extend(new.iter().map(|fit| fit.hypothesis.effects.clone()));
+    new
+}

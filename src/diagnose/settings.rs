@@ -1,0 +1,349 @@
+//! Every threshold of a diagnosis, with its source.
+//!
+//! Where a value comes from stands after it: *statistics*, it follows from a distribution; *training bank*, it was set on the training banks of the concealed
+//! benchmark (`fixtures/concealed`), never on test banks; *cost*, it bounds the work, and is set where more work changed no answer there; *judgement*, an
+//! experimenter's convention. Grids of start values and steps of numerical methods are no thresholds: they stand where they are used.
+
+/// All of them.
+#[derive(Debug, Clone, Default)]
+pub struct Settings {
+    /// What is noise.
+    pub noise: NoiseSettings,
+    /// Descents.
+    pub descent: DescentSettings,
+    /// Which fits lack something.
+    pub misfit: MisfitSettings,
+    /// What is fitted.
+    pub search: SearchSettings,
+    /// Which fits count.
+    pub certificate: CertificateSettings,
+    /// How probable each hypothesis is.
+    pub prior: PriorSettings,
+    /// Which answer that makes.
+    pub verdict: VerdictSettings,
+}
+
+/// What is noise.
+#[derive(Debug, Clone)]
+pub struct NoiseSettings {
+    /// A frequency belongs to the motion where that has more than this part of its largest power (training bank)…
+    pub motion: f64,
+    /// … and as much of it as the residual may hold would be more than this part of the noise (judgement: a tenth of a variance).
+    pub leaks: f64,
+    /// A line of the residual's own has this many times the power around it (statistics: by chance in e⁻²⁵ of the frequencies).
+    pub line: f64,
+    /// Part of the frequencies that has to be left (judgement).
+    pub enough: f64,
+    /// The frequencies off the lines tell only a part of noise that goes on: its variance is at most this multiple of the residual's (training bank).
+    pub most: f64,
+    /// ln-likelihood that colour must gain (statistics: two numbers more, e⁻⁶ by chance)…
+    pub coloured: f64,
+    /// … and white noise beside it (statistics: one number more).
+    pub beside: f64,
+    /// Two angles' noise goes together where their correlation is this many times what chance makes of it (statistics: 4 σ).
+    pub together: f64,
+    /// From this multiple of the noise on, noise is no yardstick for a model any more (training bank).
+    pub beyond: f64,
+    /// Noise that is learnt again from a fit with effects is at most this many times as large: a fit that has lost step leaves something at every frequency
+    /// (training bank).
+    pub grows: f64,
+    /// A change of the noise by less than this part is none (judgement: less than its own uncertainty over 1000 values).
+    pub changes: f64,
+    /// Correlation of neighbouring residuals of short stretches that counts as colour (training bank).
+    pub stretches_coloured: f64,
+}
+
+/// Descents.
+#[derive(Debug, Clone)]
+pub struct DescentSettings {
+    /// Steps of a dear start before it is known to be worth any (cost).
+    pub first_steps: usize,
+    /// Of a first descent (cost).
+    pub few_steps: usize,
+    /// Of one that is worth it (cost).
+    pub most_steps: usize,
+    /// It has converged when the next step promises less than this part of the mean square (statistics: 0.02 of a χ² is 0.01 of an ln-likelihood).
+    pub enough: f64,
+    /// A fit from short stretches, or of a strip, goes on where its first steps lead below this multiple of the base model's χ² (training bank).
+    pub beyond_hope: f64,
+    /// A strip goes on where its first steps lead below this multiple of the base model's χ² (training bank).
+    pub hopeful: f64,
+}
+
+/// Which fits lack something.
+#[derive(Debug, Clone)]
+pub struct MisfitSettings {
+    /// A fit that leaves this part of the swing lacks something, whatever the noise (judgement).
+    pub much: f64,
+    /// A motion that leaves more than this part of the swing has lost step (a phase lag of 0.35 rad).
+    pub out_of_step: f64,
+    /// χ² beyond its expectation by this many standard deviations is worth a dear hypothesis (statistics: 4 σ).
+    pub deviations: f64,
+    /// Where less than this many times the noise is left, in χ², many laws do as well as each other (training bank).
+    pub little: f64,
+    /// The part of what a fit leaves beyond the noise that the first steps from a dear start must explain (cost).
+    pub leads: f64,
+    /// A fall of χ² by this much counts (statistics: 3 σ of one number).
+    pub counts: f64,
+}
+
+/// What is fitted.
+#[derive(Debug, Clone)]
+pub struct SearchSettings {
+    /// Descents after which no further round is begun (cost): what is left undecided is told.
+    pub budget: usize,
+    /// A length or an inertia of a rig is known to this share (judgement: a rule and kitchen scales).
+    pub geometry_share: f64,
+    /// Fits from which pairs are built (cost).
+    pub pair_seeds: usize,
+    /// Of these, the ones beside which what is dear to score is looked for (cost).
+    pub dear_seeds: usize,
+    /// Fits that leave this many times the best one's χ² are no seeds (cost).
+    pub far: f64,
+    /// No pair is promised less than this part of its seed's χ²: a promise from afar is worth little (training bank).
+    pub afar: f64,
+    /// Pairs fitted in full (cost).
+    pub most_pairs: usize,
+    /// Pairs fitted even where they promise little (training bank).
+    pub fewest_pairs: usize,
+    /// A pair that promises more than this many times the least χ² is not fitted (cost).
+    pub promising: f64,
+    /// An effect that leaves less than this part of the base model's χ² leads the others (training bank)…
+    pub leader_leaves: f64,
+    /// … elsewhere, where a parameter of the base model differs by more than this part (training bank).
+    pub elsewhere: f64,
+    /// A fit whose χ² is this many times the best one's, and this much more, is not made any better (cost).
+    pub hopeless: f64,
+    /// A χ² that was this many times as large was not yet a minimum's: the noise is learnt again (training bank).
+    pub far_down: f64,
+    /// The best effects beside each of which every other one is sought again (cost).
+    pub restart_seeds: usize,
+    /// The best fits that are made anew from the first part of the recordings (cost).
+    pub restarted: usize,
+    /// That part of the rows, or less where the swing has fallen to `still` of its largest before (training bank).
+    pub first_part: f64,
+    /// See `first_part`.
+    pub still: f64,
+    /// A part of fewer swings tells losses and clocks from nothing (judgement).
+    pub fewest_swings: f64,
+    /// Fits that are followed from the beginning of the recordings (cost).
+    pub begun: usize,
+    /// Fits of each number of coefficients that are followed further (cost)…
+    pub followed: usize,
+    /// … unless they leave more than this many times what the best of them does.
+    pub keeps_up: f64,
+    /// Effects that an answer has at first (judgement: a bank of single effects and pairs has calibrated no more).
+    pub main_effects: usize,
+    /// Most effects of one hypothesis (training bank: of four several quartets did equally well)…
+    pub most_effects: usize,
+    /// … and most coefficients.
+    pub most_coefficients: usize,
+    /// Effects that are tried beside a fit that has some (cost).
+    pub tried: usize,
+    /// A fit that leaves more than this many times what the best one does leads nowhere (cost).
+    pub leads: f64,
+    /// Part of what one effect promises that another in its place must (training bank).
+    pub most_of: f64,
+    /// Turns of more and fewer effects (cost).
+    pub turns: usize,
+    /// Another count of rods must lower χ² by so many variances of the best fit (statistics: 5 σ).
+    pub worth_a_count: f64,
+    /// Where the best fit leaves this many variances of the noise, a wrong count may have led to it (training bank).
+    pub count_unexplained: f64,
+}
+
+/// Which fits count.
+#[derive(Debug, Clone)]
+pub struct CertificateSettings {
+    /// Two ends are one where their χ² differ by less than this many variances of what is left (0.2 is a tenth of an ln-likelihood).
+    pub agrees: f64,
+    /// Independent starts that must end there.
+    pub starts: usize,
+    /// Fits that are given further starts until so many agree (cost)…
+    pub most: usize,
+    /// … of those that leave, and need, at most this much more than the best (statistics: beyond it odds are e⁻²⁵).
+    pub within: f64,
+}
+
+/// How probable each hypothesis is.
+#[derive(Debug, Clone)]
+pub struct PriorSettings {
+    /// ln R: coefficients over four decades (judgement: nobody knows beforehand how much a hinge rubs).
+    pub sizes: f64,
+    /// The same of yield angles: over a factor of thirty.
+    pub yields: f64,
+    /// Of a support's frequency, over the swing's.
+    pub frequencies: f64,
+    /// Coefficients of less than this many standard deviations are not told from zero (statistics).
+    pub told_from_zero: f64,
+    /// From this variance on, over the noise's, a fall of χ² counts instead of a standard deviation (training bank).
+    pub much_left: f64,
+    /// Of nothing missing, of one effect, of two (judgement: as many of each as a laboratory has).
+    pub none: f64,
+    /// See `none`.
+    pub one: f64,
+    /// See `none`.
+    pub two: f64,
+    /// Three are this much less probable than two, and so on (judgement).
+    pub further: f64,
+    /// An effect of the camera is this much likelier than one of physics (judgement: in doubt it is the measurement).
+    pub camera_first: f64,
+    /// Of physics outside the table (judgement).
+    pub unknown: f64,
+    /// The part of names that stand for something outside the table (training bank: names stated at 0.99 were right in 97 of 100 cases).
+    pub imitated: f64,
+    /// Each name beyond two is with these odds what it seems to be (judgement: no bank has calibrated them).
+    pub beyond_two: f64,
+    /// A support in step with the swing is with these odds what it seems to be (training bank: four times out of five).
+    pub support_in_step: f64,
+    /// The same beside a law of physics where it gains little: three free numbers complete a law that is only nearly right (training bank).
+    pub support_beside_a_law: f64,
+    /// That little, in standard deviations (training bank).
+    pub slight: f64,
+    /// A clock that jumps by a part of a frame is with these odds a camera's (training bank).
+    pub part_of_a_frame: f64,
+}
+
+/// Which answer that makes.
+#[derive(Debug, Clone)]
+pub struct VerdictSettings {
+    /// A probability from which on something counts as likelier than not.
+    pub even: f64,
+    /// An answer stands alone when it is at least this probable (judgement: three to one).
+    pub alone: f64,
+    /// A hypothesis this much less probable than the best named one is told from it (statistics: 5 %).
+    pub told_apart: f64,
+    /// Where the best of the table leaves far more than noise, its names stand if they leave at most this part of what the base model leaves of what was not
+    /// fitted (judgement: half)…
+    pub proven: f64,
+    /// … with these odds: they may be the largest part, or the nearest relatives of what is not in the table.
+    pub nearest: f64,
+    /// There a further effect must leave at most this part of what the others do of what was not fitted (training bank: the double arm's third passes).
+    pub borne_out: f64,
+    /// Part of a recording that is fitted; the rest is predicted (judgement).
+    pub fitted: f64,
+    /// Places are told from one another by this much in ln-likelihood (statistics: 20 to 1).
+    pub places: f64,
+    /// An effect is seen at this many standard deviations (statistics)…
+    pub seen: f64,
+    /// … and named when it is this many from its nearest rival.
+    pub named: f64,
+    /// Two effects whose signatures go together by more than this are not named apart at twice the size at which they are seen.
+    pub confused: f64,
+}
+
+impl Default for NoiseSettings {
+    fn default() -> Self {
+        Self {
+            motion: 1e-7,
+            leaks: 0.1,
+            line: 25.0,
+            enough: 0.15,
+            most: 1.2,
+            coloured: 6.0,
+            beside: 3.0,
+            together: 4.0,
+            beyond: 5.0,
+            grows: 1.5,
+            changes: 0.03,
+            stretches_coloured: 0.12,
+        }
+    }
+}
+
+impl Default for DescentSettings {
+    fn default() -> Self {
+        Self { first_steps: 4, few_steps: 12, most_steps: 30, enough: 0.02, beyond_hope: 10.0, hopeful: 1.2 }
+    }
+}
+
+impl Default for MisfitSettings {
+    fn default() -> Self {
+        Self { much: 0.05, out_of_step: 0.35, deviations: 4.0, little: 2.0, leads: 0.005, counts: 9.0 }
+    }
+}
+
+impl Default for SearchSettings {
+    fn default() -> Self {
+        Self {
+            budget: 4000,
+            geometry_share: 0.1,
+            pair_seeds: 6,
+            dear_seeds: 3,
+            far: 100.0,
+            afar: 0.01,
+            most_pairs: 20,
+            fewest_pairs: 6,
+            promising: 3.0,
+            leader_leaves: 0.5,
+            elsewhere: 0.3,
+            hopeless: 10.0,
+            far_down: 3.0,
+            restart_seeds: 2,
+            restarted: 4,
+            first_part: 0.5,
+            still: 0.25,
+            fewest_swings: 5.0,
+            begun: 12,
+            followed: 3,
+            keeps_up: 2.0,
+            main_effects: 2,
+            most_effects: 3,
+            most_coefficients: 5,
+            tried: 6,
+            leads: 2.0,
+            most_of: 0.5,
+            turns: 4,
+            worth_a_count: 25.0,
+            count_unexplained: 1.2,
+        }
+    }
+}
+
+impl Default for CertificateSettings {
+    fn default() -> Self {
+        Self { agrees: 0.2, starts: 3, most: 6, within: 50.0 }
+    }
+}
+
+impl Default for PriorSettings {
+    fn default() -> Self {
+        Self {
+            sizes: 9.2,
+            yields: 3.4,
+            frequencies: 10.0,
+            told_from_zero: 1.5,
+            much_left: 4.0,
+            none: 0.25,
+            one: 0.40,
+            two: 0.25,
+            further: 0.2,
+            camera_first: 2.0,
+            unknown: 0.10,
+            imitated: 0.03,
+            beyond_two: 0.7,
+            support_in_step: 0.8,
+            support_beside_a_law: 0.35,
+            slight: 25.0,
+            part_of_a_frame: 0.6,
+        }
+    }
+}
+
+impl Default for VerdictSettings {
+    fn default() -> Self {
+        Self {
+            even: 0.5,
+            alone: 0.75,
+            told_apart: 0.05,
+            proven: 0.5,
+            nearest: 0.5,
+            borne_out: 0.9,
+            fitted: 2.0 / 3.0,
+            places: 3.0,
+            seen: 4.0,
+            named: 5.0,
+            confused: 0.93,
+        }
+    }
+}
