@@ -7,7 +7,6 @@ help:
 	@echo 'make test      every test'
 	@echo 'make accuracy  the slow accuracy tests, optimised'
 	@echo 'make concealed find hidden effects in recordings made by another program, and score it'
-	@echo 'make foreign   track pictures that another program drew, and score them'
 	@echo 'make bench     each stage, then the whole against ffmpeg and OpenCV'
 	@echo 'make lint      formatting, clippy, documentation; no warning passes'
 	@echo 'make clean     remove what was built or made'
@@ -51,18 +50,6 @@ target/concealed/video/labels.json: what = --cases 8 --levels video
 target/concealed/%/labels.json: | setup-concealed
 	$(PYTHON) fixtures/concealed/generate.py --bank test --out $(@D) $(what)
 
-# Pictures that are there are not drawn again; `SECONDS=6` and VARIANTS='base crf18' draw more, or fewer.
-SECONDS = 4
-VARIANTS = $$($(PYTHON) fixtures/foreign/render.py --list)
-
-foreign: | setup-concealed
-	cargo build --release
-	@for name in $(VARIANTS); do \
-	    $(PYTHON) fixtures/foreign/render.py --out target/foreign --seconds $(SECONDS) --only $$name >/dev/null && \
-	    TRACK=$(FREESWING:freeswing=track) fixtures/foreign/run.sh target/foreign $$name && \
-	    $(PYTHON) fixtures/foreign/score.py target/foreign --only $$name; \
-	done
-
 setup-concealed:
 	@scripts/setup concealed
 
@@ -79,4 +66,4 @@ clean:
 	cargo clean
 	rm -rf demo
 
-.PHONY: help setup setup-concealed demo test accuracy concealed foreign bench lint clean
+.PHONY: help setup setup-concealed demo test accuracy concealed bench lint clean

@@ -45,7 +45,7 @@ fn specimen(text: &mut String, finding: &Finding) {
     );
     text.push_str("mass_kg = \"MEASURE\"           # kilograms, the whole strip or pendulum, marks included\n");
     text.push_str("# length_m = 0.25             # metres, the whole strip, where it goes on beyond its last mark\n");
-    text.push_str("# width_m = 0.05              # metres, width of a strip, for the air's drag\n");
+    text.push_str("# width_m = 0.05              # metres, width of a strip, for its bending stiffness\n");
     text.push_str(
         "# for rigid arms or a bob give [[specimen.links]] with length_m, mass_kg, com_m, inertia_kg_m2 instead\n\n",
     );
