@@ -113,7 +113,14 @@ fn in_layers(
     settings: &Settings,
 ) -> Vec<f64> {
     let others: Vec<&Refit<'_>> = fits.iter().collect();
-    let ln_weight: Vec<f64> = fits.iter().zip(ln_posterior).map(|(f, ln)| ln + 0.5 * f.chi2 / scatter.of_all).collect();
+    // a fit that is not certified may be a false minimum: it counts for nothing beside those that are
+    let best = (0..fits.len()).max_by(|a, b| ln_posterior[*a].total_cmp(&ln_posterior[*b])).unwrap_or(0);
+    let counts = |place: usize| place == best || fits[place].is_certified(&settings.certificate);
+    let ln_weight = |(place, fit): (usize, &Refit<'_>)| match counts(place) {
+        true => ln_posterior[place] + 0.5 * fit.chi2 / scatter.of_all,
+        false => f64::NEG_INFINITY,
+    };
+    let ln_weight: Vec<f64> = fits.iter().enumerate().map(ln_weight).collect();
     let together = ((scatter.of_all - 1.0) / (scatter.of_values - 1.0).max(1e-9)).max(1.0);
     let bagged = if remains > NEGLIGIBLE {
         bag::bagged(fits, &ln_weight, (scatter.of_values, together))

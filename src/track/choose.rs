@@ -173,10 +173,9 @@ fn candidates(tracklets: &[Tracklet], window: &[FrameBlobs], pivot_px: Option<[f
             let mut ln_areas: Vec<f64> =
                 t.sightings.iter().map(|s| f64::from(sighting(s).measured.area_px2).ln()).collect();
             let (travel_px, scatter_px) = motion(&path);
-            let still_px = STILL_PX + STILL_SCATTERS * scatter_px;
             Candidate {
                 travel_px,
-                moves: travel_px > still_px.max(covering_shift_px(&mut ln_areas)),
+                moves: travel_px > STILL_PX + STILL_SCATTERS * scatter_px,
                 tracklet,
                 hue: t.hue,
                 presence: t.sightings.len() as f64 / window.len() as f64,
@@ -254,19 +253,6 @@ fn motion(path: &[Option<[f64; 2]>]) -> (f64, f64) {
     let travel_px = of_axis(0).max(of_axis(1));
     // a swing of few frames a turn has differences of its own: they are no scatter
     (travel_px, scatter_px.min(0.1 * travel_px))
-}
-
-/// How far the middle of a thing that stands still goes where it is covered in part, or grows together with what lies
-/// beside it: what is lost of the area A lies no farther off than the radius r.
-///
-/// ```text
-/// shift ≤ (A / A_left − 1) r
-/// ```
-fn covering_shift_px(ln_areas: &mut [f64]) -> f64 {
-    ln_areas.sort_unstable_by(f64::total_cmp);
-    let last = ln_areas.len().saturating_sub(1);
-    let at = |share: usize| ln_areas.get(last * share / 20).copied().unwrap_or(0.0);
-    ((at(19) - at(1)).exp() - 1.0) * (at(10).exp() / std::f64::consts::PI).sqrt()
 }
 
 /// How much the distance of two candidates changes, as a share of how they move against each other; 1 where they

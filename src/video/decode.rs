@@ -343,9 +343,13 @@ fn decode_segments<T>(
     measure: &(dyn Fn(Frame<'_>) -> T + Sync),
 ) {
     while let Ok(Task { index, segment, is_late }) = work.recv() {
-        let late = if is_late && threads > 1 { decoder.recipe.decoder(threads).ok() } else { None };
-        // with threads of its own a decoder reports damage some frames later: what is damaged is decoded again alone
-        let is_whole = |result: &(Vec<T>, Decoded, bool)| result.1.damaged_packets == 0 && !result.2;
+        let is_intact = segment.packets.iter().all(|packet| !packet.is_corrupt());
+        let late = if is_late && is_intact && threads > 1 { decoder.recipe.decoder(threads).ok() } else { None };
+        // with threads of its own a decoder reports damage some frames later, or not at all: then it is decoded again alone
+        let packets = segment.packets.len();
+        let is_whole = |(values, decoded, damaged): &(Vec<T>, Decoded, bool)| {
+            values.len() == packets && decoded.damaged_packets == 0 && !damaged
+        };
         let quickly =
             late.map(|mut quick| decode_segment(&mut quick, segment.packets.clone(), measure)).filter(is_whole);
         let (values, decoded, _) = quickly.unwrap_or_else(|| decode_segment(&mut decoder, segment.packets, measure));
