@@ -1,7 +1,7 @@
 //! What all searches begin with: recordings without outliers, their noise, and where the base model's descent starts.
 
-use super::base::{Taken, base_of};
 use super::settings::Settings;
+use super::taken::{Taken, base_of};
 use crate::error::Result;
 use crate::experiment::Experiment;
 use crate::fit::noise::noise_rad;

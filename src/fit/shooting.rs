@@ -240,3 +240,47 @@ fn residuals(problem: &Problem<'_>, stretches: &[Stretch], x: &[f64]) -> Vec<(us
     }
     all
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::experiment::Experiment;
+    use crate::fit::straight;
+    use crate::model::{ForwardModel, Parameter, State, Trajectory};
+
+    const FREE: [Parameter; 2] = [Parameter::JointStiffness, Parameter::JointDamping];
+
+    fn with(stiffness: f64) -> Experiment {
+        let mut experiment = Experiment::default();
+        (experiment.model.k_eq_n_m_per_rad, experiment.model.c_eq_n_m_s_per_rad) = (stiffness, 2e-7);
+        experiment
+    }
+
+    /// Half a minute at 30 Hz, exact.
+    fn swing() -> (Record, Vec<Vec<f64>>) {
+        let model = ForwardModel::of(&with(2e-4)).unwrap();
+        let release = State::released(&model, &[0.5, 0.8]).unwrap();
+        let swing = Trajectory::swing(&model, &release, 0.0, 30.0).unwrap();
+        let t_s: Vec<f64> = (0..900).map(|row| f64::from(row) / 30.0).collect();
+        let states: Vec<Vec<f64>> =
+            t_s.iter().map(|t| swing.at(*t)).map(|s| [s.theta_rad, s.omega_rad_s].concat()).collect();
+        let theta_rad = (0..2).map(|link| states.iter().map(|s| Some(s[link])).collect()).collect();
+        let rows = t_s.len();
+        (Record { path: "made".into(), t_s, theta_rad, relative_sd: vec![vec![1.0; rows]; 2], in_step: 0.0 }, states)
+    }
+
+    #[test]
+    fn stretches_along_a_motion_that_follows_lead_out_of_a_false_minimum() {
+        let (record, states) = swing();
+        let records = [record];
+        let mut problem = Problem::new(&records, &with(4e-4), &FREE).unwrap();
+        let parameters = problem.start_values().unwrap();
+        let off = |x: &[f64]| (x[0] / 2e-4 - 1.0).abs();
+        // as one motion the second mode loses step, and stays out of it
+        let descent = Descent { most_steps: 60, damping: 1e-8, ..Descent::default() };
+        let alone = straight::descend(&problem, &descent, [&parameters[..], &states[0]].concat()).unwrap();
+        assert!(off(&alone.x) > 0.05, "{:?}", alone.x);
+        let shot = shooting_along(&mut problem, &parameters, |_, row| states[row].clone()).unwrap();
+        assert!(off(&shot.x) < 0.01, "{:?}", shot.x);
+    }
+}
