@@ -361,9 +361,8 @@ fn a_law_that_is_not_in_the_table_is_unknown_and_found_at_its_place() {
     assert_eq!(report["verdict"]["status"], "unknown", "{:#}", report["verdict"]);
     assert!(names(&report["verdict"]["effects"]).is_empty());
     assert_eq!(report["where"]["place"], "hinge", "{:#}", report["where"]);
-    // it follows the angle, so that a handful of numbers says more than any course in time
-    let unknown = &report["where"]["unknown"];
-    assert_eq!((&unknown[0]["place"], &unknown[0]["form"]), (&"hinge".into(), &"law".into()), "{unknown:#}");
+    // three effects that imitate it count for nothing, whatever they leave
+    assert!(report["verdict"]["unknown_probability"].as_f64().unwrap() > 0.99, "{:#}", report["verdict"]);
 }
 
 #[test]
