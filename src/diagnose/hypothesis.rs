@@ -54,3 +54,20 @@ impl Hypothesis {
         Self { effects, dropped: self.dropped }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_hypothesis_nests_in_a_richer_one_about_the_same_chain_only() {
+        let of = |effects: &[Effect]| Hypothesis { effects: effects.to_vec(), dropped: None };
+        let (rub, drag) = (of(&[Effect::HingeCoulomb]), of(&[Effect::AirQuadratic]));
+        let both = rub.and(Effect::AirQuadratic, None);
+        assert!(Hypothesis::default().nests_in(&rub) && rub.nests_in(&both) && drag.nests_in(&both));
+        assert!(!both.nests_in(&rub) && !rub.nests_in(&rub) && !rub.nests_in(&drag));
+        // a strip that bends everywhere is another chain: two rods are no special case of it
+        let bent = of(&[Effect::HingeCoulomb, Effect::DistributedFlexibility]);
+        assert!(!rub.nests_in(&bent) && of(&[Effect::DistributedFlexibility]).nests_in(&bent));
+    }
+}

@@ -3,7 +3,7 @@
 //! | step | | files |
 //! |---|---|---|
 //! | 1 | the recordings are prepared: outliers, noise, where the base model's descent starts | [`preparation`] |
-//! | 2 | the base model is fitted | [`base`], [`context`], [`refit`], [`descents`], [`noise`], [`learnt_noise`] |
+//! | 2 | the base model is fitted | [`taken`], [`base`], [`context`], [`refit`], [`descents`], [`noise`], [`learnt_noise`] |
 //! | 3 | what it lacks is sought: effects are proposed, fitted, kept | [`mod@search`], [`screen`], [`misfit`], [`laws`] |
 //! | 4 | a strip's rods are counted | [`rods`] |
 //! | 5 | the hypotheses are weighed, beside something that is not in the table | [`posterior`], [`evidence`], [`bag`], [`unknowns`], [`latent`], [`basis_law`] |
@@ -44,6 +44,7 @@ pub mod rods;
 pub mod screen;
 pub mod search;
 pub mod settings;
+pub mod taken;
 pub mod torque;
 pub mod unknowns;
 pub mod verdict;
@@ -55,10 +56,10 @@ use crate::error::Result;
 use crate::experiment::Experiment;
 use crate::fit::Record;
 use crate::progress::Progress;
-use base::Taken;
 use findings::Findings;
 use posterior::Posterior;
 use search::Search;
+use taken::Taken;
 
 pub use adequacy::Detectable;
 pub use effect::{Effect, Phase, Place};

@@ -1,12 +1,13 @@
 //! Before an experiment: what a planned recording could show, and what it could tell apart.
 
 use super::adequacy::{Detectable, detectable};
-use super::base::{Taken, base_of, candidates};
+use super::base::candidates;
 use super::context::FitContext;
 use super::hypothesis::Hypothesis;
 use super::laws;
 use super::screen::Screen;
 use super::settings::Settings;
+use super::taken::{Taken, base_of};
 use crate::error::{Error, Result};
 use crate::experiment::Experiment;
 use crate::fit::Record;

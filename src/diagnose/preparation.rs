@@ -1,7 +1,7 @@
 //! What all searches begin with: recordings without outliers, their noise, and where the base model's descent starts.
 
-use super::base::{Taken, base_of};
 use super::settings::Settings;
+use super::taken::{Taken, base_of};
 use crate::error::Result;
 use crate::experiment::Experiment;
 use crate::fit::noise::noise_rad;
@@ -47,7 +47,8 @@ pub fn prepare(records: &[Record], experiment: &Experiment, settings: &Settings)
     problem.integrate_below_the_noise();
     let step_error_rad = problem.accuracy.step_error_rad;
     problem.accuracy = problem.accuracy_of(problem.longest_s(), step_error_rad);
-    let (kept, _) = crate::fit::without_outliers(&problem, &outcome.x)?;
+    // where short stretches led: a whole motion that has bent to a jump of the clock would take the rows beside that for outliers
+    let (kept, _) = crate::fit::without_outliers(&problem, &shot.x)?;
     Ok(Prepared {
         noise: coloured(&shot.residuals, &shot.noise, settings.noise.stretches_coloured),
         step_error_rad,

@@ -238,3 +238,51 @@ pub fn best_of_each_count<'f, 'a>(fits: &'f [Refit<'a>], most: usize) -> Vec<&'f
     let of_count = |count: usize| best(fits, 1, |fit| fit.coefficients() == count, |fit| fit.chi2);
     (1..=most).flat_map(of_count).map(|place| &fits[place]).collect()
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::diagnose::effect::Effect;
+    use crate::experiment::Experiment;
+    use crate::fit::Record;
+
+    fn leaving(records: &[Record], chi2: f64, starts_agreeing: usize) -> Refit<'_> {
+        let problem = Problem::new(records, &Experiment::default(), &[]).unwrap();
+        let hypothesis = Hypothesis { effects: vec![Effect::HingeCoulomb], dropped: None };
+        let certificate = Certificate { starts_agreeing, nested_ok: true };
+        let x = vec![0.1; problem.variables()];
+        Refit { hypothesis, problem, x, chi2, normal: DMatrix::identity(4, 4), steps: 1, converged: true, certificate }
+    }
+
+    #[test]
+    fn only_starts_that_end_at_the_best_count_together() {
+        let theta_rad = vec![vec![Some(0.1); 30]; 2];
+        let t_s = (0..30).map(f64::from).collect();
+        let records =
+            [Record { path: "none".into(), t_s, theta_rad, relative_sd: vec![vec![1.0; 30]; 2], in_step: 0.0 }];
+        let met = |own: f64, other: f64| {
+            let mut fit = leaving(&records, own, 1);
+            fit.meet(leaving(&records, other, 2), 0.2);
+            (fit.chi2, fit.certificate.starts_agreeing)
+        };
+        assert_eq!(met(60.0, 60.1), (60.0, 3));
+        assert_eq!(met(60.1, 60.0), (60.0, 3));
+        // a false minimum, here the other's, there its own
+        assert_eq!(met(60.0, 70.0), (60.0, 1));
+        assert_eq!(met(70.0, 60.0), (60.0, 2));
+        // far above the noise of 60 values the same end is known less well
+        assert_eq!(met(6000.0, 6010.0), (6000.0, 3));
+    }
+
+    #[test]
+    fn a_fit_counts_only_with_every_part_of_its_certificate() {
+        let settings = CertificateSettings::default();
+        let records = [];
+        let sound = leaving(&records, 60.0, settings.starts);
+        assert!(sound.is_certified(&settings));
+        assert!(!Refit { converged: false, ..sound.clone() }.is_certified(&settings));
+        assert!(!leaving(&records, 60.0, settings.starts - 1).is_certified(&settings));
+        let certificate = Certificate { nested_ok: false, ..sound.certificate };
+        assert!(!Refit { certificate, ..sound }.is_certified(&settings));
+    }
+}

@@ -65,17 +65,7 @@ impl<'a> Problem<'a> {
         free.iter().for_each(|parameter| switch_on(&mut experiment, *parameter));
         let model = ForwardModel::of(&experiment)?;
         for parameter in free {
-            let of_joint = matches!(
-                parameter,
-                Parameter::JointStiffness
-                    | Parameter::JointDamping
-                    | Parameter::RestCurl
-                    | Parameter::JointCubicStiffness
-                    | Parameter::HysteresisTorque
-                    | Parameter::HysteresisYield
-                    | Parameter::DifferentialLag
-            );
-            if of_joint && model.chain().count() < 2 {
+            if parameter.is_of_joint() && model.chain().count() < 2 {
                 let message = "this specimen has one link and no joint; leave it out".to_owned();
                 return Err(Error::Option { option: parameter.id().to_owned(), message });
             }

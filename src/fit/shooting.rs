@@ -240,3 +240,43 @@ fn residuals(problem: &Problem<'_>, stretches: &[Stretch], x: &[f64]) -> Vec<(us
     }
     all
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::experiment::Experiment;
+    use crate::model::{ForwardModel, Parameter, State, Trajectory};
+
+    const FREE: [Parameter; 2] = [Parameter::JointStiffness, Parameter::JointDamping];
+
+    fn with(stiffness: f64) -> Experiment {
+        let mut experiment = Experiment::default();
+        (experiment.model.k_eq_n_m_per_rad, experiment.model.c_eq_n_m_s_per_rad) = (stiffness, 2e-7);
+        experiment
+    }
+
+    /// Half a minute at 30 Hz, exact.
+    fn swing() -> (Record, Vec<Vec<f64>>) {
+        let model = ForwardModel::of(&with(2e-4)).unwrap();
+        let release = State::released(&model, &[0.5, 0.8]).unwrap();
+        let swing = Trajectory::swing(&model, &release, 0.0, 30.0).unwrap();
+        let t_s: Vec<f64> = (0..900).map(|row| f64::from(row) / 30.0).collect();
+        let states: Vec<Vec<f64>> =
+            t_s.iter().map(|t| swing.at(*t)).map(|s| [s.theta_rad, s.omega_rad_s].concat()).collect();
+        let theta_rad = (0..2).map(|link| states.iter().map(|s| Some(s[link])).collect()).collect();
+        let rows = t_s.len();
+        (Record { path: "made".into(), t_s, theta_rad, relative_sd: vec![vec![1.0; rows]; 2], in_step: 0.0 }, states)
+    }
+
+    #[test]
+    fn stretches_along_a_motion_that_follows_lead_to_its_parameters() {
+        let (record, states) = swing();
+        let records = [record];
+        // as one motion of 30 s the second mode would miss several turns
+        let mut problem = Problem::new(&records, &with(2.4e-4), &FREE).unwrap();
+        let parameters = problem.start_values().unwrap();
+        let shot = shooting_along(&mut problem, &parameters, |_, row| states[row].clone()).unwrap();
+        assert!((shot.x[0] / 2e-4 - 1.0).abs() < 0.01, "{:?}", shot.x);
+        assert!(shot.x[2..].iter().zip(&states[0]).all(|(x, state)| (x - state).abs() < 1e-2), "{:?}", shot.x);
+    }
+}

@@ -118,6 +118,20 @@ impl Parameter {
         matches!(self, Self::JointStiffness | Self::BendingStiffness)
     }
 
+    /// Whether only a specimen with a joint has it.
+    pub fn is_of_joint(self) -> bool {
+        matches!(
+            self,
+            Self::JointStiffness
+                | Self::JointDamping
+                | Self::RestCurl
+                | Self::JointCubicStiffness
+                | Self::HysteresisTorque
+                | Self::HysteresisYield
+                | Self::DifferentialLag
+        )
+    }
+
     /// Whether its law is proportional to it, and gone at zero; a yield angle or a frequency only shapes a law.
     pub fn is_proportional(self) -> bool {
         !matches!(self, Self::HysteresisYield | Self::SupportFrequency)

@@ -19,7 +19,7 @@ use std::sync::OnceLock;
 
 use rayon::prelude::*;
 
-use super::base::{self, Taken};
+use super::base;
 use super::context::{FitContext, without_errors_in_step};
 use super::effect::Effect;
 use super::laws::{self, bending};
@@ -30,6 +30,7 @@ use super::refit::{Refit, least, least_chi2, merged};
 use super::rods;
 use super::screen::{Score, Screen};
 use super::settings::Settings;
+use super::taken::{Taken, has_slack};
 use crate::error::Result;
 use crate::experiment::Experiment;
 use crate::fit::whitening::RecordNoise;
@@ -134,7 +135,7 @@ impl<'a, 'p> Search<'a, 'p> {
     #[must_use]
     pub fn doubted(self) -> Self {
         let loosened = || {
-            let has_slack = base::has_slack(self.context.experiment, self.context.marks());
+            let has_slack = has_slack(self.context.experiment, self.context.marks());
             (has_slack && self.leaves_more_than_noise()).then_some(())?;
             let (experiment, settings) = (self.context.experiment, self.context.settings);
             let mut loosened =

@@ -66,7 +66,14 @@ impl<'a> Proposal<'_, 'a> {
                 horizon::continued_alone(context, &begun).into_iter().collect()
             }
             Self::Instead(fit, effect, others) => instead(context, fit, *effect, others),
-            Self::Anew(hypothesis, without) => context.refit_anew(hypothesis, &[], without).into_iter().collect(),
+            Self::Anew(hypothesis, without) => {
+                let anew = context.refit_anew(hypothesis, &[], without);
+                let ended = |fit: Refit<'a>| match fit.converged || hypothesis.is_dear() {
+                    true => Some(fit),
+                    false => context.go_on(&fit, context.settings.descent.most_steps),
+                };
+                anew.and_then(ended).into_iter().collect()
+            }
             Self::Continued(fits, effects) => horizon::continued(context, fits, effects),
         }
     }
