@@ -85,18 +85,16 @@ pub fn weigh<'a>(fits: Vec<Refit<'a>>, effects: usize, settings: &Settings) -> P
         unknown += (1.0 - genuine) * *probability;
         *probability *= genuine;
     }
-    let mut candidates: Vec<Candidate<'a>> = (fits
-        .into_iter()
-        .zip(posterior)
-        .zip(probability.into_iter().zip(if_named).zip(in_layers)))
-    .map(|((fit, ln_posterior), ((probability, if_named), in_layers))| Candidate {
-        fit,
-        ln_posterior,
-        probability,
-        if_named,
-        in_layers,
-    })
-    .collect();
+    let mut candidates: Vec<Candidate<'a>> =
+        (fits.into_iter().zip(posterior).zip(probability.into_iter().zip(if_named).zip(in_layers)))
+            .map(|((fit, ln_posterior), ((probability, if_named), in_layers))| Candidate {
+                fit,
+                ln_posterior,
+                probability,
+                if_named,
+                in_layers,
+            })
+            .collect();
     // where the unknown takes all, or next to all, their order among themselves still counts
     candidates
         .sort_by(|a, b| (b.probability.total_cmp(&a.probability)).then(b.ln_posterior.total_cmp(&a.ln_posterior)));
