@@ -196,8 +196,11 @@ fn the_file_has_every_field_and_a_null_says_what_it_would_have_shown() {
             assert_keys(parameter, &["value", "sd", "unit"]);
         }
     }
-    let keys = ["status", "effects", "class", "probability", "statement", "to_decide"];
+    let keys = ["status", "effects", "class", "probability", "statement", "to_decide", "inclusion", "remainder"];
     assert_keys(&report["verdict"], &keys);
+    let keys = ["present", "place", "phase", "frequency_hz", "rms_rad", "over_noise", "share"];
+    assert_keys(&report["verdict"]["remainder"], &keys);
+    assert!(report["verdict"]["inclusion"].as_object().unwrap().values().all(|p| p.as_f64().unwrap() < 0.5));
     assert_keys(&report["heldout"], &["from_s", "baseline_rmse_rad", "augmented_rmse_rad"]);
     assert_eq!(report["verdict"]["status"], "adequate", "{:#}", report["verdict"]);
     assert_eq!(report["baseline"]["adequate"], true);
@@ -361,8 +364,12 @@ fn a_law_that_is_not_in_the_table_is_unknown_and_found_at_its_place() {
     assert_eq!(report["verdict"]["status"], "unknown", "{:#}", report["verdict"]);
     assert!(names(&report["verdict"]["effects"]).is_empty());
     assert_eq!(report["where"]["place"], "hinge", "{:#}", report["where"]);
-    // three effects that imitate it count for nothing, whatever they leave
-    assert!(report["verdict"]["unknown_probability"].as_f64().unwrap() > 0.99, "{:#}", report["verdict"]);
+    // three effects that imitate it count for nothing, whatever they leave: nothing of the table is stated with certainty
+    assert!(report["verdict"]["unknown_probability"].as_f64().unwrap() > 0.9, "{:#}", report["verdict"]);
+    let inclusion = report["verdict"]["inclusion"].as_object().unwrap();
+    assert!(inclusion.values().all(|p| (0.0..0.9).contains(&p.as_f64().unwrap())), "{inclusion:#?}");
+    let remainder = &report["verdict"]["remainder"];
+    assert!(remainder["present"].as_f64().unwrap() > 0.9, "{remainder:#}");
 }
 
 #[test]

@@ -214,7 +214,7 @@ impl<'a> Posterior<'a> {
     /// How probable each effect is, over all sets of names that hold it, whatever remains beside them.
     pub fn inclusion(&self, effect: Effect) -> f64 {
         let with = self.candidates.iter().filter(|c| c.fit.hypothesis.has(effect));
-        with.map(|c| c.in_layers).sum::<f64>().min(1.0)
+        with.map(|c| c.in_layers).fold(0.0, |sum, p| sum + p).min(1.0)
     }
 
     /// A fit's effects, the one that explains most first: without which it would be worst.

@@ -190,8 +190,8 @@ pub struct PriorSettings {
     pub camera_first: f64,
     /// Of physics outside the table (judgement).
     pub unknown: f64,
-    /// Names that leave less than this part of what the base model leaves beyond the noise are at work, whatever remains: laws outside the table were imitated
-    /// by those in it down to a hundredth (sealed tables: 46 mrad fell to 5), never to a thousandth.
+    /// One or two names that leave less than this part of what the base model leaves beyond the noise are at work, whatever remains: laws outside the table were
+    /// imitated by so few of it down to a hundredth (46 mrad fell to 5), never to a thousandth; by three down to 2·10⁻⁵ (judgement, not yet calibrated on a bank).
     pub imitated_down_to: f64,
     /// Decades of that part over which names that are at work may leave something (judgement: smoothed friction, a bent bearing, an encoder's steps).
     pub model_error_decades: f64,

@@ -73,10 +73,11 @@ impl Verdict {
             to_decide: None,
         };
         if unknown > adequate && unknown > named {
-            // names that take all but next to nothing stand, whatever remains beside them
+            // one or two names that take all but next to nothing stand, whatever remains beside them; three imitate much
             let best = posterior.best();
             let left = left_of_excess(best, posterior.base());
-            if left < settings.prior.imitated_down_to && best.is_certified(&settings.certificate) {
+            let few = best.hypothesis.effects.len() <= settings.search.main_effects;
+            if few && left < settings.prior.imitated_down_to && best.is_certified(&settings.certificate) {
                 let verdict = Self::naming(weighed, |w| w.in_layers, unknown, marks, settings);
                 if verdict.status == Status::Identified {
                     return verdict;
