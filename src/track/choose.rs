@@ -49,6 +49,9 @@ const LEAST_PRESENCE: f64 = 0.2;
 /// Candidates beyond the marks that are considered, most seen first.
 const SPARE_CANDIDATES: usize = 5;
 
+/// Part by which areas of one and the same thing, seen whole, differ.
+const SAME_AREA: f64 = 0.1;
+
 /// A tracklet as a candidate.
 struct Candidate {
     tracklet: usize,
@@ -62,6 +65,8 @@ struct Candidate {
     /// Half the range of its motion, the outermost twentieths apart.
     travel_px: f64,
     moves: bool,
+    /// It moves while it is seen whole, too.
+    moves_whole: bool,
     /// Position by frame.
     path: Vec<Option<[f64; 2]>>,
 }
@@ -75,7 +80,11 @@ pub(super) fn choose(
 ) -> Choice {
     let mut candidates = candidates(tracklets, window, pivot_px);
     let farthest_px = candidates.iter().map(|c| c.travel_px).fold(0.0, f64::max);
-    candidates.iter_mut().for_each(|c| c.moves &= c.travel_px > STILL_SHARE * farthest_px);
+    // what only ever moves while it is covered in part stands still, unless its like swings: then it is a mark that a hand lifts
+    let swinging: Vec<u8> = candidates.iter().filter(|c| c.moves_whole).map(|c| c.hue).collect();
+    candidates.iter_mut().for_each(|c| {
+        c.moves &= c.travel_px > STILL_SHARE * farthest_px && swinging.contains(&c.hue);
+    });
     candidates.sort_by(|a, b| (b.moves, b.presence).partial_cmp(&(a.moves, a.presence)).unwrap_or(Ordering::Equal));
     let spares_of = |taken: &[usize]| spares(&candidates_but(&candidates, taken));
     // of what stands still only a possible hinge is considered, if anything swings at all
@@ -170,12 +179,17 @@ fn candidates(tracklets: &[Tracklet], window: &[FrameBlobs], pivot_px: Option<[f
             };
             let mut orders: Vec<f64> = path.iter().flatten().map(order).collect();
             orders.sort_unstable_by(f64::total_cmp);
-            let mut ln_areas: Vec<f64> =
-                t.sightings.iter().map(|s| f64::from(sighting(s).measured.area_px2).ln()).collect();
+            let mut areas = vec![None; window.len()];
+            for at in &t.sightings {
+                areas[at.0] = Some(f64::from(sighting(at).measured.area_px2));
+            }
+            let mut ln_areas: Vec<f64> = areas.iter().flatten().map(|a: &f64| a.ln()).collect();
             let (travel_px, scatter_px) = motion(&path);
+            let still_px = STILL_PX + STILL_SCATTERS * scatter_px;
             Candidate {
                 travel_px,
-                moves: travel_px > STILL_PX + STILL_SCATTERS * scatter_px,
+                moves: travel_px > still_px,
+                moves_whole: travel_px > still_px && is_no_cover(&path, &areas, (travel_px, still_px)),
                 tracklet,
                 hue: t.hue,
                 presence: t.sightings.len() as f64 / window.len() as f64,
@@ -253,6 +267,21 @@ fn motion(path: &[Option<[f64; 2]>]) -> (f64, f64) {
     let travel_px = of_axis(0).max(of_axis(1));
     // a swing of few frames a turn has differences of its own: they are no scatter
     (travel_px, scatter_px.min(0.1 * travel_px))
+}
+
+/// It moves by more than a thing that stands still and is covered in part, or grows together with what lies beside it. What
+/// is left of such a thing lies within its radius r; and while its area is nearly the usual one, nearer than
+///
+/// ```text
+/// shift ≤ (A / A_left − 1) r
+/// ```
+fn is_no_cover(path: &[Option<[f64; 2]>], areas: &[Option<f64>], (travel_px, still_px): (f64, f64)) -> bool {
+    let Some(usual) = median(&mut areas.iter().flatten().copied().collect::<Vec<_>>()) else { return false };
+    let is_whole = |area: &Option<f64>| area.is_some_and(|a| (a / usual - 1.0).abs() < SAME_AREA);
+    let whole: Vec<Option<[f64; 2]>> = path.iter().zip(areas).map(|(p, a)| p.filter(|_| is_whole(a))).collect();
+    let radius_px = (usual / std::f64::consts::PI).sqrt();
+    let shift_px = SAME_AREA / (1.0 - SAME_AREA) * radius_px;
+    travel_px > radius_px || motion(&whole).0 > still_px.max(shift_px)
 }
 
 /// How much the distance of two candidates changes, as a share of how they move against each other; 1 where they
