@@ -225,8 +225,8 @@ fn corners(luma: &Luma<'_>) -> Vec<Patch> {
             let places = range(row, CELLS[1], luma.height)
                 .flat_map(|y| range(column, CELLS[0], luma.width).map(move |x| (x, y)));
             let clearest = places
-                .map(|(x, y)| (glance(luma, x, y), (x, y)))
-                .max_by(|a, b| a.0.total_cmp(&b.0).then_with(|| b.1.cmp(&a.1)));
+                .map(|(x, y)| (weaker_gradient(luma, x, y), (x, y)))
+                .max_by(|a, b| a.0.total_cmp(&b.0).then_with(|| [b.1.1, b.1.0].cmp(&[a.1.1, a.1.0])));
             let best = clearest.and_then(|(_, (x, y))| Patch::at(luma, x, y));
             patches.extend(best.filter(|p| p.strength > LEAST_GRADIENT));
         }
@@ -235,14 +235,14 @@ fn corners(luma: &Luma<'_>) -> Vec<Patch> {
     patches
 }
 
-/// About the mean square of the weaker gradient of the patch at (x, y), from every third pixel; 0 outside the picture.
-fn glance(luma: &Luma<'_>, x: i64, y: i64) -> f64 {
+/// Mean square of the weaker gradient of the patch at (x, y); 0 outside the picture.
+fn weaker_gradient(luma: &Luma<'_>, x: i64, y: i64) -> f64 {
     if !luma.holds(x, y) {
         return 0.0;
     }
     let [mut xx, mut xy, mut yy, mut count] = [0.0f32; 4];
-    for j in (y - HALF..=y + HALF).step_by(3) {
-        for i in (x - HALF..=x + HALF).step_by(3) {
+    for j in y - HALF..=y + HALF {
+        for i in x - HALF..=x + HALF {
             let gx = 0.5 * (luma.code(i + 1, j) - luma.code(i - 1, j));
             let gy = 0.5 * (luma.code(i, j + 1) - luma.code(i, j - 1));
             (xx, xy, yy, count) = (xx + gx * gx, xy + gx * gy, yy + gy * gy, count + 1.0);
