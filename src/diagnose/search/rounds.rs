@@ -97,7 +97,7 @@ impl Round {
         match self {
             Self::Singles => search.singles(false),
             Self::DearSingles => search.singles(true),
-            Self::FromTheLeader => search.from_the_leader(),
+            Self::FromTheLeader => search.begun_at_the_leader(),
             Self::Pairs => search.pairs(),
             Self::Stragglers => search.stragglers(),
             Self::AlongTheLeader => search.along_the_leader(),
@@ -133,7 +133,7 @@ impl<'a> Search<'a, '_> {
         self.effects.iter().filter(of_kind).map(beside).collect()
     }
 
-    fn from_the_leader(&self) -> Vec<Proposal<'_, 'a>> {
+    fn begun_at_the_leader(&self) -> Vec<Proposal<'_, 'a>> {
         let (settings, base) = (&self.context.settings.search, self.base());
         let Some(leader) = least(&self.fits).filter(|best| best.chi2 < settings.leader_leaves * base.chi2) else {
             return Vec::new();
