@@ -18,7 +18,7 @@ pub enum Taken {
 /// The base model's parameters and what is known of them.
 ///
 /// # Errors
-/// [`Error::Simulation`] for a specimen that cannot swing.
+/// [`crate::error::Error::Simulation`] for a specimen that cannot swing.
 pub fn base_of(
     experiment: &Experiment,
     marks: usize,
