@@ -313,7 +313,8 @@ fn camera(m: &Measurement, options: &Options) -> Vec<String> {
         ));
     } else if named > 0 && options.steadying != Steadying::Never {
         said.push(format!(
-            "none of the {named} reference marks has edges clear enough to be found again, so the camera's motion is left in; name a corner or a dot on what stands still"
+            "the {named} reference mark{} cannot be found again throughout the recording, so the camera's motion is left in; name a corner or a dot with clear edges on what stands still",
+            if named == 1 { "" } else { "s" }
         ));
     } else if camera.greatest_shift_px > 0.3 {
         said.push(format!(

@@ -8,8 +8,11 @@
 //! Δx = t_x − φ (y − y_c),   Δy = t_y + φ (x − x_c)
 //! ```
 
+mod smooth;
+
 use crate::statistics::median;
 use crate::video::Picture;
+use smooth::Smooth;
 
 /// Half the side of a patch.
 const HALF: i64 = crate::area::PATCH_HALF_PX as i64;
@@ -17,13 +20,17 @@ const HALF: i64 = crate::area::PATCH_HALF_PX as i64;
 const REACH_PX: i64 = 21;
 /// Columns and rows of cells, each with one patch.
 const CELLS: [usize; 2] = [8, 6];
-/// Mean square of the weaker gradient, codes², below which a patch is too plain to be found again.
-const LEAST_GRADIENT: f64 = 2.0;
+/// Mean square of the weaker gradient of the smoothed picture, codes²/px², below which a patch is too plain to be found
+/// again: with noise of one code in its 961 pixels, of which four share an error, the patch is found to 0.2 px
+/// (σ² / (n g²)), and six of them to 0.08 px. Noise alone has a fiftieth of it.
+const LEAST_GRADIENT: f64 = 0.1;
 /// Fewest patches of the background that must agree, and as a share of those that are found again.
 const FEWEST_AGREEING: usize = 6;
 const AGREEING_SHARE: f64 = 0.5;
 /// Share of the picture's width that they span, at least: what swings is a smaller thing.
 const LEAST_SPAN: f64 = 0.4;
+/// Share of a patch's own variance that its difference from the picture has at most, where it is found again.
+const MOST_DIFFERENCE: f64 = 0.5;
 /// First shifts within which two patches say the same, px.
 const SAME_PX: f64 = 3.5;
 /// Residual within which a patch agrees, px, at least.
@@ -74,6 +81,8 @@ struct Patch {
     inverse: [f64; 3],
     /// Mean square of the weaker gradient.
     strength: f64,
+    /// Σ of the squares of the values.
+    squares: f64,
 }
 
 /// What stands still.
@@ -93,8 +102,10 @@ impl Background {
         let patches = if points_px.is_empty() {
             corners(&luma)
         } else {
-            let named = points_px.iter().filter_map(|p| Patch::at(&luma, p[0].round() as i64, p[1].round() as i64));
-            named.filter(|p| p.strength > LEAST_GRADIENT).collect()
+            let smooth = Smooth::of(&luma);
+            let places = points_px.iter().map(|p| (p[0].round() as i64, p[1].round() as i64));
+            let clear = places.filter(|(x, y)| smooth.weaker_gradient(&luma, *x, *y) > LEAST_GRADIENT);
+            clear.filter_map(|(x, y)| Patch::at(&luma, x, y)).collect()
         };
         Self { patches, centre_px, named: !points_px.is_empty() }
     }
@@ -214,6 +225,7 @@ impl Background {
 
 /// The best patch of every cell, the clearest first.
 fn corners(luma: &Luma<'_>) -> Vec<Patch> {
+    let smooth = Smooth::of(luma);
     let mut patches = Vec::new();
     let margin = HALF + REACH_PX / 2;
     for row in 0..CELLS[1] {
@@ -225,30 +237,14 @@ fn corners(luma: &Luma<'_>) -> Vec<Patch> {
             let places = range(row, CELLS[1], luma.height)
                 .flat_map(|y| range(column, CELLS[0], luma.width).map(move |x| (x, y)));
             let clearest = places
-                .map(|(x, y)| (weaker_gradient(luma, x, y), (x, y)))
+                .map(|(x, y)| (smooth.weaker_gradient(luma, x, y), (x, y)))
                 .max_by(|a, b| a.0.total_cmp(&b.0).then_with(|| [b.1.1, b.1.0].cmp(&[a.1.1, a.1.0])));
-            let best = clearest.and_then(|(_, (x, y))| Patch::at(luma, x, y));
-            patches.extend(best.filter(|p| p.strength > LEAST_GRADIENT));
+            let clear = clearest.filter(|(gradient, _)| *gradient > LEAST_GRADIENT);
+            patches.extend(clear.and_then(|(_, (x, y))| Patch::at(luma, x, y)));
         }
     }
     patches.sort_by(|a, b| b.strength.total_cmp(&a.strength));
     patches
-}
-
-/// Mean square of the weaker gradient of the patch at (x, y); 0 outside the picture.
-fn weaker_gradient(luma: &Luma<'_>, x: i64, y: i64) -> f64 {
-    if !luma.holds(x, y) {
-        return 0.0;
-    }
-    let [mut xx, mut xy, mut yy, mut count] = [0.0f32; 4];
-    for j in y - HALF..=y + HALF {
-        for i in x - HALF..=x + HALF {
-            let gx = 0.5 * (luma.code(i + 1, j) - luma.code(i - 1, j));
-            let gy = 0.5 * (luma.code(i, j + 1) - luma.code(i, j - 1));
-            (xx, xy, yy, count) = (xx + gx * gx, xy + gx * gy, yy + gy * gy, count + 1.0);
-        }
-    }
-    f64::from((0.5 * (xx + yy) - (0.25 * (xx - yy).powi(2) + xy * xy).sqrt()) / count)
 }
 
 impl Patch {
@@ -282,6 +278,7 @@ impl Patch {
             y,
             inverse: [yy / determinant, -xy / determinant, xx / determinant],
             strength: weaker / values.len() as f64,
+            squares: values.iter().map(|v| f64::from(*v).powi(2)).sum(),
             values,
             gradients,
         })
@@ -323,11 +320,12 @@ impl Patch {
         for _ in 0..20 {
             luma.read(self.x as f64 + shift[0], self.y as f64 + shift[1], &mut values)?;
             let mean = values.iter().sum::<f32>() / values.len() as f32;
-            let mut push = [0.0f64; 2];
+            let (mut push, mut rest) = ([0.0f64; 2], 0.0);
             for ((value, own), gradient) in values.iter().zip(&self.values).zip(&self.gradients) {
                 let difference = f64::from(value - mean - own);
                 push[0] += f64::from(gradient[0]) * difference;
                 push[1] += f64::from(gradient[1]) * difference;
+                rest += difference * difference;
             }
             let [xx, xy, yy] = self.inverse;
             let step = [xx * push[0] + xy * push[1], xy * push[0] + yy * push[1]];
@@ -336,7 +334,7 @@ impl Patch {
                 return None;
             }
             if step[0].hypot(step[1]) < 3e-3 {
-                return Some(shift);
+                return (rest < MOST_DIFFERENCE * self.squares).then_some(shift);
             }
         }
         None

@@ -373,6 +373,32 @@ fn a_law_that_is_not_in_the_table_is_unknown_and_found_at_its_place() {
 }
 
 #[test]
+fn a_stiffening_hinge_is_learnt_as_a_formula_that_the_file_takes_back() {
+    let folder = Folder::new();
+    let base = &ONE_LINK.replace("[0.6]", "[0.7]");
+    let hidden = "[[model.law]]\nname = \"stiffening\"\nplace = \"hinge\"\n\
+                  torque_n_m = \"-a * angle ^ 3\"\n\
+                  parameters.a = { start = 0.2, min = 0.0, unit = \"N m/rad3\" }\n";
+    let angles = folder.simulated(base, hidden, &["--duration", "40", "--noise-rad", "5e-4"]);
+    let report = folder.diagnosis(&angles, base, &[]);
+    let verdict = &report["verdict"];
+    assert_eq!(verdict["status"], "unknown", "{verdict:#}");
+    let law = &verdict["law"];
+    let first = &law["terms"][0];
+    assert_eq!((&law["place"], &first["shape"]), (&"hinge".into(), &"cube".into()), "{law:#}");
+    let close = |value: &Value, truth: f64| (value.as_f64().unwrap() / truth - 1.0).abs() < 0.05;
+    assert!(close(&first["parameters"]["a"]["value"], 0.2), "{law:#}");
+    let left = |key: &str| report["heldout"][key][0].as_f64().unwrap();
+    assert!(left("augmented_rmse_rad") < 1.15 * 5e-4, "{:#}", report["heldout"]);
+    assert!(left("named_rmse_rad") > 1.5 * left("augmented_rmse_rad"), "{:#}", report["heldout"]);
+    let config = folder.write("with.toml", &format!("{base}\n{}", law["toml"].as_str().unwrap()));
+    let json = folder.path("fit.json");
+    freeswing("fit").arg(&angles).arg("--config").arg(config).arg("--json").arg(&json).assert().success();
+    let fit: Value = serde_json::from_str(&fs::read_to_string(json).unwrap()).unwrap();
+    assert!(close(&fit["parameters"]["learnt 1.a"]["value"], 0.2), "{fit:#}");
+}
+
+#[test]
 fn one_thread_and_two_write_the_same_bytes() {
     let folder = Folder::new();
     let angles = folder.swing(ONE_LINK, "air_quadratic = 4e-3\n");

@@ -492,7 +492,6 @@ fn wrong_places() {
 }
 
 #[test]
-#[ignore = "in a picture of 320×240 a shake of 4 px is neither taken out nor said"]
 fn a_camera_that_shakes() {
     hold(&["track"], "angles.csv", shaking());
 }
@@ -508,7 +507,6 @@ fn wrong_first_looks() {
 }
 
 #[test]
-#[ignore = "init takes a still thing that the strip covers in part for a mark"]
 fn a_thing_that_is_covered_from_time_to_time() {
     hold(&["freeswing", "init"], "experiment.toml", covered());
 }

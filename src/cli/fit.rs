@@ -94,15 +94,17 @@ impl FitArgs {
 
 /// The parameters a fit leaves free: those of the base model, with the user's changes.
 fn free_parameters(experiment: &Experiment, marks: usize, more: &[String], fix: &[String]) -> Result<Vec<Parameter>> {
+    let stated = experiment.model.law.iter().flat_map(|law| law.coefficients().map(|(own, _)| Parameter::Law(own)));
+    let known: Vec<Parameter> = Parameter::ALL.into_iter().chain(stated).collect();
     let parse = |id: &String| {
         let nearest = || {
-            Parameter::ALL
-                .into_iter()
+            known
+                .iter()
                 .map(|p| (strsim::jaro_winkler(id, p.id()), p.id()))
                 .max_by(|a, b| a.0.total_cmp(&b.0))
                 .map_or("", |n| n.1)
         };
-        Parameter::from_id(id).ok_or_else(|| Error::Option {
+        known.iter().copied().find(|p| p.id() == id).ok_or_else(|| Error::Option {
             option: id.clone(),
             message: format!("no such parameter; the nearest known one is `{}`", nearest()),
         })

@@ -96,7 +96,11 @@ impl InitArgs {
             Some(picture) => eprintln!("look at {} to see whether these are the marks", picture.display()),
             None => eprintln!("to see whether these are the marks, run it again with --force --preview seen.png"),
         }
-        eprintln!("written to {out}; next: track {video} --config {out} --out angles.csv");
+        if self.out.as_os_str() == "-" {
+            eprintln!("keep what was written in a file; next: track {video} --config THE_FILE --out angles.csv");
+        } else {
+            eprintln!("written to {out}; next: track {video} --config {out} --out angles.csv");
+        }
     }
 }
 

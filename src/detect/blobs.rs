@@ -1,11 +1,13 @@
 //! Frame → blobs: the scan for the hue, the binary mask, its connected regions.
 
+use std::rc::Rc;
+
 use super::centroid::{self, Centroid, Channels};
 use super::component::{BLOCK, HueAxis};
 use super::mask::{Mask, Part};
 use super::plane::Plane;
 use crate::error::Result;
-use crate::video::Picture;
+use crate::video::{Layout, Picture};
 
 /// A region of a mark's colour, measured.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -68,25 +70,16 @@ const MOST_BLOBS: usize = 40;
 const MARGIN: usize = 6;
 
 /// Finds and measures the blobs of one hue.
-pub(super) fn find(picture: &Picture<'_>, target: &Target, channels: Channels, blobs: &mut Vec<Blob>) -> Result<()> {
-    let mut parts: Vec<(Part, Option<&Plane>)> = Vec::new();
-    let plane;
-    if target.is_sought_everywhere() {
-        plane = Plane::of(picture, target.axis, target.level)?;
-        let mask = Mask::of_plane(&plane, target.threshold, target.thin);
-        parts.extend(mask.parts()?.into_iter().filter(|p| target.accepts(p)).map(|p| (p, Some(&plane))));
-    } else {
-        for region in regions(picture, target.axis, target.threshold) {
-            let mask = Mask::of(picture, target.axis, target.threshold, target.thin, region);
-            parts.extend(mask.parts()?.into_iter().filter(|p| target.accepts(p)).map(|p| (p, None)));
-        }
-    }
-    if parts.len() > MOST_BLOBS {
-        parts.sort_by_key(|(part, _)| std::cmp::Reverse(part.points.len()));
-        parts.truncate(MOST_BLOBS);
-    }
-    for (part, plane) in &parts {
-        let silhouette = match plane {
+pub(super) fn find(
+    picture: &Picture<'_>,
+    target: &Target,
+    channels: Channels,
+    planes: &mut Planes,
+    blobs: &mut Vec<Blob>,
+) -> Result<()> {
+    let (parts, plane) = parts(picture, target, planes)?;
+    for part in &parts {
+        let silhouette = match &plane {
             Some(plane) => part.finer_silhouette(picture, plane, target.threshold),
             None => part.silhouette(picture),
         };
@@ -97,6 +90,89 @@ pub(super) fn find(picture: &Picture<'_>, target: &Target, channels: Channels, b
         }
     }
     Ok(())
+}
+
+/// Finds the spots of one hue; their places come from the mask's samples alone.
+pub(super) fn glance(picture: &Picture<'_>, target: &Target, planes: &mut Planes, blobs: &mut Vec<Blob>) -> Result<()> {
+    let (parts, plane) = parts(picture, target, planes)?;
+    let layout = &picture.layout;
+    let sides_px = [layout.chroma_shift_x, layout.chroma_shift_y].map(|shift| f64::from(1u32 << shift));
+    for part in &parts {
+        let silhouette = match &plane {
+            Some(plane) => part.finer_silhouette(picture, plane, target.threshold),
+            None => part.silhouette(picture),
+        };
+        let samples = silhouette.points_px.len() as f64;
+        let binary_px = silhouette.centre_px;
+        // a coarse plane has been interpolated; samples at full resolution count by what they have above the threshold
+        let [x_px, y_px] = match &plane {
+            Some(plane) if plane.level > 0 => binary_px,
+            Some(plane) => weighted(part, layout, &|[x, y]| plane.values[y * plane.width + x] - target.threshold),
+            None => weighted(part, layout, &|[x, y]| target.axis.at(picture, x, y) - target.threshold),
+        };
+        // the rim's samples are known to a sample's width, each by itself
+        let variance = |side_px: f64| side_px.powi(2) / 12.0 / samples.max(1.0).sqrt();
+        let centroid = Centroid {
+            x_px,
+            y_px,
+            variance_px2: [variance(sides_px[0]), variance(sides_px[1]), 0.0],
+            area_px2: samples * sides_px[0] * sides_px[1],
+            chroma_share: 0.0,
+            cut: false,
+        };
+        if samples > 0.0 {
+            blobs.push(Blob { hue: target.hue, centroid, binary_px, samples: part.points.len() as u32 });
+        }
+    }
+    Ok(())
+}
+
+/// Mean of a region's samples in luma pixels, each with a weight of at least 1.
+fn weighted(part: &Part, layout: &Layout, weight: &dyn Fn([usize; 2]) -> i16) -> [f64; 2] {
+    let [mut sum, mut sum_x, mut sum_y] = [0.0; 3];
+    for p in &part.points {
+        let weight = f64::from(weight(*p).max(1));
+        (sum, sum_x, sum_y) = (sum + weight, sum_x + weight * p[0] as f64, sum_y + weight * p[1] as f64);
+    }
+    layout.chroma_to_luma(sum_x / sum, sum_y / sum).into()
+}
+
+/// The regions of a target's colour, and the plane they were found in where the whole picture was searched.
+fn parts(picture: &Picture<'_>, target: &Target, planes: &mut Planes) -> Result<(Vec<Part>, Option<Rc<Plane>>)> {
+    let mut parts: Vec<Part> = Vec::new();
+    let mut plane = None;
+    let accepted = |mask: Mask| -> Result<_> { Ok(mask.parts()?.into_iter().filter(|p| target.accepts(p))) };
+    if target.is_sought_everywhere() {
+        let whole = planes.of(picture, target)?;
+        let mask = Mask::of_plane(&whole, target.threshold, target.thin).bridged(target.axis.is_luma());
+        parts.extend(accepted(mask)?);
+        plane = Some(whole);
+    } else {
+        for region in regions(picture, target.axis, target.threshold) {
+            parts.extend(accepted(Mask::of(picture, target.axis, target.threshold, target.thin, region))?);
+        }
+    }
+    if parts.len() > MOST_BLOBS {
+        parts.sort_by_key(|part| std::cmp::Reverse(part.points.len()));
+        parts.truncate(MOST_BLOBS);
+    }
+    Ok((parts, plane))
+}
+
+/// Planes of one picture: hues that differ in their threshold alone share one.
+#[derive(Default)]
+pub(super) struct Planes(Vec<(HueAxis, Rc<Plane>)>);
+
+impl Planes {
+    fn of(&mut self, picture: &Picture<'_>, target: &Target) -> Result<Rc<Plane>> {
+        let known = self.0.iter().find(|(axis, plane)| *axis == target.axis && plane.level == target.level);
+        if let Some((_, plane)) = known {
+            return Ok(Rc::clone(plane));
+        }
+        let plane = Rc::new(Plane::of(picture, target.axis, target.level)?);
+        self.0.push((target.axis, Rc::clone(&plane)));
+        Ok(plane)
+    }
 }
 
 /// A rectangle of chroma samples: left, top, right, bottom (exclusive).

@@ -267,7 +267,8 @@ impl Scale {
         });
         let Some((threshold, thin)) = chosen else { return Ok(None) };
         let of_picture = |(n, plane): (usize, &Plane)| {
-            spots_of(plane, threshold, thin, self.least, self.moved.get(n).map(Vec::as_slice))
+            let mask = Mask::of_plane(plane, from_255(threshold), thin).bridged(self.luma);
+            spots_of(plane, &mask, self.least, self.moved.get(n).map(Vec::as_slice))
         };
         let spots = self.planes.par_iter().enumerate().map(of_picture).collect::<Result<Vec<_>>>()?;
         let quality = quality(&spots, marks, self.moves, self.luma);
@@ -285,8 +286,7 @@ fn keep_better(best: &mut Option<Trial>, trial: Trial) {
     }
 }
 
-fn spots_of(plane: &Plane, threshold: f64, thin: bool, least: usize, moved: Option<&[bool]>) -> Result<Vec<Spot>> {
-    let mask = Mask::of_plane(plane, from_255(threshold), thin);
+fn spots_of(plane: &Plane, mask: &Mask, least: usize, moved: Option<&[bool]>) -> Result<Vec<Spot>> {
     let spots = mask.parts()?.into_iter().filter(|part| part.points.len() >= least).map(|part| {
         let at = |p: &[usize; 2]| p[1] * plane.width + p[0];
         let moving = moved.map_or(0, |m| part.points.iter().filter(|p| m[at(p)]).count());

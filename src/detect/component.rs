@@ -88,7 +88,11 @@ impl HueAxis {
 
     /// The components of chroma row `y` in `columns`, added to `row`.
     pub(super) fn row(self, picture: &Picture<'_>, y: usize, columns: std::ops::Range<usize>, row: &mut Vec<i16>) {
-        if self.is_luma() || picture.wide() || picture.cb.step != 1 {
+        if self.is_luma() {
+            luma_row(picture, y, columns, |code| row.push(self.of_luma(code)));
+            return;
+        }
+        if picture.wide() || picture.cb.step != 1 {
             row.extend(columns.map(|x| self.at(picture, x, y)));
             return;
         }
@@ -113,6 +117,25 @@ impl HueAxis {
             // a plain fold over bytes, which the compiler turns into vector instructions
             *max = cb.iter().zip(cr).fold(i16::MIN, |m, (b, r)| m.max(self.of(*b, *r)));
         }
+    }
+}
+
+/// Mean luma of the pixels at every chroma sample of a row, 8-bit codes.
+pub(super) fn luma_row(picture: &Picture<'_>, y: usize, columns: std::ops::Range<usize>, mut take: impl FnMut(u8)) {
+    let layout = &picture.layout;
+    let plain = !picture.wide() && picture.luma.step == 1 && layout.low_bits == 0 && layout.bits == 8;
+    let halved = (layout.chroma_shift_x, layout.chroma_shift_y) == (1, 1);
+    let whole = 2 * y + 1 < layout.height_px && 2 * columns.end <= layout.width_px;
+    if !(plain && halved && whole) {
+        columns.for_each(|x| take(luma_at(picture, x, y)));
+        return;
+    }
+    // the usual layout, pair by pair: this runs over whole pictures
+    let pairs =
+        |y: usize| picture.luma.bytes[y * picture.luma.stride..][2 * columns.start..2 * columns.end].chunks_exact(2);
+    for (upper, lower) in pairs(2 * y).zip(pairs(2 * y + 1)) {
+        let sum = [upper[0], upper[1], lower[0], lower[1]].into_iter().map(u16::from).sum::<u16>();
+        take((sum / 4) as u8);
     }
 }
 

@@ -17,6 +17,8 @@ use crate::video::Picture;
 pub struct Mask {
     region: Region,
     bytes: Vec<u8>,
+    /// Parts that almost touch are one.
+    bridged: bool,
 }
 
 impl Mask {
@@ -33,6 +35,11 @@ impl Mask {
     pub fn of_plane(plane: &Plane, threshold: i16, thin: bool) -> Self {
         let region = Region { left: 0, top: 0, right: plane.width, bottom: plane.height };
         Self::of_component(&plane.values, threshold, thin, region)
+    }
+
+    /// Takes parts up to two samples apart for one: the quadrants of a target touch at a point, in which neither is dark.
+    pub fn bridged(self, bridged: bool) -> Self {
+        Self { bridged, ..self }
     }
 
     /// Smooths the component over a plus of five samples against camera noise, compares, and mends the outline:
@@ -55,7 +62,7 @@ impl Mask {
             dilate(&mut bytes, width, 3);
             erode(&mut bytes, width, 2);
         }
-        Self { region, bytes }
+        Self { region, bytes, bridged: false }
     }
 
     /// The mask, row by row, 255 inside.
@@ -80,7 +87,8 @@ impl Mask {
             let mut points = Vec::with_capacity(bounds.samples);
             for y in bounds.rows.clone() {
                 let row = &labels[y * width..][..width];
-                let inside = bounds.columns.clone().filter(|x| row[*x] == bounds.label);
+                let mask = &self.bytes[y * width..][..width];
+                let inside = bounds.columns.clone().filter(|x| row[*x] == bounds.label && mask[*x] > 0);
                 points.extend(inside.map(|x| [x + self.region.left, y + self.region.top]));
             }
             parts.push(Part { points });
@@ -91,7 +99,14 @@ impl Mask {
     /// Labels the connected regions of the mask.
     fn labelled(&self) -> opencv::Result<(Mat, Vec<Bounds>)> {
         let (rows, columns) = (self.region.bottom - self.region.top, self.region.right - self.region.left);
-        let mask = Mat::new_rows_cols_with_data(rows as i32, columns as i32, &self.bytes)?;
+        let mut grown;
+        let mut bytes = &self.bytes;
+        if self.bridged {
+            grown = self.bytes.clone();
+            dilate(&mut grown, columns, 1);
+            bytes = &grown;
+        }
+        let mask = Mat::new_rows_cols_with_data(rows as i32, columns as i32, bytes)?;
         let (mut labels, mut stats, mut centroids) = (Mat::default(), Mat::default(), Mat::default());
         imgproc::connected_components_with_stats(&mask, &mut labels, &mut stats, &mut centroids, 8, CV_32S)?;
         let of_label = |(label, stats): (usize, &[i32])| {

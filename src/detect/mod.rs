@@ -21,7 +21,7 @@ pub use samples::{Album, HuePeak};
 pub use siting::{Siting, SitingSurvey};
 pub use threshold::LEAST_COMPONENT;
 
-use blobs::Target;
+use blobs::{Planes, Target};
 use component::{HueAxis, from_255};
 
 use crate::error::Result;
@@ -125,9 +125,21 @@ impl Detector {
     /// # Errors
     /// As [`Detector::detect`].
     pub fn detect_by(&self, picture: &Picture<'_>, channels: Channels) -> Result<Vec<Blob>> {
-        let mut blobs = Vec::new();
+        let (mut blobs, mut planes) = (Vec::new(), Planes::default());
         for (index, hue) in self.hues.iter().enumerate() {
-            blobs::find(picture, &self.target(index, hue, picture), channels, &mut blobs)?;
+            blobs::find(picture, &self.target(index, hue, picture), channels, &mut planes, &mut blobs)?;
+        }
+        Ok(blobs)
+    }
+
+    /// All blobs, to some tenths of a chroma sample and many times as fast: enough to see what moves and how.
+    ///
+    /// # Errors
+    /// As [`Detector::detect`].
+    pub fn glance(&self, picture: &Picture<'_>) -> Result<Vec<Blob>> {
+        let (mut blobs, mut planes) = (Vec::new(), Planes::default());
+        for (index, hue) in self.hues.iter().enumerate() {
+            blobs::glance(picture, &self.target(index, hue, picture), &mut planes, &mut blobs)?;
         }
         Ok(blobs)
     }

@@ -1,6 +1,6 @@
 //! Pictures of a recording, kept at chroma resolution, and what moves between them.
 
-use super::component::{HueAxis, luma_at};
+use super::component::{HueAxis, luma_row};
 use crate::statistics::median;
 use crate::video::{Matrix, Picture};
 
@@ -21,7 +21,7 @@ impl Samples {
         let down = picture.layout.low_bits + picture.layout.bits - 8;
         let mut samples = Self { width, height, luma: Vec::new(), cb: Vec::new(), cr: Vec::new() };
         for y in 0..height {
-            samples.luma.extend((0..width).map(|x| luma_at(picture, x, y)));
+            luma_row(picture, y, 0..width, |code| samples.luma.push(code));
             samples.cb.extend((0..width).map(|x| (picture.cb.code(picture.wide(), x, y) >> down) as u8));
             samples.cr.extend((0..width).map(|x| (picture.cr.code(picture.wide(), x, y) >> down) as u8));
         }

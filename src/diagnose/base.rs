@@ -39,7 +39,19 @@ pub fn context<'a>(
     let (base, beliefs) = base_of(experiment, marks, taken, &settings.search)?;
     let begun = beginning(prepared, &prepared.begun, experiment, &base)?;
     let step_error_rad = prepared.step_error_rad;
-    Ok(FitContext { records, experiment, settings, base, beliefs, step_error_rad, begun, fine_strip: None })
+    let work = prepared.work.clone();
+    Ok(FitContext {
+        records,
+        experiment,
+        settings,
+        base,
+        beliefs,
+        step_error_rad,
+        begun,
+        fine_strip: None,
+        laws: Vec::new(),
+        work,
+    })
 }
 
 /// Where a base model's descent begins: what was not free when the start was sought, where the file has it.

@@ -56,15 +56,17 @@ struct Instant {
 }
 
 /// A recording's motion, ready for any torque.
-struct Swing<'s> {
-    around: &'s Linearisation,
+pub struct Swing<'s> {
+    /// Its linearisation.
+    pub around: &'s Linearisation,
     instants: Vec<Instant>,
     /// From row to row, with a torque on each link.
     transitions: Vec<DMatrix<f64>>,
 }
 
 impl<'s> Swing<'s> {
-    fn of(around: &'s Linearisation, model: &ForwardModel) -> Self {
+    /// Along a linearised motion of a model.
+    pub fn of(around: &'s Linearisation, model: &ForwardModel) -> Self {
         let middle = |a: &[f64], b: &[f64]| -> Vec<f64> { a.iter().zip(b).map(|(a, b)| 0.5 * (a + b)).collect() };
         let last = around.rows.len().max(2) - 1;
         let instant = |(k, pair): (usize, &[Row])| {
@@ -79,6 +81,21 @@ impl<'s> Swing<'s> {
             instants: around.rows.windows(2).enumerate().map(instant).collect(),
             transitions: around.transitions_of_inputs(|_| each_link.clone()),
         }
+    }
+
+    /// The motion at the middles between two rows.
+    pub fn motions(&self) -> impl Iterator<Item = &Motion> {
+        self.instants.iter().map(|at| &at.motion)
+    }
+
+    /// What a torque adds to the values seen, whitened: `torque` adds it to the links'.
+    pub fn response(&self, torque: impl Fn(&Motion, &mut [f64])) -> DMatrix<f64> {
+        let held = self.instants.iter().map(|at| {
+            let mut q = vec![0.0; self.around.rates];
+            torque(&at.motion, &mut q);
+            q[..self.around.links].iter().map(|q| [*q]).collect::<Vec<_>>()
+        });
+        self.around.seen(&self.around.responses(&self.transitions, &held.collect::<Vec<_>>()))
     }
 
     /// The torques on the links of each function of the angle and the rate on which an input works.
@@ -119,9 +136,9 @@ impl<'s> Swing<'s> {
     }
 
     /// The largest speed across the strip at an instant.
-    fn fastest_m_s(&self, at: &Instant) -> f64 {
+    pub fn fastest_m_s(&self, motion: &Motion) -> f64 {
         let mut fastest_m_s = 0.0f64;
-        stations(&self.around.chain, &at.motion, |station| fastest_m_s = fastest_m_s.max(station.speed_m_s.abs()));
+        stations(&self.around.chain, motion, |station| fastest_m_s = fastest_m_s.max(station.speed_m_s.abs()));
         fastest_m_s
     }
 }
@@ -184,7 +201,7 @@ pub fn basis_laws(
         columns(&swings, rows, |swing| torques(swing, |at| swing.of_input(input, at, largest)))
     };
     let of_air = || {
-        let largest_m_s = largest(&|swing, at| swing.fastest_m_s(at));
+        let largest_m_s = largest(&|swing, at| swing.fastest_m_s(&at.motion));
         columns(&swings, rows, |swing| torques(swing, |at| swing.of_air(at, largest_m_s)))
     };
     let of_camera = || {

@@ -6,10 +6,10 @@ use super::effect::SetUp;
 use super::hypothesis::Hypothesis;
 use super::settings::Settings;
 use crate::error::Result;
-use crate::experiment::Experiment;
+use crate::experiment::{Experiment, Law};
 use crate::fit::whitening::RecordNoise;
 use crate::fit::{Belief, Problem, Record};
-use crate::model::Parameter;
+use crate::model::{Parameter, Work};
 
 /// A yield angle of the joint's hysteresis to expect, as a part of the largest bend, and how far from it that may be, as a part of itself.
 const YIELD: (f64, f64) = (0.2, 2.5);
@@ -38,6 +38,10 @@ pub struct FitContext<'a> {
     /// Rods between two marks of a strip that bends everywhere, which may then start in as many shapes as one that is the base model: it is dear, and worth it
     /// where such a strip is the answer. Few, and no further shapes, where it is only a candidate.
     pub fine_strip: Option<usize>,
+    /// Laws learnt from the recordings, beside those of the file; their coefficients stand among the base model's.
+    pub laws: Vec<Law>,
+    /// What the fits have cost.
+    pub work: Work,
 }
 
 impl<'a> FitContext<'a> {
@@ -49,6 +53,7 @@ impl<'a> FitContext<'a> {
         let mut free = self.base.clone();
         let mut beliefs = self.beliefs.clone();
         let mut experiment = self.experiment.clone();
+        experiment.model.law.extend(self.laws.iter().cloned());
         let mut set_up = SetUp {
             free: &mut free,
             beliefs: &mut beliefs,
@@ -58,6 +63,7 @@ impl<'a> FitContext<'a> {
         };
         hypothesis.effects.iter().for_each(|effect| effect.set_up(&mut set_up));
         let mut problem = Problem::new(self.records, &experiment, &free)?;
+        problem.work = self.work.clone();
         problem.noise = noise.to_vec();
         problem.beliefs = beliefs;
         if free.contains(&Parameter::BendingStiffness) && !self.is_strip() && self.fine_strip.is_none() {

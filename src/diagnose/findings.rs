@@ -4,6 +4,7 @@ use super::adequacy::Adequacy;
 use super::context::FitContext;
 use super::effect::{Effect, Phase, Place};
 use super::heldout::HeldOut;
+use super::learnt::Learnt;
 use super::locate::Departure;
 use super::posterior::{Posterior, left_of_excess};
 use super::refit::Refit;
@@ -29,6 +30,8 @@ pub struct Findings<'a> {
     pub missing_torque: Option<MissingTorque>,
     /// The prediction of what was not fitted.
     pub held_out: Option<HeldOut>,
+    /// The law that was learnt of what the names leave.
+    pub learnt: Option<Learnt<'a>>,
     /// Whether the base model is enough, and what could have been seen.
     pub adequacy: Adequacy,
     /// What each round of the search came to.

@@ -69,18 +69,55 @@ pub fn borne_out<'a>(
     }
 }
 
-/// Predicts, by the base model and by each of some fits, the last third of a single recording from the first two; of several, the last recording from the others,
-/// of which only the start is then fitted. `from_s` moves the border of a single one.
+/// What one fit predicts of what is not fitted: the last third of a single recording from the first two; of several, the last recording from the others, of
+/// which only the start is then fitted. `from_s` moves the border of a single one.
+pub fn predicted(context: &FitContext<'_>, fit: &Refit<'_>, from_s: Option<f64>) -> Option<Prediction> {
+    // a prediction is held against what was seen, whoever erred
+    let fit = plain(fit);
+    match border(context, from_s)? {
+        Border::Row(rows, _) => along(context, &fit, rows),
+        Border::Record(last) => across(context, &fit, last),
+    }
+}
+
+/// Predicts by the base model and by each of some fits.
 fn held_out(
     context: &FitContext<'_>,
     null: &Refit<'_>,
     fits: &[&Refit<'_>],
     from_s: Option<f64>,
 ) -> Vec<Option<HeldOut>> {
-    // a prediction is held against what was seen, whoever erred
-    let null = &plain(null);
-    let fits: Vec<Refit<'_>> = fits.iter().map(|fit| plain(fit)).collect();
-    if context.records.len() > 1 { across(context, null, &fits) } else { along(context, null, &fits, from_s) }
+    let of_fits = || fits.par_iter().with_max_len(1).map(|fit| predicted(context, fit, from_s)).collect::<Vec<_>>();
+    let (baseline, augmented) = rayon::join(|| predicted(context, null, from_s), of_fits);
+    let (record, from_s) = match border(context, from_s) {
+        Some(Border::Row(_, border_s)) => (0, border_s),
+        Some(Border::Record(last)) => (last, context.records[last].t_s[0]),
+        None => return vec![None; fits.len()],
+    };
+    let proof = |augmented: Option<Prediction>| {
+        Some(HeldOut { record, from_s, baseline: baseline.clone()?, augmented: augmented? })
+    };
+    augmented.into_iter().map(proof).collect()
+}
+
+/// What is not fitted.
+enum Border {
+    /// A single recording from this row, and this stamp, on.
+    Row(usize, f64),
+    /// This one of several recordings.
+    Record(usize),
+}
+
+fn border(context: &FitContext<'_>, from_s: Option<f64>) -> Option<Border> {
+    if context.records.len() > 1 {
+        return Some(Border::Record(context.records.len() - 1));
+    }
+    let record = context.records.first()?;
+    let (first_s, last_s) = (record.t_s[0], record.t_s[record.len() - 1]);
+    let border_s = from_s.unwrap_or(first_s + context.settings.verdict.fitted * (last_s - first_s));
+    let rows = record.t_s.partition_point(|t| *t < border_s);
+    let is_long = |rows: usize| rows >= crate::series::FEWEST_ROWS;
+    (is_long(rows) && is_long(record.len() - rows)).then_some(Border::Row(rows, border_s))
 }
 
 /// The same judged without errors in step with the swing; what it left is no more known.
@@ -90,71 +127,42 @@ fn plain<'a>(fit: &Refit<'a>) -> Refit<'a> {
     fit
 }
 
-fn along(context: &FitContext<'_>, null: &Refit<'_>, fits: &[Refit<'_>], from_s: Option<f64>) -> Vec<Option<HeldOut>> {
+fn along(context: &FitContext<'_>, fit: &Refit<'_>, rows: usize) -> Option<Prediction> {
     let record = &context.records[0];
-    let (first_s, last_s) = (record.t_s[0], record.t_s[record.len() - 1]);
-    let border_s = from_s.unwrap_or(first_s + context.settings.verdict.fitted * (last_s - first_s));
-    let rows = record.t_s.partition_point(|t| *t < border_s);
-    if rows < crate::series::FEWEST_ROWS || rows + crate::series::FEWEST_ROWS > record.len() {
-        return vec![None; fits.len()];
-    }
     let early = [record.until(rows)];
     let part = context.on(&early);
-    let predicted = |fit: &Refit<'_>| {
-        let refitted = part.refit(&fit.hypothesis, fit, &[])?;
-        // what leaves far more than noise may have lost step between here and there
-        let grown = leaves_more_than_noise(&refitted, &context.settings.noise);
-        let grown = grown.then(|| continued_alone(&part, &refitted)).flatten();
-        let refitted = grown.into_iter().chain([refitted]).min_by(|a, b| a.chi2.total_cmp(&b.chi2))?;
-        let whole = context.problem(&fit.hypothesis, &fit.problem.noise).ok()?;
-        let rmse_rad = errors(&whole.predict(0, &refitted.x, false).ok()?.values, record, rows)?;
-        Some(Prediction { rmse_rad, left: residuals_of(&whole, &refitted.x, 0).ok() })
-    };
-    beside_the_base(null, fits, predicted, (0, border_s))
+    let refitted = part.refit(&fit.hypothesis, fit, &[])?;
+    // what leaves far more than noise may have lost step between here and there
+    let grown = leaves_more_than_noise(&refitted, &context.settings.noise);
+    let grown = grown.then(|| continued_alone(&part, &refitted)).flatten();
+    let refitted = grown.into_iter().chain([refitted]).min_by(|a, b| a.chi2.total_cmp(&b.chi2))?;
+    let whole = context.problem(&fit.hypothesis, &fit.problem.noise).ok()?;
+    let rmse_rad = errors(&whole.predict(0, &refitted.x, false).ok()?.values, record, rows)?;
+    Some(Prediction { rmse_rad, left: residuals_of(&whole, &refitted.x, 0).ok() })
 }
 
-fn across(context: &FitContext<'_>, null: &Refit<'_>, fits: &[Refit<'_>]) -> Vec<Option<HeldOut>> {
-    let last = context.records.len() - 1;
+fn across(context: &FitContext<'_>, fit: &Refit<'_>, last: usize) -> Option<Prediction> {
     let others = context.on(&context.records[..last]);
     let alone = context.on(&context.records[last..]);
-    let predicted = |fit: &Refit<'_>| {
-        let starts = 2 * fit.problem.shapes();
-        let hypothesis =
-            Hypothesis { dropped: fit.hypothesis.dropped.filter(|d| d.0 < last), ..fit.hypothesis.clone() };
-        let mut near = fit.clone();
-        near.x.truncate(fit.x.len() - starts);
-        let fitted = others.refit(&hypothesis, &near, &[])?;
-        // on the last one only the start is free
-        let frozen: Vec<Belief> = (fitted.problem.free.iter().zip(&fitted.x))
-            .map(|(p, value)| Belief { parameter: *p, value: *value, sd: FROZEN * value.abs().max(1e-12) })
-            .collect();
-        let alone = FitContext { beliefs: frozen, ..alone.clone() };
-        let noise = vec![fit.problem.noise[last].clone()];
-        let problem = Problem { records: alone.records, noise, ..fitted.problem.clone() };
-        let mut start = Refit { problem, ..fitted.clone() };
-        start.x.truncate(fitted.problem.free.len());
-        start.x.extend_from_slice(&fit.x[fit.x.len() - starts..]);
-        let hypothesis = Hypothesis { dropped: None, ..hypothesis };
-        let seen = alone.refit(&hypothesis, &start, &[])?;
-        let rmse_rad = errors(&seen.problem.predict(0, &seen.x, false).ok()?.values, &context.records[last], 0)?;
-        Some(Prediction { rmse_rad, left: None })
-    };
-    beside_the_base(null, fits, predicted, (last, context.records[last].t_s[0]))
-}
-
-/// What each fit leaves of a recording from a stamp on, beside what the base model does.
-fn beside_the_base(
-    null: &Refit<'_>,
-    fits: &[Refit<'_>],
-    predicted: impl Fn(&Refit<'_>) -> Option<Prediction> + Sync,
-    (record, from_s): (usize, f64),
-) -> Vec<Option<HeldOut>> {
-    let of_fits = || fits.par_iter().with_max_len(1).map(&predicted).collect::<Vec<_>>();
-    let (baseline, augmented) = rayon::join(|| predicted(null), of_fits);
-    let proof = |augmented: Option<Prediction>| {
-        Some(HeldOut { record, from_s, baseline: baseline.clone()?, augmented: augmented? })
-    };
-    augmented.into_iter().map(proof).collect()
+    let starts = 2 * fit.problem.shapes();
+    let hypothesis = Hypothesis { dropped: fit.hypothesis.dropped.filter(|d| d.0 < last), ..fit.hypothesis.clone() };
+    let mut near = fit.clone();
+    near.x.truncate(fit.x.len() - starts);
+    let fitted = others.refit(&hypothesis, &near, &[])?;
+    // on the last one only the start is free
+    let frozen: Vec<Belief> = (fitted.problem.free.iter().zip(&fitted.x))
+        .map(|(p, value)| Belief { parameter: *p, value: *value, sd: FROZEN * value.abs().max(1e-12) })
+        .collect();
+    let alone = FitContext { beliefs: frozen, ..alone };
+    let noise = vec![fit.problem.noise[last].clone()];
+    let problem = Problem { records: alone.records, noise, ..fitted.problem.clone() };
+    let mut start = Refit { problem, ..fitted.clone() };
+    start.x.truncate(fitted.problem.free.len());
+    start.x.extend_from_slice(&fit.x[fit.x.len() - starts..]);
+    let hypothesis = Hypothesis { dropped: None, ..hypothesis };
+    let seen = alone.refit(&hypothesis, &start, &[])?;
+    let rmse_rad = errors(&seen.problem.predict(0, &seen.x, false).ok()?.values, &context.records[last], 0)?;
+    Some(Prediction { rmse_rad, left: None })
 }
 
 /// Root mean square error of each angle from a row on.

@@ -29,7 +29,7 @@ impl Misfit {
     pub fn of(context: &FitContext<'_>, fit: &Refit<'_>, scores: &[Score]) -> Self {
         let settings = &context.settings.misfit;
         let values = context.values() as f64;
-        let too_much = values + settings.deviations * (2.0 * values).sqrt();
+        let too_much = most_of_noise(context.values(), settings);
         let left_share = fit.left_share();
         let out_of_step = left_share > settings.out_of_step;
         let unexplained = left_share > settings.much || fit.chi2 > too_much;
@@ -51,6 +51,18 @@ impl Misfit {
     pub fn beside(self, others: &[Refit<'_>]) -> Self {
         Self { unsolved: self.unexplained && (self.little || least_chi2(others) > self.too_much), ..self }
     }
+}
+
+/// The largest χ² of so many values that is still noise.
+pub fn most_of_noise(values: usize, settings: &MisfitSettings) -> f64 {
+    let values = values as f64;
+    values + settings.deviations * (2.0 * values).sqrt()
+}
+
+/// What a fit leaves, in variances of what the best one leaves, and what its effects must gain.
+pub fn needs(fit: &Refit<'_>, best: &Refit<'_>, settings: &MisfitSettings) -> f64 {
+    let variance = (best.chi2 / best.values().max(1) as f64).max(1.0);
+    fit.chi2 / variance + settings.counts * fit.hypothesis.effects.len() as f64
 }
 
 /// Whether a motion has lost step with a recording: what is left is a good part of the swing.

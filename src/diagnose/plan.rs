@@ -11,9 +11,10 @@ use super::taken::{Taken, base_of};
 use crate::error::{Error, Result};
 use crate::experiment::Experiment;
 use crate::fit::Record;
+use crate::fit::problem::step_error_rad;
 use crate::fit::whitening::RecordNoise;
 use crate::model::observe::chord_angles_rad;
-use crate::model::{ForwardModel, State, Trajectory};
+use crate::model::{ForwardModel, State, Trajectory, Work};
 
 /// A recording that is planned.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -41,9 +42,11 @@ pub fn planned(experiment: &Experiment, plan: &Plan) -> Result<Vec<Detectable>> 
         settings: &settings,
         base,
         beliefs,
-        step_error_rad: (1e-3 * plan.noise_rad).clamp(1e-10, 1e-6),
+        step_error_rad: step_error_rad(plan.noise_rad),
         begun: Vec::new(),
         fine_strip: None,
+        laws: Vec::new(),
+        work: Work::default(),
     };
     let nothing = Hypothesis::default();
     let problem = context.problem(&nothing, &[RecordNoise::white(vec![plan.noise_rad; marks])])?;

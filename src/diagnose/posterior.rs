@@ -6,6 +6,7 @@ use super::energy::added_torque_n_m;
 use super::evidence::{self, Scatter, normalised};
 use super::latent::{Assumed, Latent};
 use super::laws::law_of;
+use super::misfit::{most_of_noise, needs};
 use super::refit::{self, Refit};
 use super::settings::Settings;
 use super::unknowns::unknowns;
@@ -27,6 +28,8 @@ pub struct Candidate<'a> {
     pub if_named: f64,
     /// Posterior of these names, whatever remains beside them.
     pub in_layers: f64,
+    /// The odds that these names are what has been filmed, and stand for nothing else.
+    pub genuine: f64,
 }
 
 /// Hypotheses beside the unknown.
@@ -44,6 +47,8 @@ pub struct Posterior<'a> {
     pub uncertified: Vec<Vec<Effect>>,
     /// That something around the likeliest fit, at each place.
     pub unknowns: Vec<Latent>,
+    /// How probable each name of the likeliest fit is where any law may stand in its place, as far as that was asked.
+    pub needed: Vec<(Effect, f64)>,
 }
 
 /// Weighs the hypotheses of some fits, out of so many candidate effects, beside the unknown around the likeliest of them.
@@ -72,71 +77,80 @@ pub fn weigh<'a>(fits: Vec<Refit<'a>>, effects: usize, settings: &Settings) -> P
         at_best[*rival] = at_best[*rival].max(posterior[best] + ln_prior(&fits[*rival]) - ln_prior(&fits[best]));
     }
     let others: Vec<&Refit<'_>> = fits.iter().collect();
-    let lowest = normalised(&at_best)[best] * genuine(&fits[best], &others, settings);
+    let genuine: Vec<f64> = fits.iter().map(|fit| genuine(fit, &others, settings)).collect();
+    let lowest = normalised(&at_best)[best] * genuine[best];
     let uncertified = rivals.iter().map(|rival| fits[*rival].hypothesis.effects.clone()).collect();
     let if_named = normalised(&posterior[..fits.len()]);
     let mut probability = normalised(&posterior);
     let mut unknown = probability.pop().unwrap_or(0.0);
     let remains = unknown;
-    let in_layers = in_layers(&fits, &posterior, (scatter, remains), &if_named, settings);
+    let layers = Layers { fits: &fits, best, ln_posterior: &posterior, if_named: &if_named, genuine: &genuine };
+    let in_layers = layers.probabilities((scatter, remains), settings);
     // a name, above all a support that moves, may be a stand-in for what is not known
-    for (fit, probability) in fits.iter().zip(&mut probability).filter(|(_, p)| **p > NEGLIGIBLE) {
-        let genuine = genuine(fit, &others, settings);
+    for (genuine, probability) in genuine.iter().zip(&mut probability) {
         unknown += (1.0 - genuine) * *probability;
         *probability *= genuine;
     }
-    let mut candidates: Vec<Candidate<'a>> =
-        (fits.into_iter().zip(posterior).zip(probability.into_iter().zip(if_named).zip(in_layers)))
-            .map(|((fit, ln_posterior), ((probability, if_named), in_layers))| Candidate {
-                fit,
-                ln_posterior,
-                probability,
-                if_named,
-                in_layers,
-            })
-            .collect();
+    let mut candidates: Vec<Candidate<'a>> = fits
+        .into_iter()
+        .enumerate()
+        .map(|(place, fit)| Candidate {
+            fit,
+            ln_posterior: posterior[place],
+            probability: probability[place],
+            if_named: if_named[place],
+            in_layers: in_layers[place],
+            genuine: genuine[place],
+        })
+        .collect();
     // where the unknown takes all, or next to all, their order among themselves still counts
     candidates
         .sort_by(|a, b| (b.probability.total_cmp(&a.probability)).then(b.ln_posterior.total_cmp(&a.ln_posterior)));
-    Posterior { candidates, unknown, remains, lowest, uncertified, unknowns: latents }
+    Posterior { candidates, unknown, remains, lowest, uncertified, unknowns: latents, needed: Vec::new() }
 }
 
 /// The names in layers: P(S) = (1 − z) P(S | nothing remains) + z g P(S | something remains), z being the probability that something does, and g the odds
-/// that names which leave so much are at work and stand for nothing else. The last of `ln_posterior` is that of the unknown.
-fn in_layers(
-    fits: &[Refit<'_>],
-    ln_posterior: &[f64],
-    (scatter, remains): (Scatter, f64),
-    if_named: &[f64],
-    settings: &Settings,
-) -> Vec<f64> {
-    let others: Vec<&Refit<'_>> = fits.iter().collect();
-    // a fit that is not certified may be a false minimum: it counts for nothing beside those that are
-    let best = (0..fits.len()).max_by(|a, b| ln_posterior[*a].total_cmp(&ln_posterior[*b])).unwrap_or(0);
-    let counts = |place: usize| place == best || fits[place].is_certified(&settings.certificate);
-    let ln_weight = |(place, fit): (usize, &Refit<'_>)| match counts(place) {
-        true => ln_posterior[place] + 0.5 * fit.chi2 / scatter.of_all,
-        false => f64::NEG_INFINITY,
-    };
-    let ln_weight: Vec<f64> = fits.iter().enumerate().map(ln_weight).collect();
-    let together = ((scatter.of_all - 1.0) / (scatter.of_values - 1.0).max(1e-9)).max(1.0);
-    let bagged = if remains > NEGLIGIBLE {
-        bag::bagged(fits, &ln_weight, (scatter.of_values, together))
-    } else {
-        if_named.to_vec()
-    };
-    let base = fits.iter().find(|f| f.hypothesis.effects.is_empty());
-    let of = |((fit, plain), bagged): ((&Refit<'_>, &f64), &f64)| {
-        let stands = |odds: f64| odds * genuine(fit, &others, settings);
-        let left = base.map_or(1.0, |base| left_of_excess(fit, base));
-        let odds = if fit.hypothesis.effects.is_empty() { 1.0 } else { settings.prior.odds_where_left(left) };
-        if *plain > NEGLIGIBLE || *bagged > NEGLIGIBLE {
-            (1.0 - remains) * stands(1.0) * plain + remains * stands(odds) * bagged
-        } else {
-            0.0
-        }
-    };
-    fits.iter().zip(if_named).zip(&bagged).map(of).collect()
+/// that names which leave so much are at work and stand for nothing else.
+struct Layers<'f, 'a> {
+    fits: &'f [Refit<'a>],
+    /// The likeliest.
+    best: usize,
+    /// Of the fits, then of the unknown.
+    ln_posterior: &'f [f64],
+    /// P(S | nothing remains).
+    if_named: &'f [f64],
+    /// The odds that a fit's effects stand for nothing else.
+    genuine: &'f [f64],
+}
+
+impl Layers<'_, '_> {
+    fn probabilities(&self, (scatter, remains): (Scatter, f64), settings: &Settings) -> Vec<f64> {
+        let Self { fits, if_named, genuine, .. } = *self;
+        let bagged = match remains > NEGLIGIBLE {
+            true => self.bagged(scatter, settings),
+            false => if_named.to_vec(),
+        };
+        let base = fits.iter().find(|f| f.hypothesis.effects.is_empty());
+        let of = |place: usize| {
+            let left = base.map_or(1.0, |base| left_of_excess(&fits[place], base));
+            let named = !fits[place].hypothesis.effects.is_empty();
+            let odds = if named { settings.prior.odds_where_left(left) } else { 1.0 };
+            genuine[place] * ((1.0 - remains) * if_named[place] + remains * odds * bagged[place])
+        };
+        (0..fits.len()).map(of).collect()
+    }
+
+    /// P(S | something remains). A fit that is not certified may be a false minimum: it counts for nothing beside those that are.
+    fn bagged(&self, scatter: Scatter, settings: &Settings) -> Vec<f64> {
+        let counts = |place: usize| place == self.best || self.fits[place].is_certified(&settings.certificate);
+        let ln_weight = |(place, fit): (usize, &Refit<'_>)| match counts(place) {
+            true => self.ln_posterior[place] + 0.5 * fit.chi2 / scatter.of_all,
+            false => f64::NEG_INFINITY,
+        };
+        let ln_weight: Vec<f64> = self.fits.iter().enumerate().map(ln_weight).collect();
+        let together = ((scatter.of_all - 1.0) / (scatter.of_values - 1.0).max(1e-9)).max(1.0);
+        bag::bagged(self.fits, &ln_weight, (scatter.of_values, together))
+    }
 }
 
 /// The part of what the base model leaves beyond the noise that a fit leaves, too.
@@ -148,10 +162,8 @@ pub fn left_of_excess(fit: &Refit<'_>, base: &Refit<'_>) -> f64 {
 /// The rivals of the likeliest fit that are not certified, and leave so little more that a better fit of theirs might count. One that leaves only noise stands in
 /// no false minimum, however few starts have led there.
 fn uncertified_within_reach(fits: &[Refit<'_>], best: usize, settings: &Settings) -> Vec<usize> {
-    let values = fits[best].values() as f64;
-    let only_noise = values + settings.misfit.deviations * (2.0 * values).sqrt();
-    let variance = (fits[best].chi2 / values.max(1.0)).max(1.0);
-    let needs = |fit: &Refit<'_>| fit.chi2 / variance + settings.misfit.counts * fit.hypothesis.effects.len() as f64;
+    let only_noise = most_of_noise(fits[best].values(), &settings.misfit);
+    let needs = |fit: &Refit<'_>| needs(fit, &fits[best], &settings.misfit);
     let reach = needs(&fits[best]) + settings.certificate.within;
     let is_rival = |place: &usize| {
         let fit = &fits[*place];
@@ -211,10 +223,16 @@ impl<'a> Posterior<'a> {
         self.candidates.iter().find(|c| c.fit.hypothesis.effects.is_empty()).map_or(self.best(), |c| &c.fit)
     }
 
-    /// How probable each effect is, over all sets of names that hold it, whatever remains beside them.
+    /// How probable an effect is, over all sets of names that hold it, whatever remains beside them: as the fits of the table say, and where something remains as
+    /// the laws say that may stand in its place.
     pub fn inclusion(&self, effect: Effect) -> f64 {
         let with = self.candidates.iter().filter(|c| c.fit.hypothesis.has(effect));
-        with.map(|c| c.in_layers).fold(0.0, |sum, p| sum + p).min(1.0)
+        let of_table = with.map(|c| c.in_layers).fold(0.0, |sum, p| sum + p).min(1.0);
+        let needed = self.needed.iter().find(|own| own.0 == effect);
+        let beside = |(_, needed): &(Effect, f64)| {
+            (1.0 - self.remains) * of_table + self.remains * needed * self.candidates[0].genuine
+        };
+        needed.map_or(of_table, beside)
     }
 
     /// A fit's effects, the one that explains most first: without which it would be worst.

@@ -1,20 +1,24 @@
 //! What all searches begin with: recordings without outliers, their noise, and where the base model's descent starts.
 
-use super::settings::Settings;
+use super::context::first_part;
+use super::settings::{SearchSettings, Settings};
 use super::taken::{Taken, base_of};
 use crate::error::Result;
 use crate::experiment::Experiment;
 use crate::fit::noise::noise_rad;
-use crate::fit::search::{End, best_end};
+use crate::fit::problem::step_error_rad;
+use crate::fit::search::{End, best_end, seen_starts};
 use crate::fit::whitening::{Colour, RecordNoise};
-use crate::fit::{Record, Seen, refuse_another_pace};
-use crate::model::Parameter;
+use crate::fit::{Problem, Record, Seen, refuse_another_pace};
+use crate::model::{Parameter, Work};
 use crate::progress::Silent;
 
 /// What the recordings, cleaned of outliers, are held against.
 pub struct Prepared {
     /// Cleaned.
     pub records: Vec<Record>,
+    /// The first part of their rows on which the budget allows a search; 1 where that is all of them.
+    pub part: f64,
     /// Learnt from short stretches.
     pub noise: Vec<RecordNoise>,
     /// Of the integration.
@@ -27,6 +31,16 @@ pub struct Prepared {
     pub begun: Vec<f64>,
     /// The same where the robust descent from there ended.
     pub ended: Vec<f64>,
+    /// What all fits to them have cost.
+    pub work: Work,
+}
+
+impl Prepared {
+    /// How a search takes the file at first.
+    pub fn taken_at_first(&self) -> Taken {
+        let marks = self.records.first().map_or(0, Record::links);
+        Taken::at_first(&self.experiment, marks, self.part < 1.0)
+    }
 }
 
 /// Learns the noise, leaves outliers out, and finds where the base model's descent is to start: where `fit` ends, which begins with the file's values and with
@@ -42,22 +56,47 @@ pub fn prepare(records: &[Record], experiment: &Experiment, settings: &Settings)
     let marks = records.first().map_or(0, Record::links);
     let (base, _) = base_of(experiment, marks, Taken::AtItsWord, &settings.search)?;
     let noise_rad: Vec<Vec<f64>> = records.iter().map(noise_rad).collect();
-    let End { mut problem, outcome, shot, begun } = best_end(records, experiment, &base, &noise_rad, &Silent)?;
+    let part = affordable_part(records, experiment, &base, &noise_rad, &settings.search)?;
+    let early = if part < 1.0 { first_part(records, part) } else { records.to_vec() };
+    let End { mut problem, outcome, shot, begun } = best_end(&early, experiment, &base, &noise_rad, &Silent)?;
     problem.noise.clone_from(&shot.noise);
     problem.integrate_below_the_noise();
     let step_error_rad = problem.accuracy.step_error_rad;
+    let mut problem = Problem { records, ..problem };
     problem.accuracy = problem.accuracy_of(problem.longest_s(), step_error_rad);
     // where short stretches led: a whole motion that has bent to a jump of the clock would take the rows beside that for outliers
     let (kept, _) = crate::fit::without_outliers(&problem, &shot.x)?;
     Ok(Prepared {
         noise: coloured(&shot.residuals, &shot.noise, settings.noise.stretches_coloured),
         step_error_rad,
+        part,
         experiment: begun,
         base,
         begun: shot.x,
         ended: outcome.x,
         records: kept,
+        work: problem.work,
     })
+}
+
+/// The part of the rows of which the budget allows a search, where that is not next to all of them: a search makes so many motions with derivatives.
+fn affordable_part(
+    records: &[Record],
+    experiment: &Experiment,
+    base: &[Parameter],
+    noise_rad: &[Vec<f64>],
+    settings: &SearchSettings,
+) -> Result<f64> {
+    let mut problem = Problem::new(records, experiment, base)?;
+    let least_rad = noise_rad.iter().flatten().copied().fold(f64::INFINITY, f64::min);
+    problem.accuracy = problem.accuracy_of(problem.longest_s(), step_error_rad(least_rad));
+    let x = [problem.start_values()?, seen_starts(&problem)?].concat();
+    let swings = problem.longest_s() * problem.model(0, &[])?.0.pace_rad_s() / std::f64::consts::TAU;
+    // a motion that runs away has cost what it has
+    _ = problem.blocks(&x);
+    let affordable = settings.budget as f64 / (settings.evaluations * problem.work.done().max(1) as f64);
+    let part = affordable.max(settings.early_swings / swings.max(1.0));
+    Ok(if part < settings.part_worth { part } else { 1.0 })
 }
 
 /// Noise with the correlation of neighbouring residuals of each angle, where it is more than chance and the stretches' own starts make of it.

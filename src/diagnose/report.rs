@@ -9,8 +9,10 @@ use super::adequacy::Detectable;
 use super::effect::{Effect, Phase, Place};
 use super::findings::Findings;
 use super::latent::Latent;
+use super::law_report::LearntLaw;
 use super::misfit::is_beyond_noise;
 use super::posterior::{Candidate, left_of_excess};
+pub use super::quantity::{Parameters, Quantity};
 use super::refit::Refit;
 use super::search::RoundEnd;
 use super::settings::CertificateSettings;
@@ -71,20 +73,6 @@ pub struct Baseline {
     pub adequate: bool,
     /// How often chance alone leaves residuals as conspicuous.
     pub p_value: f64,
-}
-
-/// Fitted parameters by their identifiers.
-pub type Parameters = BTreeMap<&'static str, Quantity>;
-
-/// A fitted parameter.
-#[derive(Debug, Clone, Copy, Serialize)]
-pub struct Quantity {
-    /// Its value.
-    pub value: Option<f64>,
-    /// Standard deviation.
-    pub sd: f64,
-    /// Of both.
-    pub unit: &'static str,
 }
 
 /// Where the base model differs from the recordings.
@@ -208,6 +196,8 @@ pub struct Answer {
     pub inclusion: BTreeMap<&'static str, f64>,
     /// What remains beside the names.
     pub remainder: Remainder,
+    /// What that was learnt to be.
+    pub law: Option<LearntLaw>,
     /// The same in words.
     pub statement: String,
     /// The measurement that would split the class.
@@ -264,8 +254,10 @@ pub struct Proof {
     pub recording: PathBuf,
     /// What the base model leaves of each angle.
     pub baseline_rmse_rad: Vec<f64>,
-    /// What the model with the names does.
+    /// What the whole answer does: the names, and the law that was learnt beside them.
     pub augmented_rmse_rad: Vec<f64>,
+    /// What the names do without it.
+    pub named_rmse_rad: Vec<f64>,
     /// Noise of each angle.
     #[serde(skip)]
     pub noise_rad: Vec<f64>,
@@ -447,6 +439,7 @@ impl Answer {
             unknown_probability: verdict.unknown,
             inclusion: Effect::ALL.iter().map(|effect| (effect.id(), findings.posterior.inclusion(*effect))).collect(),
             remainder: Remainder::of(findings),
+            law: findings.learnt.as_ref().and_then(LearntLaw::of),
             statement: findings.verdict_statement(),
             to_decide: verdict.to_decide.clone(),
             among_themselves: is_beyond_noise(findings.named(), &settings.noise),
@@ -457,11 +450,14 @@ impl Answer {
 impl Proof {
     fn of(findings: &Findings<'_>) -> Option<Self> {
         let held_out = findings.held_out.as_ref()?;
+        let named_rmse_rad = held_out.augmented.rmse_rad.clone();
+        let of_learnt = findings.learnt.as_ref().map(|learnt| learnt.prediction.rmse_rad.clone());
         Some(Self {
             from_s: held_out.from_s,
             recording: findings.context.records[held_out.record].path.clone(),
             baseline_rmse_rad: held_out.baseline.rmse_rad.clone(),
-            augmented_rmse_rad: held_out.augmented.rmse_rad.clone(),
+            augmented_rmse_rad: of_learnt.unwrap_or_else(|| named_rmse_rad.clone()),
+            named_rmse_rad,
             noise_rad: findings.posterior.base().problem.noise[held_out.record].sd_rad.clone(),
         })
     }

@@ -57,12 +57,16 @@ impl Projection {
     fn new(residual: DVector<f64>, slopes: DMatrix<f64>, fit: &Refit<'_>) -> Self {
         let lower = fit.problem.lower();
         let loose: Vec<usize> = (0..fit.x.len()).filter(|i| fit.x[*i] > lower[*i]).collect();
-        let mut kept = slopes.select_columns(&loose);
-        for mut column in kept.column_iter_mut() {
+        Self::off(residual, slopes.select_columns(&loose))
+    }
+
+    /// Of residuals, with what some derivatives can change taken out.
+    pub fn off(residual: DVector<f64>, mut slopes: DMatrix<f64>) -> Self {
+        for mut column in slopes.column_iter_mut() {
             let size = column.norm();
             column /= size.max(1e-300);
         }
-        let basis = kept.qr().q();
+        let basis = slopes.qr().q();
         let residual = &residual - &basis * basis.tr_mul(&residual);
         Self { basis, residual }
     }

@@ -87,11 +87,34 @@ pub struct MisfitSettings {
     pub counts: f64,
 }
 
+/// Up to which share of the budget each phase of a search may go (cost).
+#[derive(Debug, Clone, Copy)]
+pub struct BudgetShares {
+    /// Single effects and pairs.
+    pub usual: f64,
+    /// Restarts.
+    pub restarts: f64,
+    /// Further starts of the fits that count.
+    pub certified: f64,
+    /// From the beginning on, more effects and fewer. What is left is for further starts of what that found.
+    pub further: f64,
+    /// A law that no table holds is learnt beside all of that, with this much.
+    pub law: f64,
+}
+
 /// What is fitted.
 #[derive(Debug, Clone)]
 pub struct SearchSettings {
-    /// Descents after which no further round is begun (cost): what is left undecided is told.
-    pub budget: usize,
+    /// Work after which no further fit is begun (cost: a minute of two cores for everything; see [`crate::model::Work`]). What is left undecided is told.
+    pub budget: u64,
+    /// How the phases of a search share it.
+    pub shares: BudgetShares,
+    /// Motions with derivatives that a search makes (cost): where the budget does not allow so many of whole recordings, it is begun on their first part…
+    pub evaluations: f64,
+    /// … of at least so many swings (judgement: losses change with amplitude)…
+    pub early_swings: f64,
+    /// … unless that is next to the whole (cost).
+    pub part_worth: f64,
     /// A length or an inertia of a rig is known to this share (judgement: a rule and kitchen scales).
     pub geometry_share: f64,
     /// Fits from which pairs are built (cost).
@@ -130,6 +153,8 @@ pub struct SearchSettings {
     pub begun: usize,
     /// Fits of each number of coefficients that are followed further (cost)…
     pub followed: usize,
+    /// … of the first part of recordings of which the whole is dear so many altogether (cost)…
+    pub carried: usize,
     /// … unless they leave more than this many times what the best of them does.
     pub keeps_up: f64,
     /// Effects that an answer has at first (judgement: a bank of single effects and pairs has calibrated no more).
@@ -271,7 +296,11 @@ impl Default for MisfitSettings {
 impl Default for SearchSettings {
     fn default() -> Self {
         Self {
-            budget: 4000,
+            budget: 60_000_000,
+            shares: BudgetShares { usual: 0.45, restarts: 0.6, certified: 0.7, further: 0.9, law: 0.25 },
+            evaluations: 4000.0,
+            early_swings: 12.0,
+            part_worth: 0.6,
             geometry_share: 0.1,
             pair_seeds: 6,
             dear_seeds: 3,
@@ -291,6 +320,7 @@ impl Default for SearchSettings {
             fewest_swings: 5.0,
             begun: 12,
             followed: 3,
+            carried: 6,
             keeps_up: 2.0,
             main_effects: 2,
             most_effects: 3,

@@ -15,6 +15,13 @@ pub enum Taken {
     Loosely,
 }
 
+impl Taken {
+    /// How a search takes the file at first: at its word, and loosely only if much is left then; loosely at once where there is no time for both.
+    pub fn at_first(experiment: &Experiment, marks: usize, is_dear: bool) -> Self {
+        if is_dear && has_slack(experiment, marks) { Self::Loosely } else { Self::AtItsWord }
+    }
+}
+
 /// The base model's parameters and what is known of them.
 ///
 /// # Errors

@@ -77,15 +77,30 @@ impl Verdict {
             let best = posterior.best();
             let left = left_of_excess(best, posterior.base());
             let few = best.hypothesis.effects.len() <= settings.search.main_effects;
-            if few && left < settings.prior.imitated_down_to && best.is_certified(&settings.certificate) {
+            // none stand for which another law may stand in
+            let least = best.hypothesis.effects.iter().map(|effect| posterior.inclusion(*effect));
+            let least = least.fold(1.0, f64::min);
+            let asked = !posterior.needed.is_empty();
+            let is_sound = few && best.is_certified(&settings.certificate);
+            let may_stand = is_sound && (!asked || least >= settings.verdict.alone);
+            if may_stand && left < settings.prior.imitated_down_to {
                 let verdict = Self::naming(weighed, |w| w.in_layers, unknown, marks, settings);
                 if verdict.status == Status::Identified {
                     return verdict;
                 }
             }
+            // and so do those that no other law can stand in for, where they predict what was not fitted
             let predicts = proof.is_some_and(|proof| proof.leaves() <= settings.verdict.proven);
+            if asked && may_stand && predicts {
+                let probability = |w: &Candidate<'_>| {
+                    let is_best = w.fit.hypothesis.effects == best.hypothesis.effects;
+                    if is_best { least } else { (1.0 - least) * w.if_named }
+                };
+                return Self::naming(weighed, probability, unknown, marks, settings);
+            }
             let nearest = settings.verdict.nearest;
-            return if predicts && is_beyond_noise(posterior.best(), &settings.noise) {
+            let replaced = asked && least < settings.verdict.even;
+            return if predicts && !replaced && is_beyond_noise(posterior.best(), &settings.noise) {
                 Self::naming(weighed, |w| nearest * w.if_named, 1.0 - nearest, marks, settings)
             } else {
                 nothing(Status::Unknown, unknown)

@@ -8,6 +8,7 @@ use super::misfit::is_beyond_noise;
 use super::torque::MissingTorque;
 use super::verdict::{self, Status};
 use crate::digits::number;
+use crate::experiment::LawPlace;
 use crate::model::Parameter;
 
 /// A change of a probability that is worth a sentence.
@@ -44,7 +45,7 @@ impl Findings<'_> {
                 format!("Missing: most likely {effects} ({percent:.0} %){others}.{remark}{more}")
             }
         };
-        statement + &reservation
+        statement + &self.law() + &reservation
     }
 
     /// What rivals whose fits are not certified could change.
@@ -110,6 +111,31 @@ impl Findings<'_> {
             let _ = write!(words, ", {}", self.in_swings(hz));
         }
         words + ": not in the table."
+    }
+
+    /// The law that was learnt of what the names leave.
+    fn law(&self) -> String {
+        let (Some(learnt), Some(proof)) = (&self.learnt, &self.held_out) else { return String::new() };
+        let Some(first) = learnt.terms.first() else { return String::new() };
+        let place = match first.law.place {
+            LawPlace::Hinge => "a torque at the hinge",
+            LawPlace::Joint => "a torque in the joint",
+            LawPlace::Strip => "a force along the strip",
+            LawPlace::Tip => "a force at the tip",
+            LawPlace::Support => "an acceleration of the support",
+        };
+        let beside = match learnt.fit.hypothesis.effects.is_empty() {
+            true => " It is described best without a name of the table, by",
+            false => " What remains is described best by",
+        };
+        let milli = |of: &[f64]| of.iter().map(|rad| number(1e3 * rad, 2)).collect::<Vec<_>>().join(" and ");
+        format!(
+            "{beside} {place} of {} {}: of what was not fitted that leaves {} mrad, the names alone {} mrad.",
+            learnt.formula(),
+            first.law.place.unit(),
+            milli(&learnt.prediction.rmse_rad),
+            milli(&proof.augmented.rmse_rad)
+        )
     }
 
     /// A frequency, as a multiple of the swing's where it is one.
@@ -191,11 +217,7 @@ fn in_place(place: Place) -> &'static str {
 
 /// What the smoothed torque says by itself.
 fn words_of_torque(torque: &MissingTorque) -> String {
-    let place = match torque.place {
-        Place::Hinge => "at the hinge",
-        Place::Joint => "in the joint",
-        Place::Air | Place::Camera => "along the strip",
-    };
+    let place = in_place(torque.place);
     let mut words = format!("A torque without a law would do {place}, of {} N m rms", number(torque.rms, 2));
     if let Some(hz) = torque.frequency_hz {
         let _ = write!(words, ", strongest at {hz:.2} Hz");

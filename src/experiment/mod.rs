@@ -4,6 +4,7 @@
 
 mod consistency;
 mod keys;
+mod law;
 mod model;
 mod render;
 mod rig;
@@ -14,6 +15,7 @@ use std::path::Path;
 
 use serde::Deserialize;
 
+pub use law::{Coefficient, Law, LawPlace};
 pub use model::{Effects, Hysteresis, Model, SupportMotion};
 pub use render::{Caption, Codec, CodecName, Distractor, Lens, Noise, Occlusion, PixelFormat, Render, Rgb, Siting};
 pub use rig::{Look, MarkColour, Rig};

@@ -2,6 +2,7 @@
 
 use serde::Deserialize;
 
+use super::law::{self, Law};
 use super::{finite, not_negative, positive};
 
 /// Bouc–Wen hysteresis of the joint.
@@ -84,6 +85,8 @@ pub struct Model {
     pub pieces: usize,
     /// Physics beyond the base model.
     pub effects: Effects,
+    /// Laws stated by a formula.
+    pub law: Vec<Law>,
 }
 
 impl Default for Model {
@@ -95,6 +98,7 @@ impl Default for Model {
             release_rad: vec![0.5, 0.6],
             pieces: 8,
             effects: Effects::default(),
+            law: Vec::new(),
         }
     }
 }
@@ -109,6 +113,7 @@ impl Model {
         if !(1..=20).contains(&self.pieces) {
             return Err(format!("model.pieces = {}: must be from 1 to 20", self.pieces));
         }
+        law::validate(&self.law)?;
         self.effects.validate()
     }
 }

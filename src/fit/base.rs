@@ -3,7 +3,7 @@
 use crate::experiment::Experiment;
 use crate::model::Parameter;
 
-/// The joint's spring (where it has one) and damper, or of one link the hinge's viscous damper; and every effect named in `[model.effects]`.
+/// The joint's spring (where it has one) and damper, or of one link the hinge's viscous damper; and every effect named in `[model.effects]` or law stated in `[[model.law]]`.
 ///
 /// A joint whose `k_eq_n_m_per_rad` is 0 has no spring; a strip with `distributed_flexibility` has EI in place of K.
 pub fn base_parameters(experiment: &Experiment, marks: usize) -> Vec<Parameter> {
@@ -40,6 +40,8 @@ pub fn base_parameters(experiment: &Experiment, marks: usize) -> Vec<Parameter> 
         (effects.differential_lag, Parameter::DifferentialLag),
     ];
     let named = named.into_iter().filter_map(|(value, parameter)| value.map(|_| parameter));
+    let stated = experiment.model.law.iter().flat_map(|law| law.coefficients().map(|(own, _)| Parameter::Law(own)));
+    let named = named.chain(stated);
     free.extend(named.filter(|p| !free.contains(p)).collect::<Vec<_>>());
     free
 }

@@ -7,8 +7,8 @@ use super::predict::{Request, Value, predict};
 use super::whitening::{RecordNoise, Whitening};
 use super::{Prediction, Record};
 use crate::error::{Error, Result};
-use crate::experiment::{Experiment, Hysteresis, SupportMotion};
-use crate::model::{Accuracy, Camera, ForwardModel, Parameter};
+use crate::experiment::{Experiment, Hysteresis, Law, SupportMotion};
+use crate::model::{Accuracy, Camera, ForwardModel, Parameter, Work};
 use crate::statistics::median;
 
 /// Standard deviations of a strip's further shapes where a motion starts, as angles between marks: the sixth part of a large swing, at some hertz.
@@ -42,6 +42,8 @@ pub struct Problem<'a> {
     pub beliefs: Vec<Belief>,
     /// Shapes free at each start beyond the angles between marks.
     pub further_shapes: usize,
+    /// What its integrations have cost.
+    pub work: Work,
 }
 
 /// A free parameter that is known beforehand, as a measured length or mass is.
@@ -79,6 +81,7 @@ impl<'a> Problem<'a> {
             dropped_at_s: vec![f64::INFINITY; records.len()],
             beliefs: Vec::new(),
             further_shapes: usize::from(model.shapes().is_some()),
+            work: Work::default(),
         })
     }
 
@@ -124,7 +127,11 @@ impl<'a> Problem<'a> {
     /// Lower bounds of all variables.
     pub fn lower(&self) -> Vec<f64> {
         let mut lower = vec![f64::NEG_INFINITY; self.variables()];
+        let stated: Vec<(Parameter, f64)> = self.experiment.model.law.iter().flat_map(least_values).collect();
         for (bound, parameter) in lower.iter_mut().zip(&self.free) {
+            if let Some((_, least)) = stated.iter().find(|(stated, _)| stated == parameter) {
+                *bound = *least;
+            }
             if parameter.is_not_negative() {
                 // a yield angle or a frequency of zero has no meaning
                 *bound = if parameter.is_proportional() { 0.0 } else { 1e-4 };
@@ -138,7 +145,7 @@ impl<'a> Problem<'a> {
     /// # Errors
     /// [`Error::Simulation`].
     pub fn model(&self, record: usize, values: &[f64]) -> Result<(ForwardModel, Camera)> {
-        let mut model = ForwardModel::of(&self.experiment)?;
+        let mut model = ForwardModel::of(&self.experiment)?.counted_by(&self.work);
         let mut camera = Camera::of(&self.experiment.model.effects, 0.0, self.dropped_at_s[record]);
         for (parameter, value) in self.free.iter().zip(values) {
             model.set(*parameter, *value);
@@ -219,10 +226,10 @@ impl<'a> Problem<'a> {
         Block { columns, residual, slopes, robust: true }
     }
 
-    /// Sets the accuracy of the integration to a thousandth of the least noise.
+    /// Sets the accuracy of the integration by the least noise.
     pub fn integrate_below_the_noise(&mut self) {
         let least = self.noise.iter().flat_map(|n| &n.sd_rad).copied().fold(f64::INFINITY, f64::min);
-        self.accuracy = Accuracy { step_error_rad: (1e-3 * least).clamp(1e-10, 1e-6), ..Accuracy::default() };
+        self.accuracy = Accuracy { step_error_rad: step_error_rad(least), ..Accuracy::default() };
     }
 
     /// Standard deviation of the noise of one value.
@@ -265,6 +272,17 @@ impl<'a> Problem<'a> {
     }
 }
 
+/// Of the coefficients of a stated law those that have a least value.
+fn least_values(law: &Law) -> impl Iterator<Item = (Parameter, f64)> {
+    law.coefficients().filter_map(|(coefficient, own)| Some((Parameter::Law(coefficient), own.min?)))
+}
+
+/// The error allowed in a step beside some noise: a hundredth of it. A minute of one, two or three links then errs by a two-hundredth of the noise, since errors of
+/// single steps are estimated too large (1e-6 rad a step: 5e-7 rad after 60 s).
+pub fn step_error_rad(noise_rad: f64) -> f64 {
+    (1e-2 * noise_rad).clamp(1e-10, 1e-5)
+}
+
 /// How far variables (place, value, standard deviation) are from what is known of them.
 fn known_block(known: &[(usize, f64, f64)], x: &[f64]) -> Option<Block> {
     (!known.is_empty()).then(|| Block {
@@ -302,7 +320,8 @@ fn switch_on(experiment: &mut Experiment, parameter: Parameter) {
         | Parameter::FirstInertia
         | Parameter::FirstCom
         | Parameter::SecondInertia
-        | Parameter::SecondCom => {}
+        | Parameter::SecondCom
+        | Parameter::Law(_) => {}
         Parameter::RestCurl => on(&mut effects.rest_curl),
         Parameter::BendingStiffness => on(&mut effects.distributed_flexibility),
         Parameter::JointCubicStiffness => on(&mut effects.joint_cubic_stiffness),

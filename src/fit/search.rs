@@ -1,7 +1,7 @@
 //! Several beginnings, the best end.
 
 use super::descent::{Descent, Outcome};
-use super::shooting::{self, Shot};
+use super::shooting::{self, STATE_NEAR, Shot};
 use super::{Problem, Record, begin, straight};
 use crate::error::{Error, Result};
 use crate::experiment::{Experiment, Hysteresis, SupportMotion};
@@ -22,13 +22,11 @@ const YIELDS: [f64; 3] = [0.05, 0.2, 0.6];
 const SPRINGS: [f64; 2] = [0.4, 0.9];
 const BEGINNING: f64 = 0.15;
 /// Parts of the rows that are followed one after the other, before all of them.
-const PARTS: [f64; 4] = [0.1, 0.2, 0.35, 0.6];
+pub const PARTS: [f64; 4] = [0.1, 0.2, 0.35, 0.6];
 /// Frequencies of what is left are looked at this finely for the length of the recording, up to this one; and so many of the strongest are begun with.
 const FINENESS: f64 = 2.0;
 const HIGHEST_HZ: f64 = 20.0;
 const PEAKS: usize = 4;
-/// A start is read off values this near, in radians of the model's pace: wide enough to even out the noise, short enough for a cubic to follow the second mode.
-const STATE_NEAR: f64 = 0.35;
 /// Another end is better where it leaves less by this part.
 const BETTER: f64 = 1e-3;
 /// Beginnings, each of which is a stage.
@@ -265,7 +263,10 @@ fn strongest_hz(end: &End<'_>) -> Vec<f64> {
 }
 
 /// Each recording's start as its first values show it.
-fn seen_starts(problem: &Problem<'_>) -> Result<Vec<f64>> {
+///
+/// # Errors
+/// [`Error::Simulation`] where the specimen cannot swing.
+pub fn seen_starts(problem: &Problem<'_>) -> Result<Vec<f64>> {
     let reach_s = STATE_NEAR / problem.model(0, &[])?.0.pace_rad_s();
     let further = vec![0.0; problem.further_shapes];
     let of = |record: &Record| {

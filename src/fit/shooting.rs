@@ -17,6 +17,8 @@ use crate::error::Result;
 use crate::model::Camera;
 use crate::statistics::median;
 
+/// A start is read off values this near, in radians of the model's pace: wide enough to even out the noise, short enough for a cubic to follow the second mode.
+pub const STATE_NEAR: f64 = 0.35;
 /// Standard deviations of the seams (in units of the noise), from loose to tight.
 const SEAMS: [f64; 2] = [100.0, 5.0];
 /// Steps of the descent for each.
@@ -78,7 +80,7 @@ pub fn multiple_shooting(problem: &mut Problem<'_>) -> Result<Shot> {
     let marks = problem.marks();
     let mut x = problem.start_values()?;
     // wide enough to even out the noise, short enough for a cubic to follow the second mode
-    let reach_s = 0.35 / pace_rad_s;
+    let reach_s = STATE_NEAR / pace_rad_s;
     let mut left: Vec<Vec<Vec<f64>>> = vec![vec![Vec::new(); marks]; problem.records.len()];
     for stretch in &stretches {
         let near = problem.records[stretch.record].state_near(stretch.rows.start, reach_s);

@@ -6,12 +6,14 @@
 //! ```
 //! On a short arc the distance of the centre hangs on the arc's sagitta alone. What pulls a centroid goes with its
 //! place, not with the frame, so frames beyond n_e say nothing new, and the residual alone does not show it: e is what
-//! a place pulls.
+//! a place pulls, for a large mark also by its shading, which is not the same wherever it hangs.
 
 use nalgebra::{Matrix3, Vector3};
 
 /// What a mark's place pulls its centroid, px, and the number of independent places on an arc.
 const PLACE_ERROR_PX: f64 = 0.05;
+/// The same of shading and highlights, as a share of the mark's radius.
+const SHADING_ERROR: f64 = 0.005;
 const INDEPENDENT_PLACES: f64 = 10.0;
 /// Points below which there is no arc.
 const FEWEST_POINTS: usize = 8;
@@ -30,8 +32,8 @@ pub struct Arc {
 }
 
 impl Arc {
-    /// Through the points of a path; `None` where they lie on no circle, or on one point.
-    pub fn of(points: &[[f64; 2]]) -> Option<Self> {
+    /// Through the path of a mark of this radius; `None` where its points lie on no circle, or on one point.
+    pub fn of(points: &[[f64; 2]], mark_radius_px: f64) -> Option<Self> {
         if points.len() < FEWEST_POINTS {
             return None;
         }
@@ -66,7 +68,8 @@ impl Arc {
             local.iter().map(|p| ((p[0] - state[0]).hypot(p[1] - state[1]) - state[2]).powi(2)).sum::<f64>() / n;
         let residual_px = scale * squares.sqrt();
         let covariance = (normal / n).try_inverse()?;
-        let variance = (residual_px.powi(2) + PLACE_ERROR_PX.powi(2)) / INDEPENDENT_PLACES;
+        let place_px2 = PLACE_ERROR_PX.powi(2) + (SHADING_ERROR * mark_radius_px).powi(2);
+        let variance = (residual_px.powi(2) + place_px2) / INDEPENDENT_PLACES;
         let sd = |k: usize| (variance * covariance[(k, k)]).sqrt();
         let arc = Self {
             centre_px: [mean[0] + scale * state[0], mean[1] + scale * state[1]],
@@ -75,6 +78,28 @@ impl Arc {
             residual_px,
         };
         (arc.centre_px.iter().chain(&arc.sd_px).all(|v| v.is_finite()) && arc.radius_px > 0.0).then_some(arc)
+    }
+}
+
+/// Standard deviations of the centre within which a point is the centre, and what a mark there may be off, px and as a
+/// share of the radius.
+const CENTRE_DEVIATIONS: f64 = 4.0;
+const CENTRE_OFF_PX: f64 = 4.0;
+const CENTRE_OFF: f64 = 0.03;
+
+impl Arc {
+    /// How far a point lies from the centre, as a share of how far it may where a mark shows the hinge.
+    pub fn off_centre(&self, place_px: [f64; 2]) -> f64 {
+        let part = |axis: usize| {
+            let limit = CENTRE_DEVIATIONS * self.sd_px[axis] + CENTRE_OFF_PX + CENTRE_OFF * self.radius_px;
+            (place_px[axis] - self.centre_px[axis]).abs() / limit
+        };
+        part(0).max(part(1))
+    }
+
+    /// A mark there may show the hinge.
+    pub fn is_near(&self, place_px: [f64; 2]) -> bool {
+        self.off_centre(place_px) < 1.0
     }
 }
 
@@ -108,15 +133,16 @@ mod tests {
     #[test]
     fn the_centre_of_an_arc_outside_the_picture_is_found_within_its_deviation() {
         for amplitude_rad in [0.08, 0.2, 0.5] {
-            let arc = Arc::of(&swing(amplitude_rad, 0.05)).unwrap();
+            let arc = Arc::of(&swing(amplitude_rad, 0.05), 8.0).unwrap();
             let off = [arc.centre_px[0] - 300.0, arc.centre_px[1] + 80.0];
             assert!(off[0].abs() < 3.0 * arc.sd_px[0] && off[1].abs() < 3.0 * arc.sd_px[1], "{arc:?}");
         }
-        assert!(Arc::of(&swing(0.5, 0.05)).unwrap().sd_px[1] < Arc::of(&swing(0.1, 0.05)).unwrap().sd_px[1]);
+        let sd_px = |amplitude_rad, radius_px| Arc::of(&swing(amplitude_rad, 0.05), radius_px).unwrap().sd_px[1];
+        assert!(sd_px(0.5, 8.0) < sd_px(0.1, 8.0) && sd_px(0.5, 8.0) < sd_px(0.5, 40.0));
     }
 
     #[test]
     fn what_stands_still_has_no_arc() {
-        assert!(Arc::of(&vec![[3.0, 4.0]; 50]).is_none());
+        assert!(Arc::of(&vec![[3.0, 4.0]; 50], 8.0).is_none());
     }
 }

@@ -11,20 +11,24 @@ const MOST_OFF_ARC: f64 = 0.04;
 const MOST_UNLIKE: f64 = 1.0;
 /// What a thing of the marks' look that swings, and is none, takes from it.
 const STRAY: f64 = 0.2;
+/// What a path that is hardly an arc takes from it, against one that is an arc exactly: of two looks that show as many
+/// marks, the clearer one counts.
+const BLURRED_ARC: f64 = 0.2;
 /// Change of the distance from a still thing, over the motion, up to which it is the hinge though the arc's centre is
 /// elsewhere: the plane of the swing is turned, and the arc an ellipse. And how far it may lie off the line towards
 /// that centre, rad.
 const HINGE_STRETCH: f64 = 0.1;
 const HINGE_OFF_LINE_RAD: f64 = 0.1;
+/// How many times as large as all of its parts together a thing is that they are parts of, and how far from its middle
+/// they lie, in its radii.
+const PARTS_TIMES: f64 = 2.0;
+const PARTS_REACH: f64 = 1.1;
+/// By how much of it their travel differs from its own at most.
+const PARTS_TRAVEL: f64 = 0.2;
 /// Share of the frames in which a mark is seen, at least.
 const LEAST_PRESENCE: f64 = 0.4;
 /// How much farther a lower mark swings than an upper one, from which on that decides which is which.
 const CLEARLY_FARTHER: f64 = 1.25;
-/// Standard deviations of the arc's centre within which a still thing is the hinge, and what a hinge may be off, px
-/// and as a share of the radius.
-const HINGE_DEVIATIONS: f64 = 4.0;
-const HINGE_OFF_PX: f64 = 4.0;
-const HINGE_OFF: f64 = 0.03;
 
 /// The marks, from the hinge down.
 #[derive(Debug, Clone, PartialEq)]
@@ -38,16 +42,27 @@ pub struct Chain {
 /// The best chain that any look shows, filled up with what other looks add to it.
 pub fn longest(things: &[Thing], names: &[String]) -> Option<Chain> {
     let hued = |hue: u8| names[usize::from(hue)].starts_with('#');
+    // what is darker or lighter on a thing of a hue, or of its own kind, is printed on it or shines on it
+    let bears =
+        |bearer: u8, hue: u8| !hued(hue) && (hued(bearer) || names[usize::from(bearer)] == names[usize::from(hue)]);
     let best = (0..names.len() as u8)
-        .filter_map(|hue| of_look(things, &|t| t.hue == hue, hued(hue)))
+        .filter_map(|hue| {
+            let is_part = |marks: &[usize]| are_parts(things, marks, &|bearer| bears(bearer.hue, hue));
+            of_look(things, &|t| t.hue == hue, hued(hue), &is_part)
+        })
         .max_by(|a, b| a.worth.total_cmp(&b.worth))?;
     // marks of several colours: what swings with the chain and is like its marks
-    let coloured = of_look(things, &|t| hued(t.hue), true);
+    let coloured = of_look(things, &|t| hued(t.hue), true, &|_| false);
     let wins = |c: &Chain| (c.marks.len(), c.worth) > (best.marks.len(), best.worth);
     Some(coloured.filter(wins).unwrap_or(best))
 }
 
-fn of_look(things: &[Thing], belongs: &dyn Fn(&Thing) -> bool, hued: bool) -> Option<Chain> {
+fn of_look(
+    things: &[Thing],
+    belongs: &dyn Fn(&Thing) -> bool,
+    hued: bool,
+    is_part: &dyn Fn(&[usize]) -> bool,
+) -> Option<Chain> {
     let mut movers: Vec<usize> = (0..things.len())
         .filter(|i| belongs(&things[*i]) && things[*i].moves && things[*i].presence > LEAST_PRESENCE)
         .collect();
@@ -58,10 +73,11 @@ fn of_look(things: &[Thing], belongs: &dyn Fn(&Thing) -> bool, hued: bool) -> Op
     let sets = movers.iter().filter_map(|first| {
         let mut marks = rigid_set(things, &movers, *first);
         order(things, &mut marks);
-        hangs(things, &marks).map(|arc| (marks, arc))
+        hangs(things, &marks).filter(|_| !is_part(&marks)).map(|arc| (marks, arc))
     });
     let (mut marks, arc) = sets.max_by(|a, b| value(things, &a.0).total_cmp(&value(things, &b.0)))?;
     let mut hinge_marked = false;
+    let blurred = arc.map_or(0.0, |arc| arc.residual_px / (MOST_OFF_ARC * things[marks[0]].travel_px));
     if let Some(arc) = arc
         && let Some(hinge) = hinge(things, belongs, &arc, marks[0])
     {
@@ -70,18 +86,44 @@ fn of_look(things: &[Thing], belongs: &dyn Fn(&Thing) -> bool, hued: bool) -> Op
     }
     // a hue tells a mark from what is printed on it or shines on it
     let strays = crowd.saturating_sub(marks.len()) as f64;
-    let worth = value(things, &marks) + if hued { 0.5 } else { 0.0 } - STRAY * strays;
+    let worth = value(things, &marks) + if hued { 0.5 } else { 0.0 } - STRAY * strays - BLURRED_ARC * blurred;
     Some(Chain { marks, arc, hinge_marked, worth })
+}
+
+/// All of them lie within the outline of one thing that is much larger, and move as it does: they are its shades, or its
+/// edges.
+fn are_parts(things: &[Thing], marks: &[usize], bears: &dyn Fn(&Thing) -> bool) -> bool {
+    let area_px2: f64 = marks.iter().map(|i| things[*i].area_px2).sum();
+    let holds = |whole: &Thing, i: &usize| {
+        let part = &things[*i];
+        let lies_within = whole.distance_px(part).is_some_and(|d| d < PARTS_REACH * radius_px(whole));
+        let moves_alike = (part.travel_px / whole.travel_px - 1.0).abs() < PARTS_TRAVEL;
+        lies_within && moves_alike && part.stretch(whole) < MOST_STRETCH
+    };
+    let mut wholes = things.iter().filter(|t| t.moves && t.presence > LEAST_PRESENCE && bears(t));
+    wholes.any(|whole| whole.area_px2 > PARTS_TIMES * area_px2 && marks.iter().all(|i| holds(whole, i)))
+}
+
+fn radius_px(thing: &Thing) -> f64 {
+    (thing.area_px2 / std::f64::consts::PI).sqrt()
 }
 
 /// The circle on which the first mark swings; `Some(None)` where its path is so flat that it shows no centre. What
 /// hangs from a fixed point has no other path.
+///
+/// A still thing that something covers from time to time seems to move as well, by less than its own radius and about
+/// no clear centre, or about a point within itself. Two such things do not keep their distance; one alone is no mark.
 fn hangs(things: &[Thing], marks: &[usize]) -> Option<Option<Arc>> {
     let first = &things[*marks.first()?];
     let path: Vec<[f64; 2]> = first.path.iter().flatten().copied().collect();
     let most_px = MOST_OFF_ARC * first.travel_px;
-    match Arc::of(&path) {
-        Some(arc) => (arc.residual_px < most_px).then_some(Some(arc)),
+    let own_radius_px = radius_px(first);
+    let is_no_cover = marks.len() > 1 || first.travel_px > own_radius_px;
+    match Arc::of(&path, own_radius_px) {
+        Some(arc) => {
+            let shows_centre = arc.sd_px[0].max(arc.sd_px[1]) < arc.radius_px && arc.radius_px > own_radius_px;
+            (arc.residual_px < most_px && (is_no_cover || shows_centre)).then_some(Some(arc))
+        }
         None => (marks.len() > 1 && off_line_px(&path) < most_px).then_some(None),
     }
 }
@@ -153,12 +195,7 @@ fn order(things: &[Thing], marks: &mut [usize]) {
 
 /// The still thing at the centre of the first mark's arc.
 fn hinge(things: &[Thing], belongs: &dyn Fn(&Thing) -> bool, arc: &Arc, first: usize) -> Option<usize> {
-    let off = |t: &Thing| {
-        let place = t.place_px();
-        let limit = |axis: usize| HINGE_DEVIATIONS * arc.sd_px[axis] + HINGE_OFF_PX + HINGE_OFF * arc.radius_px;
-        let parts = [0, 1].map(|axis| (place[axis] - arc.centre_px[axis]).abs() / limit(axis));
-        parts[0].max(parts[1])
-    };
+    let off = |t: &Thing| arc.off_centre(t.place_px());
     let like = |t: &Thing| (t.area_px2 / things[first].area_px2).ln().abs() < MOST_UNLIKE;
     let still = |t: &Thing| t.travel_px < 0.1 * things[first].travel_px;
     let stays = |t: &Thing| t.stretch(&things[first]) < MOST_STRETCH;
@@ -220,6 +257,40 @@ mod tests {
             thing(0, |t| [810.0 + jumps(t).0, 520.0 + jumps(t).1], true),
         ];
         assert!(longest(&things, &["#c0b090".to_owned()]).is_none());
+    }
+
+    #[test]
+    fn a_single_thing_that_shifts_within_its_own_outline_about_no_clear_centre_is_no_mark() {
+        let names = ["dark".to_owned()];
+        let rocks = |size_px: f64| {
+            let path = move |t: f64| [90.0 + size_px * (3.0 * t).sin(), 190.0 + 0.003 * (9.0 * t).cos()];
+            longest(&[thing(0, path, true)], &names)
+        };
+        // an area of 300 px² has a radius of 9.8 px
+        assert!(rocks(1.0).is_none());
+        let swings = |t: f64| {
+            let theta: f64 = 0.2 * (3.0 * t).sin();
+            [400.0 + 40.0 * theta.sin(), 50.0 + 40.0 * theta.cos()]
+        };
+        assert!(longest(&[thing(0, swings, true)], &names).is_some());
+    }
+
+    #[test]
+    fn spots_at_the_edge_of_a_swinging_ball_are_parts_of_it() {
+        let beside = |dx: f64, dy: f64| move |t: f64| [joint(t)[0] + dx, joint(t)[1] + dy];
+        let mut things = vec![Thing { area_px2: 2900.0, ..thing(0, joint, true) }];
+        for (dx, dy) in [(26.0, 0.0), (-26.0, 0.0), (0.0, 26.0), (0.0, -26.0)] {
+            things.push(Thing { area_px2: 200.0, ..thing(1, beside(dx, dy), true) });
+        }
+        let names = |ball: &str| [ball.to_owned(), "dark".to_owned()];
+        assert_eq!(longest(&things, &names("dark")).unwrap().marks, [0]);
+        assert_eq!(longest(&things, &names("#20a040")).unwrap().marks, [0]);
+        // a wall behind them does not move as they do
+        things[0] = Thing { area_px2: 2900.0, ..thing(0, |t| [joint(0.3 * t)[0], 240.0], true) };
+        assert_eq!(longest(&things, &names("#d0c0a0")).unwrap().marks.len(), 4);
+        // dark marks on a light plate are marks
+        things[0] = Thing { area_px2: 2900.0, ..thing(0, joint, true) };
+        assert_eq!(longest(&things, &names("light")).unwrap().marks.len(), 4);
     }
 
     #[test]

@@ -113,7 +113,13 @@ fn pivot(text: &mut String, finding: &Finding) {
     let inside = (0.0..width as f64).contains(&x) && (0.0..height as f64).contains(&y);
     let beside = if inside { "" } else { ", outside the picture" };
     let what = format!("centre of the first arc{beside}: ± {sx:.1}, ± {sy:.1} px (standard deviation)");
-    if finding.hinge_marked {
+    if finding.hinge_marked && !arc.is_near(finding.marks[0].thing.place_px()) {
+        let [hinge_x, hinge_y] = finding.marks[0].thing.place_px();
+        let _ = writeln!(
+            text,
+            "# the first mark is the hinge, at {hinge_x:.1}, {hinge_y:.1}, but the arc of the next one has its centre at {x:.1}, {y:.1}: the plane of the swing is turned out of the picture"
+        );
+    } else if finding.hinge_marked {
         let _ = writeln!(text, "# the first mark is the hinge: at {x:.1}, {y:.1} lies the {what}");
     } else if finding.states_pivot() {
         let _ = writeln!(text, "pivot_px = [{x:.2}, {y:.2}]    # {what}");

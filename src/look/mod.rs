@@ -1,8 +1,9 @@
 //! A recording of which nothing is known → what moves, the marks in order, the pivot, the links.
 //!
-//! Every hue that moves, and dark and light spots, are looked for at once. Of what lasts and swings, the things that
-//! keep their distances form a chain; the look whose chain is longest is that of the marks. The hinge is a still thing
-//! of their look at the centre of the first arc, or else that centre itself.
+//! Every hue that moves, and dark and light spots, are looked for at once, roughly, in some hundred frames in a row. Of
+//! what lasts and swings, the things that keep their distances form a chain; the look whose chain is longest is that of
+//! the marks. Only this look is then measured in every frame, and the chain with it. The hinge is a still thing of the
+//! marks' look at the centre of the first arc, or else that centre itself.
 
 mod arc;
 mod chain;
@@ -29,6 +30,8 @@ const MOST_HUES: usize = 6;
 const LEAST_WEIGHT: f64 = 2e-3;
 /// Numbers of marks for which threshold and scale are chosen: how many there are is not known yet.
 const COUNTS: [usize; 3] = [1, 2, 3];
+/// Stretches of the recording in which a chain is sought, one after the other.
+const STRETCHES: usize = 3;
 /// Marks that are looked for at most.
 pub const MOST_MARKS: usize = 12;
 
@@ -85,12 +88,51 @@ pub fn look(path: &Path, options: &Options, folder: &Path, progress: &dyn Progre
     let options = Options { marks: Vec::new(), ..options.clone() };
     let mut session = Session::open(path, &options, folder)?;
     let looks = looks(session.album())?;
-    let frames = session.gather(looks.iter().map(|l| l.0.clone()).collect(), progress)?;
+    let (hues, names): (Vec<Hue>, Vec<String>) = looks.iter().cloned().unzip();
+    let (mut seen, mut from_s, mut rest) = (Vec::new(), None, Vec::new());
+    for stretch in 0..STRETCHES {
+        let frames = session.glance(&hues, from_s, progress)?;
+        if stretch == 0 {
+            rest = further_stretches(&session, &frames);
+        }
+        let all = things(&frames);
+        if let Some(chain) = chain::longest(&all, &names) {
+            let mut worn: Vec<u8> = chain.marks.iter().map(|i| all[*i].hue).collect();
+            worn.sort_unstable();
+            worn.dedup();
+            let worn = worn.into_iter().map(|hue| looks[usize::from(hue)].clone()).collect();
+            if let Some(finding) = measured(&mut session, worn, progress)? {
+                return Ok(finding);
+            }
+        }
+        seen.push((frames.len(), all));
+        match rest.pop() {
+            Some(begin_s) => from_s = Some(begin_s),
+            None => break,
+        }
+    }
+    Err(nothing_swings(path, &seen, &names, session.stream().stated_frames))
+}
+
+/// Where the stretches after the first begin, the last first.
+fn further_stretches(session: &Session<'_>, first: &[FrameBlobs]) -> Vec<f64> {
+    let (Some(begin), Some(end)) = (first.first(), first.last()) else { return Vec::new() };
+    let length_s = end.t_s - begin.t_s;
+    let Some([_, last_s]) = session.span_s(begin.t_s) else { return Vec::new() };
+    // what is left is looked at in even steps
+    let room_s = last_s - begin.t_s - length_s;
+    if room_s < 0.1 * length_s {
+        return Vec::new();
+    }
+    (1..STRETCHES).rev().map(|k| begin.t_s + room_s * k as f64 / (STRETCHES - 1) as f64).collect()
+}
+
+/// The chain that the things of these looks form throughout the recording, measured exactly.
+fn measured(session: &mut Session<'_>, looks: Vec<(Hue, String)>, progress: &dyn Progress) -> Result<Option<Finding>> {
+    let (hues, names): (Vec<Hue>, Vec<String>) = looks.into_iter().unzip();
+    let frames = session.gather(hues, progress)?;
     let all = things(&frames);
-    let names: Vec<String> = looks.into_iter().map(|(_, name)| name).collect();
-    let Some(chain) = chain::longest(&all, &names) else {
-        return Err(nothing_swings(path, &all, &names, &frames));
-    };
+    let Some(chain) = chain::longest(&all, &names) else { return Ok(None) };
     let t_s: Vec<f64> = frames.iter().map(|f| f.t_s).collect();
     let marks: Vec<Mark> = chain
         .marks
@@ -104,7 +146,7 @@ pub fn look(path: &Path, options: &Options, folder: &Path, progress: &dyn Progre
     };
     let still = all.iter().filter(|t| !t.moves && marks.iter().any(|m| m.thing.hue == t.hue));
     let still = still.filter(|t| marks.iter().all(|m| beside(t, m)));
-    Ok(Finding {
+    Ok(Some(Finding {
         frequency_hz: marks.get(swinging).and_then(|m| turns_per_second(&m.thing, &t_s)),
         still: still.cloned().collect(),
         links_px,
@@ -115,7 +157,7 @@ pub fn look(path: &Path, options: &Options, folder: &Path, progress: &dyn Progre
         stream: session.stream().clone(),
         camera: session.camera(),
         background: background(session.album()),
-    })
+    }))
 }
 
 /// What is worth following: every hue that moves, dark spots, light spots; each with its name.
@@ -159,19 +201,24 @@ fn is_alike(a: &Trial, b: &Trial) -> bool {
         && sizes.is_none_or(|(a, b)| (a / b).ln().abs() < 0.4)
 }
 
-fn nothing_swings(path: &Path, all: &[Thing], names: &[String], frames: &[FrameBlobs]) -> Error {
-    let moving = all.iter().filter(|t| t.moves).count();
-    let still = all.len() - moving;
+/// `seen`: frames and things of every stretch. The stretch with most of them speaks.
+fn nothing_swings(path: &Path, seen: &[(usize, Vec<Thing>)], names: &[String], stated_frames: Option<u64>) -> Error {
+    // stretches may overlap
+    let most = stated_frames.map_or(usize::MAX, |frames| frames as usize);
+    let frames = seen.iter().map(|(frames, _)| frames).sum::<usize>().min(most);
+    let count = |all: &[Thing]| (all.iter().filter(|t| t.moves).count(), all.len());
+    let (moving, lasting) = seen.iter().map(|(_, all)| count(all)).max().unwrap_or_default();
+    let still = lasting - moving;
     let found = if names.is_empty() {
         "nothing coloured, dark or light stands out from its surroundings".to_owned()
     } else {
         format!(
             "of {} lasting spots ({}) {moving} move and {still} stand still, but none swings on an arc like a mark",
-            all.len(),
+            lasting,
             names.join(", ")
         )
     };
-    Error::NothingSwings { path: path.to_owned(), frames: frames.len(), found }
+    Error::NothingSwings { path: path.to_owned(), frames, found }
 }
 
 /// Full turns a second of a thing's motion along its longer axis.

@@ -1,5 +1,6 @@
 //! A recording → tracks and angles, with everything a reader of the table should know beside it.
 
+mod glance;
 mod survey;
 mod view;
 
@@ -134,6 +135,8 @@ pub struct Session<'a> {
     siting: Option<Siting>,
     slots: Vec<MarkSlot>,
     background: Option<Background>,
+    /// As the pictures looked at beforehand show it.
+    first_camera: Camera,
     camera: Camera,
     stamps_s: Vec<f64>,
 }
@@ -167,6 +170,7 @@ impl<'a> Session<'a> {
             siting,
             slots,
             background,
+            first_camera: camera,
             camera,
             stamps_s,
         })
@@ -209,11 +213,16 @@ impl<'a> Session<'a> {
         self.conclude(decoded, tracker)
     }
 
-    /// Everything of these hues in every frame.
+    /// Everything of these hues in every frame. May be called again.
     ///
     /// # Errors
     /// As [`measure`].
     pub fn gather(&mut self, hues: Vec<Hue>, progress: &dyn Progress) -> Result<Vec<FrameBlobs>> {
+        if !self.stamps_s.is_empty() {
+            self.recording = Recording::open(&self.path, &self.options.still_times)?;
+            self.stamps_s.clear();
+            self.camera = self.first_camera;
+        }
         let detector = Detector::new(hues);
         let mut frames = Vec::new();
         self.each_frame(&detector, progress, &mut |frame| frames.push(frame))?;
@@ -227,16 +236,8 @@ impl<'a> Session<'a> {
         progress: &dyn Progress,
         sink: &mut dyn FnMut(FrameBlobs),
     ) -> Result<Decoded> {
-        let rig = &self.options.rig;
         progress.begin("tracking", self.stream.stated_frames);
-        let view = View {
-            orientation: self.stream.orientation,
-            size: self.stream.stored_size_px,
-            binary: self.options.binary_centroid,
-            area: &self.area,
-            background: self.background.as_ref(),
-            span_s: [rig.from_s.unwrap_or(f64::NEG_INFINITY), rig.until_s.unwrap_or(f64::INFINITY)],
-        };
+        let view = view(&self.stream, self.options, &self.area, self.background.as_ref());
         let mut spread = DamageSpread::new(self.stream.delay_frames);
         let (stamps_s, camera) = (&mut self.stamps_s, &mut self.camera);
         let mut take = |frame: Outcome<Seen>| {
@@ -258,6 +259,10 @@ impl<'a> Session<'a> {
             })?;
         spread.finish().for_each(&mut take);
         Ok(decoded)
+    }
+
+    fn view(&self) -> View<'_> {
+        view(&self.stream, self.options, &self.area, self.background.as_ref())
     }
 
     fn conclude(&mut self, decoded: Decoded, tracker: Tracker) -> Result<Measurement> {
@@ -307,6 +312,19 @@ impl Camera {
         let n = frames.saturating_sub(self.lost_frames).max(1);
         self.patches /= n;
         self.sd_px = (self.sd_px / n as f64).sqrt();
+    }
+}
+
+fn view<'a>(stream: &StreamInfo, options: &Options, area: &'a Area, background: Option<&'a Background>) -> View<'a> {
+    let rig = &options.rig;
+    View {
+        orientation: stream.orientation,
+        size: stream.stored_size_px,
+        binary: options.binary_centroid,
+        glance: false,
+        area,
+        background,
+        span_s: [rig.from_s.unwrap_or(f64::NEG_INFINITY), rig.until_s.unwrap_or(f64::INFINITY)],
     }
 }
 

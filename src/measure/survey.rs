@@ -71,7 +71,7 @@ pub fn camera(pictures: &[OwnedPicture], options: &Options, stream: &StreamInfo)
         // where some picture does not show the background well, no frame is risked for it
         Steadying::WhereNeeded => {
             let moves = greatest_px > CAMERA_MOVES_PX && agreed.len() >= FEWEST_PICTURES;
-            !points_px.is_empty() || (moves && !silent)
+            !silent && (!points_px.is_empty() || moves)
         }
     };
     background.keep_steady(&agreed);

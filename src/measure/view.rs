@@ -21,6 +21,8 @@ pub struct View<'a> {
     pub orientation: Orientation,
     pub size: (usize, usize),
     pub binary: bool,
+    /// Rough places are enough.
+    pub glance: bool,
     pub area: &'a Area,
     pub background: Option<&'a Background>,
     pub span_s: [f64; 2],
@@ -34,7 +36,8 @@ impl View<'_> {
         if !frame.damaged && !outside {
             seen.camera = self.background.and_then(|b| b.locate(&frame.picture));
             if self.background.is_none() || seen.camera.is_some() {
-                let mut blobs = detector.detect(&frame.picture)?;
+                let mut blobs =
+                    if self.glance { detector.glance(&frame.picture) } else { detector.detect(&frame.picture) }?;
                 if let Some(camera) = seen.camera {
                     blobs.iter_mut().for_each(|b| undo(b, &camera));
                 }

@@ -6,7 +6,7 @@ use super::effects::outside::{NodalForces, SupportMotion};
 use super::effects::{Effect, effects_of};
 use super::observe::links_from_chords;
 use super::shapes::Shapes;
-use super::{Chain, Hinge, Motion, Parameter, Partials};
+use super::{Chain, Hinge, Motion, Parameter, Partials, Work};
 use crate::error::{Error, Result};
 use crate::experiment::Experiment;
 
@@ -27,6 +27,7 @@ pub struct ForwardModel {
     shapes: Option<Shapes>,
     /// τ, where the hinge is dry.
     friction_n_m: Option<f64>,
+    work: Work,
 }
 
 impl ForwardModel {
@@ -50,7 +51,7 @@ impl ForwardModel {
         let effects = effects_of(model, mark_length_m);
         let hidden = effects.iter().map(|e| e.hidden(&chain)).sum();
         let friction_n_m = model.effects.hinge_coulomb;
-        Ok(Self { chain, gravity_m_s2, effects, hidden, shapes, friction_n_m })
+        Ok(Self { chain, gravity_m_s2, effects, hidden, shapes, friction_n_m, work: Work::default() })
     }
 
     /// The same with forces on the lower ends of the links.
@@ -64,6 +65,18 @@ impl ForwardModel {
     pub fn link_by_link(mut self) -> Self {
         self.shapes = None;
         self
+    }
+
+    /// The same, its integrations counted with others'.
+    #[must_use]
+    pub fn counted_by(mut self, work: &Work) -> Self {
+        self.work = work.clone();
+        self
+    }
+
+    /// What its integrations have cost.
+    pub fn work(&self) -> &Work {
+        &self.work
     }
 
     /// The links.
@@ -184,7 +197,8 @@ impl ForwardModel {
     pub fn sensitivity(&self, parameter: Parameter, motion: &Motion, partials: &Partials, q: &mut [f64]) {
         q.fill(0.0);
         if self.chain.value(parameter).is_some() {
-            let sideways_m_s2 = self.value(Parameter::SideForce).unwrap_or(0.0) - motion.pivot_m_s2;
+            let stated: f64 = self.effects.iter().map(|e| e.sideways_m_s2(motion)).sum();
+            let sideways_m_s2 = self.value(Parameter::SideForce).unwrap_or(0.0) + stated - motion.pivot_m_s2;
             self.chain.add_sensitivity(parameter, [sideways_m_s2, self.gravity_m_s2], motion, q);
         }
         self.effects.iter().for_each(|e| e.add_sensitivity(parameter, &self.chain, motion, q));

@@ -60,21 +60,28 @@ pub(super) fn integrate(
     visit: &mut dyn FnMut(Step),
 ) -> Result<()> {
     let mut run = Run::new(model, place, directions, accuracy)?;
+    let columns = run.slopes.as_ref().map_or(0, |(theta, _)| theta.ncols());
     let mut steps = 0;
-    while run.place.t_s < until_s {
+    let ended = loop {
+        if run.place.t_s >= until_s {
+            break Ok(());
+        }
         steps += 1;
         if steps > accuracy.most_steps {
             let detail = format!("more than {} steps up to t = {:.4} s", accuracy.most_steps, run.place.t_s);
-            return Err(Error::Simulation { detail });
+            break Err(Error::Simulation { detail });
         }
-        if let Some(step) = run.advance(until_s)? {
-            visit(match model.shapes() {
+        match run.advance(until_s) {
+            Ok(Some(step)) => visit(match model.shapes() {
                 Some(shapes) => step.of_links(shapes),
                 None => step,
-            });
+            }),
+            Ok(None) => {}
+            Err(error) => break Err(error),
         }
-    }
-    Ok(())
+    };
+    model.work().add(steps, model.rates(), columns);
+    ended
 }
 
 struct Run<'a> {

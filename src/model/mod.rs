@@ -6,6 +6,7 @@
 //! | [`motion`] | one instant of the motion |
 //! | [`parameter`] | the numbers a fit may change |
 //! | [`effects`] | every further torque, one law each |
+//! | [`expression`] | formulas of stated laws, with their derivatives |
 //! | [`forward`] | the equations of motion, and their derivatives |
 //! | [`shapes`] | the few shapes of a strip of many links |
 //! | [`balance`] | the equations along the coordinates that are integrated |
@@ -14,6 +15,7 @@
 //! | [`step`] | one step of it |
 //! | [`integrate`] | step after step, from reversal to reversal |
 //! | [`trajectory`] | the motion at every instant, with its sensitivities |
+//! | [`work`] | what integrations have cost |
 //! | [`observe`] | the angles between marks |
 //! | [`camera`] | what a camera makes of them |
 //! | [`modes`] | small vibrations: frequencies, damping ratios, shapes |
@@ -26,6 +28,7 @@ pub mod chain;
 pub mod collocation;
 pub mod effects;
 mod elimination;
+pub mod expression;
 pub mod forward;
 pub mod integrate;
 pub mod modes;
@@ -40,13 +43,16 @@ pub mod strip;
 #[cfg(test)]
 mod tests;
 pub mod trajectory;
+pub mod work;
 
 pub use camera::Camera;
 pub use chain::Chain;
 pub use effects::Effect;
+pub use expression::Expression;
 pub use forward::ForwardModel;
 pub use integrate::Accuracy;
 pub use motion::{Hinge, Motion};
-pub use parameter::Parameter;
+pub use parameter::{LawCoefficient, Parameter};
 pub use partials::Partials;
 pub use trajectory::{State, Trajectory};
+pub use work::Work;

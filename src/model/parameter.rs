@@ -1,6 +1,34 @@
 //! The numbers of a model that a fit may change.
 
+use std::collections::BTreeSet;
 use std::fmt;
+use std::sync::{Mutex, PoisonError};
+
+/// A coefficient of a law that a file states by a formula.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub struct LawCoefficient {
+    id: &'static str,
+    unit: &'static str,
+}
+
+impl LawCoefficient {
+    /// By the names of the law and the coefficient, which make its identifier `law.name`. Names and units are kept as long as the program runs, once each.
+    pub fn new(law: &str, name: &str, unit: &str) -> Self {
+        Self { id: kept(&format!("{law}.{name}")), unit: kept(unit) }
+    }
+}
+
+/// The text, kept as long as the program runs.
+fn kept(text: &str) -> &'static str {
+    static KEPT: Mutex<BTreeSet<&'static str>> = Mutex::new(BTreeSet::new());
+    let mut kept = KEPT.lock().unwrap_or_else(PoisonError::into_inner);
+    if let Some(known) = kept.get(text) {
+        return known;
+    }
+    let text: &'static str = Box::leak(text.to_owned().into_boxed_str());
+    kept.insert(text);
+    text
+}
 
 /// A coefficient of the equations of motion, or of the camera.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
@@ -57,6 +85,8 @@ pub enum Parameter {
     AngleGain,
     /// θ₂ is sampled later than θ₁.
     DifferentialLag,
+    /// Of a law that the file states.
+    Law(LawCoefficient),
 }
 
 impl Parameter {
@@ -89,6 +119,7 @@ impl Parameter {
             Self::CameraTilt => "camera_tilt",
             Self::AngleGain => "angle_gain",
             Self::DifferentialLag => "differential_lag",
+            Self::Law(coefficient) => coefficient.id,
         }
     }
 
@@ -110,6 +141,7 @@ impl Parameter {
             Self::SupportFrequency => "Hz",
             Self::TimeBase | Self::AngleGain => "1",
             Self::DroppedFrames | Self::DifferentialLag => "s",
+            Self::Law(coefficient) => coefficient.unit,
         }
     }
 
@@ -149,7 +181,8 @@ impl Parameter {
             | Self::DroppedFrames
             | Self::CameraTilt
             | Self::AngleGain
-            | Self::DifferentialLag => false,
+            | Self::DifferentialLag
+            | Self::Law(_) => false,
             Self::JointStiffness
             | Self::JointDamping
             | Self::BendingStiffness
@@ -169,7 +202,7 @@ impl Parameter {
         }
     }
 
-    /// Every parameter.
+    /// Every parameter but those of stated laws.
     pub const ALL: [Self; 26] = [
         Self::JointStiffness,
         Self::JointDamping,
@@ -199,7 +232,7 @@ impl Parameter {
         Self::DifferentialLag,
     ];
 
-    /// The parameter of a name in files.
+    /// The parameter of a name in files, but those of stated laws.
     pub fn from_id(id: &str) -> Option<Self> {
         Self::ALL.into_iter().find(|p| p.id() == id)
     }

@@ -4,7 +4,7 @@ use nalgebra::DMatrix;
 
 use super::integrate::Directions;
 use super::*;
-use crate::experiment::{Effects, Experiment, Hysteresis, Inertia, Model, Rig, SupportMotion};
+use crate::experiment::{Effects, Experiment, Hysteresis, Inertia, Law, Model, Rig, SupportMotion};
 
 fn experiment(k: f64, c: f64, effects: Effects) -> Experiment {
     let model = Model { k_eq_n_m_per_rad: k, c_eq_n_m_s_per_rad: c, effects, ..Model::default() };
@@ -28,8 +28,26 @@ fn everything() -> ForwardModel {
         ..Effects::default()
     };
     let mut experiment = experiment(2e-4, 1e-6, effects);
+    experiment.model.law = stated_laws();
     experiment.specimen.link_lengths_m = vec![0.06, 0.09, 0.05];
     ForwardModel::of(&experiment).unwrap()
+}
+
+/// A law at every place.
+fn stated_laws() -> Vec<Law> {
+    let of = |place: &str, formula: &str| {
+        let text = format!(
+            "[[model.law]]\nname = \"{place}\"\nplace = \"{place}\"\ntorque_n_m = \"{formula}\"\nparameters.a = {{ start = 0.1 }}\n"
+        );
+        Experiment::parse(&text, std::path::Path::new("e.toml")).unwrap().model.law.remove(0)
+    };
+    vec![
+        of("hinge", "-1e-5 * a * rate * angle ^ 2 * exp(-t)"),
+        of("joint", "-1e-5 * a * (max(rate, 0) + sin(angle))"),
+        of("strip", "-a * wind ^ 3 * t"),
+        of("tip", "-1e-2 * a * abs(wind) * wind"),
+        of("support", "a * cos(3 * t)"),
+    ]
 }
 
 fn some_motion(model: &ForwardModel) -> Motion {

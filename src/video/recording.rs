@@ -110,6 +110,32 @@ impl Recording {
         }
     }
 
+    /// Shows every frame from `from_s` on, in order, until `see` breaks off; from the first one where there is no time.
+    ///
+    /// # Errors
+    /// As [`Recording::sample`].
+    pub fn stretch(
+        &self,
+        from_s: Option<f64>,
+        threads: usize,
+        see: &mut dyn FnMut(&Frame<'_>) -> ControlFlow<()>,
+    ) -> Result<()> {
+        match self {
+            Self::Container(container) => stretch_of_container(container.path(), from_s, threads, see),
+            Self::Stills(stills) => {
+                let late_enough = |t_s: &f64| from_s.is_none_or(|from_s| *t_s >= from_s);
+                let mut flow = ControlFlow::Continue(());
+                for index in (0..stills.files().len()).filter(|i| late_enough(&stills.stamps_s()[*i])) {
+                    stills.show(index, &mut |frame| flow = see(frame));
+                    if flow.is_break() {
+                        break;
+                    }
+                }
+                Ok(())
+            }
+        }
+    }
+
     /// Shows the frame with this very time stamp; says whether there is one.
     ///
     /// # Errors
@@ -154,6 +180,29 @@ fn sample_container(path: &Path, count: usize, see: &mut dyn FnMut(&Frame<'_>)) 
             ControlFlow::Continue(())
         });
     }
+    Ok(())
+}
+
+fn stretch_of_container(
+    path: &Path,
+    from_s: Option<f64>,
+    threads: usize,
+    see: &mut dyn FnMut(&Frame<'_>) -> ControlFlow<()>,
+) -> Result<()> {
+    let mut container = Container::open(path)?;
+    let mut decoder =
+        DecoderRecipe::new(&container).decoder(threads).map_err(|e| decode::cannot_open(&container, &e))?;
+    // a file that cannot be sought in is decoded up to there
+    let sought = from_s.is_none_or(|from_s| container.seek(from_s).is_ok());
+    if !sought {
+        container = Container::open(path)?;
+    }
+    let _ = decoder.decode(&mut || container.next_packet().ok().flatten(), &mut |frame| {
+        if from_s.is_some_and(|from_s| frame.t_s < from_s) {
+            return ControlFlow::Continue(());
+        }
+        see(&frame)
+    });
     Ok(())
 }
 

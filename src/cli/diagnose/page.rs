@@ -57,17 +57,25 @@ fn proof(diagnosis: &Diagnosis, text: &mut String) {
     let Some(held_out) = &diagnosis.heldout else { return };
     let noise_rad = &held_out.noise_rad;
     let _ = writeln!(text, "\nFitted before {:.2} s, predicted from there on:", held_out.from_s);
-    let mut table = Table::new(["", "noise mrad", "base model leaves", "with the effects named"]);
+    let learnt = diagnosis.verdict.law.as_ref();
+    let last = if learnt.is_some() { "with the law that was learnt" } else { "" };
+    let mut table = Table::new(["", "noise mrad", "base model leaves", "with the effects named", last]);
     for link in 0..noise_rad.len() {
         let milli = |rad: f64| number(1e3 * rad, 3);
+        let of_law = learnt.map_or(String::new(), |_| milli(held_out.augmented_rmse_rad[link]));
         table.row([
             format!("θ{}", link + 1),
             milli(noise_rad[link]),
             milli(held_out.baseline_rmse_rad[link]),
-            milli(held_out.augmented_rmse_rad[link]),
+            milli(held_out.named_rmse_rad[link]),
+            of_law,
         ]);
     }
     text.push_str(&table.text());
+    if let Some(law) = learnt {
+        text.push_str("\nFor the experiment file:\n");
+        law.toml.lines().for_each(|line| _ = writeln!(text, "  {line}"));
+    }
 }
 
 /// What could have been seen, where nothing was.

@@ -11,11 +11,12 @@ use super::super::hypothesis::Hypothesis;
 use super::super::refit::{self, Refit, best_of_each_count, merged};
 use super::super::settings::SearchSettings;
 use super::beside::with_one_more;
+use crate::fit::search::PARTS;
 use crate::fit::whitening::RecordNoise;
 use crate::model::Parameter;
 
-/// Parts of the rows, one after the other; then all of them.
-const PARTS: [f64; 4] = [0.1, 0.2, 0.35, 0.6];
+/// A part that is less than this many times as long as the one before is left out.
+const MUCH_LONGER: f64 = 1.5;
 
 /// The hypotheses of some fits from the beginning of the recordings on, those of each number of coefficients that keep up with the best; and beside the best
 /// of each part other effects.
@@ -41,12 +42,30 @@ pub fn continued<'a>(context: &FitContext<'a>, fits: &[Refit<'a>], effects: &[Ef
             .into_iter()
             .flat_map(|best| with_one_more(&early, best, effects))
             .collect();
-        followed = foremost(merged(there, more, context.settings.certificate.agrees), settings)
-            .into_iter()
-            .map(|fit| (fit.hypothesis, fit.x))
-            .collect();
+        followed = to_follow(foremost(merged(there, more, context.settings.certificate.agrees), settings));
     }
     descended(context, &noise, followed, steps.most_steps)
+}
+
+/// The best of some fits of the first part of the recordings, followed to their end.
+pub fn carried<'a>(context: &FitContext<'a>, fits: Vec<Refit<'_>>, part: f64, noise: &[RecordNoise]) -> Vec<Refit<'a>> {
+    let (settings, steps) = (&context.settings.search, &context.settings.descent);
+    // of a longer part each step costs more
+    let few = |mut fits: Vec<Refit<'_>>| {
+        fits.sort_by(|a, b| a.chi2.total_cmp(&b.chi2));
+        fits.truncate(settings.carried);
+        to_follow(fits)
+    };
+    let mut followed = few(foremost(fits, settings));
+    for longer in PARTS.into_iter().filter(|longer| *longer > MUCH_LONGER * part) {
+        let records = first_part(context.records, longer);
+        followed = few(foremost(descended(&context.on(&records), noise, followed, steps.few_steps), settings));
+    }
+    descended(context, noise, followed, steps.most_steps)
+}
+
+fn to_follow(fits: Vec<Refit<'_>>) -> Vec<(Hypothesis, Vec<f64>)> {
+    fits.into_iter().map(|fit| (fit.hypothesis, fit.x)).collect()
 }
 
 /// A hypothesis by itself from the beginning of the recordings on.
@@ -55,7 +74,7 @@ pub fn continued_alone<'a>(context: &FitContext<'a>, fit: &Refit<'a>) -> Option<
 }
 
 /// How often the longest recording swings.
-fn swings(fits: &[Refit<'_>]) -> f64 {
+pub fn swings(fits: &[Refit<'_>]) -> f64 {
     let of = |fit: &Refit<'_>| {
         let (model, _) = fit.problem.model(0, &[]).ok()?;
         Some(fit.problem.longest_s() * model.pace_rad_s() / std::f64::consts::TAU)
@@ -86,7 +105,7 @@ fn descended<'b>(
 }
 
 /// A fit's hypothesis on the beginning, from its own parameters or from those that short stretches led to, whichever leads further.
-fn on_the_beginning<'b>(context: &FitContext<'_>, early: &FitContext<'b>, fit: &Refit<'_>) -> Option<Refit<'b>> {
+pub fn on_the_beginning<'b>(context: &FitContext<'_>, early: &FitContext<'b>, fit: &Refit<'_>) -> Option<Refit<'b>> {
     let fit = context.seen_to_start(fit);
     let stretches: Vec<(Parameter, f64)> = context.base.iter().copied().zip(context.begun.iter().copied()).collect();
     let from = |start: &[(Parameter, f64)]| early.refit(&fit.hypothesis, &fit, start);

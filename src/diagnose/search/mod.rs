@@ -8,9 +8,11 @@
 //! | [`rounds`] | the rounds, in order, and what each proposes |
 //! | [`proposal`] | what can be proposed, and how it is fitted |
 //! | [`beside`] | an effect beside a fit |
+//! | `early` | the search of the first part, where the whole is dear |
 //! | [`horizon`] | horizon continuation: fits that follow a recording from its beginning |
 
 pub mod beside;
+mod early;
 pub mod horizon;
 pub mod proposal;
 pub mod rounds;
@@ -39,11 +41,18 @@ use beside::Beside;
 use proposal::Proposal;
 use rounds::{Learns, Round, Tried};
 
+/// Proposals fitted together, between two looks at the budget.
+const TOGETHER: usize = 8;
+
 /// What a round came to.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize)]
 pub struct RoundEnd {
     /// Its name.
     pub round: &'static str,
+    /// The part of the recordings that was fitted.
+    pub part: f64,
+    /// The work done when it ended ([`crate::model::Work`]).
+    pub work: u64,
     /// Fits that it proposed.
     pub proposed: usize,
     /// Hypotheses that were new with it, or whose χ² it lowered by more than one.
@@ -61,12 +70,18 @@ pub struct Search<'a, 'p> {
     pub fits: Vec<Refit<'a>>,
     /// What each round came to.
     pub rounds: Vec<RoundEnd>,
-    /// Rounds that the budget did not allow.
+    /// Rounds that the budget cut short.
     pub undecided: Vec<&'static str>,
     /// What the effects promise at the base model.
     scores: Vec<Score>,
-    /// Proposals fitted.
-    spent: usize,
+    /// Whether the file is taken loosely.
+    is_loose: bool,
+    /// The work that had been done when it began.
+    begun_at: u64,
+    /// The work up to which the present phase may go.
+    until: u64,
+    /// The part of the recordings that its first rounds fitted.
+    part: f64,
     progress: &'p dyn Progress,
 }
 
@@ -83,6 +98,7 @@ impl<'a, 'p> Search<'a, 'p> {
         progress: &'p dyn Progress,
     ) -> Result<Self> {
         let context = base::context(prepared, experiment, taken, settings)?;
+        let begun_at = context.work.done();
         let fit = base::fitted(&context, prepared)?;
         let effects = base::candidates(&context);
         let scored = laws::cheap_to_score(&context, &effects);
@@ -95,17 +111,31 @@ impl<'a, 'p> Search<'a, 'p> {
             rounds: Vec::new(),
             undecided: Vec::new(),
             scores,
-            spent: 0,
+            is_loose: taken == Taken::Loosely,
+            begun_at,
+            until: begun_at,
+            part: 1.0,
             progress,
         })
     }
 
     /// Searches for what the base model lacks, the file taken at its word.
     pub fn run(&mut self) {
-        self.usual();
-        self.restarts();
+        self.begin();
         self.allow_errors_in_step();
+        self.allow(self.context.settings.search.shares.certified);
         self.certify();
+    }
+
+    /// Allows the search a share of the budget that was left when it began.
+    fn allow(&mut self, share: f64) {
+        self.until = self.up_to(share);
+    }
+
+    /// The work at which a share is spent of the budget that was left when the search began.
+    fn up_to(&self, share: f64) -> u64 {
+        let left = self.context.settings.search.budget.saturating_sub(self.begun_at);
+        self.begun_at + (share * left as f64) as u64
     }
 
     /// Searches again with the number of rods that the recordings of a strip ask for, where that does better.
@@ -124,9 +154,9 @@ impl<'a, 'p> Search<'a, 'p> {
 
     /// The same with what another search has spent before, or in vain.
     fn after(mut self, other: Self) -> Self {
-        self.spent += other.spent;
         self.rounds.splice(0..0, other.rounds);
-        self.undecided.extend(other.undecided);
+        let new = other.undecided.into_iter().filter(|name| !self.undecided.contains(name));
+        self.undecided.extend(new.collect::<Vec<_>>());
         self
     }
 
@@ -134,21 +164,25 @@ impl<'a, 'p> Search<'a, 'p> {
     /// effects. A strip's fits are too dear for it.
     #[must_use]
     pub fn doubted(self) -> Self {
+        let enough = self.up_to(self.context.settings.search.shares.certified);
         let loosened = || {
+            (self.context.work.done() < enough).then_some(())?;
             let has_slack = has_slack(self.context.experiment, self.context.marks());
-            (has_slack && self.leaves_more_than_noise()).then_some(())?;
+            (!self.is_loose && has_slack && self.leaves_more_than_noise()).then_some(())?;
             let (experiment, settings) = (self.context.experiment, self.context.settings);
             let mut loosened =
                 Self::of_base_model(self.prepared, experiment, Taken::Loosely, settings, self.progress).ok()?;
-            loosened.usual();
+            loosened.begin();
             Some(loosened)
         };
         let mut search = match loosened() {
             Some(loosened) => loosened.after(self),
             None => self,
         };
+        search.allow(search.context.settings.search.shares.further);
         search.further();
         search.allow_errors_in_step();
+        search.allow(1.0);
         search.certify();
         search
     }
@@ -165,12 +199,14 @@ impl<'a, 'p> Search<'a, 'p> {
 
     /// Singles and pairs, a strip as finely as it needs.
     fn usual(&mut self) {
+        self.allow(self.context.settings.search.shares.usual);
         Round::USUAL.into_iter().for_each(|round| self.round(round, &mut Tried::default()));
         self.refine_strip();
     }
 
     /// Restarts where the best fit leaves more than noise. A strip's fits are too dear for it.
     fn restarts(&mut self) {
+        self.allow(self.context.settings.search.shares.restarts);
         if !self.context.is_strip() && self.misfit().is_some_and(|misfit| misfit.unexplained) {
             Round::RESTARTS.into_iter().for_each(|round| self.round(round, &mut Tried::default()));
         }
@@ -188,7 +224,7 @@ impl<'a, 'p> Search<'a, 'p> {
     fn further(&mut self) {
         self.judge_by(&without_errors_in_step(&self.base().problem.noise), 0);
         let mut tried = Tried::default();
-        if self.leaves_more_than_noise() {
+        if self.part == 1.0 && self.leaves_more_than_noise() {
             self.round(Round::FromTheBeginning, &mut tried);
         }
         for turn in 0..self.context.settings.search.turns {
@@ -206,18 +242,35 @@ impl<'a, 'p> Search<'a, 'p> {
 
     /// One round: propose, fit, keep.
     fn round(&mut self, round: Round, tried: &mut Tried) {
-        if self.spent >= self.context.settings.search.budget {
-            self.undecided.push(round.name());
+        if self.is_spent() {
+            self.leave_undecided(round);
             return;
         }
         let before = least_chi2(&self.fits);
         let proposals = round.proposals(self, tried);
+        self.progress.begin(round.name(), Some(proposals.len() as u64));
+        let mut found = Vec::new();
+        let mut proposed = 0;
         let count = proposals.len();
-        self.progress.begin(round.name(), Some(count as u64));
-        let found = self.fitted(&proposals);
-        self.spent += count;
+        for some in proposals.chunks(TOGETHER) {
+            if self.is_spent() {
+                break;
+            }
+            found.extend(self.fitted(some));
+            proposed += some.len();
+        }
+        drop(proposals);
+        if proposed < count {
+            self.leave_undecided(round);
+        }
         let bettered = self.bettered_by(&found);
-        self.rounds.push(RoundEnd { round: round.name(), proposed: count, bettered });
+        self.rounds.push(RoundEnd {
+            round: round.name(),
+            part: self.part,
+            work: self.context.work.done(),
+            proposed,
+            bettered,
+        });
         self.keep(found);
         if round == Round::DearSingles {
             self.fits[1..].sort_by(|a, b| a.hypothesis.effects.cmp(&b.hypothesis.effects));
@@ -227,6 +280,17 @@ impl<'a, 'p> Search<'a, 'p> {
             Learns::IfLower if least_chi2(&self.fits) < before => self.learn_noise(),
             _ => {}
         }
+    }
+
+    fn leave_undecided(&mut self, round: Round) {
+        if !self.undecided.contains(&round.name()) {
+            self.undecided.push(round.name());
+        }
+    }
+
+    /// Whether the present phase has done the work it was allowed. It is asked between fits that run together, so that the answer does not depend on threads.
+    fn is_spent(&self) -> bool {
+        self.context.work.done() >= self.until
     }
 
     fn fitted(&self, proposals: &[Proposal<'_, 'a>]) -> Vec<Refit<'a>> {

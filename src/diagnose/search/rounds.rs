@@ -5,7 +5,7 @@ use rayon::prelude::*;
 use super::super::effect::{Cost, Effect};
 use super::super::hypothesis::Hypothesis;
 use super::super::laws;
-use super::super::misfit::{Misfit, leaves_more_than_noise};
+use super::super::misfit::{Misfit, leaves_more_than_noise, needs};
 use super::super::refit::{Refit, best, best_of_each_count, least, least_chi2};
 use super::super::screen::{Score, Screen};
 use super::Search;
@@ -181,10 +181,8 @@ impl<'a> Search<'a, '_> {
     /// beginning of the recordings on. A strip's fits are too dear for it.
     fn further_starts(&self) -> Vec<Proposal<'_, 'a>> {
         let (settings, base) = (&self.context.settings.certificate, self.base());
-        let variance = (least_chi2(&self.fits) / self.context.values() as f64).max(1.0);
-        let needs = |fit: &Refit<'a>| {
-            fit.chi2 / variance + self.context.settings.misfit.counts * fit.hypothesis.effects.len() as f64
-        };
+        let least = least(&self.fits).unwrap_or(base);
+        let needs = |fit: &Refit<'a>| needs(fit, least, &self.context.settings.misfit);
         let order = best(&self.fits, usize::MAX, |_| !self.context.is_strip(), needs);
         let enough = order.first().map_or(0.0, |first| needs(&self.fits[*first])) + settings.within;
         let counts = order.iter().map(|place| &self.fits[*place]).filter(|fit| needs(fit) < enough).take(settings.most);

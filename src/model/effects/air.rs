@@ -20,6 +20,14 @@ use crate::model::{Chain, Motion, Parameter, Partials};
 /// Gauss–Legendre nodes on 0..1 with their weights: exact to the third power, the highest that any law here needs.
 const GAUSS: [(f64, f64); 2] = [(0.211_324_865_405_187_1, 0.5), (0.788_675_134_594_812_9, 0.5)];
 
+/// The same, exact to the seventh power.
+const FINE_GAUSS: [(f64, f64); 4] = [
+    (0.069_431_844_202_973_71, 0.173_927_422_568_726_93),
+    (0.330_009_478_207_571_87, 0.326_072_577_431_273_07),
+    (0.669_990_521_792_428_1, 0.326_072_577_431_273_07),
+    (0.930_568_155_797_026_3, 0.173_927_422_568_726_93),
+];
+
 /// `air_linear`: f = −c vₙ.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct LinearDrag;
@@ -148,8 +156,54 @@ pub struct Station<'a> {
 /// Up to so many links the arms need no memory of their own.
 const FEW_LINKS: usize = 8;
 
-/// Visits the points of the strip at which a force per length is taken.
-pub fn stations(chain: &Chain, motion: &Motion, mut visit: impl FnMut(&Station<'_>)) {
+/// Visits the points of the strip at which a force per length is taken that is a polynomial of the second power at most on either side of standstill.
+pub fn stations(chain: &Chain, motion: &Motion, visit: impl FnMut(&Station<'_>)) {
+    each_station(chain, motion, 0..chain.count(), visit, |length_m, still_m| {
+        let [[a, b], [c, d]] =
+            [above(length_m, still_m), below(length_m, still_m)].map(|part| GAUSS.map(|node| on(part, node)));
+        [a, b, c, d]
+    });
+}
+
+/// The same for a force of any formula: exact up to the sixth power.
+pub fn fine_stations(chain: &Chain, motion: &Motion, visit: impl FnMut(&Station<'_>)) {
+    each_station(chain, motion, 0..chain.count(), visit, |length_m, still_m| {
+        let [[a, b, c, d], [e, f, g, h]] =
+            [above(length_m, still_m), below(length_m, still_m)].map(|part| FINE_GAUSS.map(|node| on(part, node)));
+        [a, b, c, d, e, f, g, h]
+    });
+}
+
+/// From and until where a link lies above the point about which it turns.
+fn above(length_m: f64, still_m: f64) -> [f64; 2] {
+    [0.0, if still_m > 0.0 && still_m < length_m { still_m } else { length_m }]
+}
+
+/// The same below it: nothing where there is no such point.
+fn below(length_m: f64, still_m: f64) -> [f64; 2] {
+    [above(length_m, still_m)[1], length_m]
+}
+
+/// A node on a part, with the length that it stands for.
+fn on([from_m, until_m]: [f64; 2], (node, weight): (f64, f64)) -> (f64, f64) {
+    (from_m + node * (until_m - from_m), weight * (until_m - from_m))
+}
+
+/// Visits the lower end of the last link, where a force is taken whole.
+pub fn tip(chain: &Chain, motion: &Motion, visit: impl FnMut(&Station<'_>)) {
+    let last = chain.count() - 1;
+    each_station(chain, motion, last..last + 1, visit, |length_m, _| [(length_m, 1.0)]);
+}
+
+/// Visits points of some links: `points` gives their distances down a link and the lengths that they stand for, from the link's length and the distance at
+/// which it stands still.
+fn each_station<const P: usize>(
+    chain: &Chain,
+    motion: &Motion,
+    links: std::ops::Range<usize>,
+    mut visit: impl FnMut(&Station<'_>),
+    points: impl Fn(f64, f64) -> [(f64, f64); P],
+) {
     let n = chain.count();
     let (mut few, mut many) = ([0.0; 2 * FEW_LINKS], Vec::new());
     let both = if n <= FEW_LINKS {
@@ -159,7 +213,7 @@ pub fn stations(chain: &Chain, motion: &Motion, mut visit: impl FnMut(&Station<'
         &mut many[..]
     };
     let (arms_m, crosses_m) = both.split_at_mut(n);
-    for i in 0..n {
+    for i in links {
         let (length_m, omega_rad_s) = (chain.length_m(i), motion.rate[i]);
         let mut end_m_s = motion.pivot_m_s * motion.cos[i];
         let mut slip_m_s = motion.pivot_m_s * motion.sin[i];
@@ -170,19 +224,14 @@ pub fn stations(chain: &Chain, motion: &Motion, mut visit: impl FnMut(&Station<'
             slip_m_s += crosses_m[l] * motion.rate[l];
         }
         crosses_m[i] = 0.0;
-        // where the link turns about a point of its own
-        let still_m = -end_m_s / omega_rad_s;
-        let cut_m = if still_m > 0.0 && still_m < length_m { still_m } else { length_m };
-        for (from_m, until_m) in [(0.0, cut_m), (cut_m, length_m)] {
-            if until_m <= from_m {
+        for (down_m, weight_m) in points(length_m, -end_m_s / omega_rad_s) {
+            if weight_m <= 0.0 {
                 continue;
             }
-            for (node, weight) in GAUSS {
-                arms_m[i] = from_m + node * (until_m - from_m);
-                let (weight_m, speed_m_s) = (weight * (until_m - from_m), end_m_s + arms_m[i] * omega_rad_s);
-                let (arms_m, crosses_m) = (&arms_m[..=i], &crosses_m[..=i]);
-                visit(&Station { motion, i, weight_m, arms_m, crosses_m, speed_m_s, slip_m_s });
-            }
+            arms_m[i] = down_m;
+            let speed_m_s = end_m_s + down_m * omega_rad_s;
+            let (arms_m, crosses_m) = (&arms_m[..=i], &crosses_m[..=i]);
+            visit(&Station { motion, i, weight_m, arms_m, crosses_m, speed_m_s, slip_m_s });
         }
     }
 }
@@ -199,12 +248,12 @@ impl Station<'_> {
         if l < self.i { self.crosses_m[l] * self.motion.rate[l] } else { -self.slip_m_s }
     }
 
-    fn add_force(&self, force_n_m: f64, q: &mut [f64]) {
+    pub(super) fn add_force(&self, force_n_m: f64, q: &mut [f64]) {
         q.iter_mut().zip(self.arms_m).for_each(|(q, arm)| *q += self.weight_m * force_n_m * arm);
     }
 
     /// For a force per length f(vₙ) with its slope f′.
-    fn add_force_partials(&self, force_n_m: f64, slope: f64, partials: &mut Partials) {
+    pub(super) fn add_force_partials(&self, force_n_m: f64, slope: f64, partials: &mut Partials) {
         let (i, slope, force) = (self.i, self.weight_m * slope, self.weight_m * force_n_m);
         for l in 0..=i {
             let (with_rate, with_angle) = (slope * self.arms_m[l], slope * self.speed_with_angle(l));

@@ -5,12 +5,14 @@
 //! | [`hinge`] | `hinge_viscous`, `hinge_coulomb`, `hinge_stiffness` |
 //! | [`joint`] | the joint's spring and damper, `rest_curl`, `joint_cubic_stiffness`, `joint_hysteretic` |
 //! | [`air`] | `air_linear`, `air_quadratic`, `added_mass` |
+//! | [`formula`] | those that a file states by a formula |
 //! | [`outside`] | `side_force`, `support_motion`, nodal forces |
 //!
 //! `distributed_flexibility` is a chain of more links, see [`Chain::of`](super::Chain::of). Camera effects (`time_base`, `dropped_frames`,
 //! `camera_tilt`, `angle_gain`, `differential_lag`) change the observation, not the motion.
 
 pub mod air;
+pub mod formula;
 pub mod hinge;
 pub mod joint;
 pub mod outside;
@@ -38,6 +40,11 @@ pub trait Effect: std::fmt::Debug + Send + Sync {
 
     /// Adds ∂Q/∂coefficient.
     fn add_sensitivity(&self, _parameter: Parameter, _chain: &Chain, _motion: &Motion, _q: &mut [f64]) {}
+
+    /// The sideways acceleration that all masses feel from it (m/s²), on which the derivatives with masses and lengths depend.
+    fn sideways_m_s2(&self, _motion: &Motion) -> f64 {
+        0.0
+    }
 
     /// Energy it stores (J).
     fn energy_j(&self, _chain: &Chain, _motion: &Motion) -> f64 {
@@ -153,5 +160,6 @@ pub fn effects_of(model: &Model, mark_length_m: f64) -> Vec<Box<dyn Effect>> {
             frequency_hz: support.frequency_hz,
         }));
     }
+    effects.extend(model.law.iter().filter_map(formula::Formula::of).map(|law| Box::new(law) as Box<dyn Effect>));
     effects
 }

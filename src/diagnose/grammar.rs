@@ -1,0 +1,258 @@
+//! The grammar of laws: the formulas that a torque may have which no law of the table describes.
+//!
+//! ```text
+//! a · place × state × shape × modulation
+//! place       hinge, joint, strip, tip
+//! state       the angle there, its rate, the wind across the strip
+//! shape       |u|^p sgn u (p = 0 … 3), u², one-sided, with play, a bump, a sign that fades with speed
+//! modulation  1, growing with time, fading with time, from an instant on; of friction also with the angle
+//! ```
+//!
+//! Each term has the amplitude `a` and at most two further coefficients, whose starts are parts of the largest state that the recordings visit.
+
+use std::collections::BTreeMap;
+
+use crate::experiment::{Coefficient, Law, LawPlace};
+
+/// One term.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Term {
+    /// As a file would state it, its amplitude 0.
+    pub law: Law,
+    /// `angle`, `rate`, `wind`.
+    pub state: &'static str,
+    /// Its shape, in words.
+    pub shape: &'static str,
+    /// How it changes with time or place, in words.
+    pub modulation: &'static str,
+    /// Whether it changes with time.
+    pub drifts: bool,
+}
+
+/// The largest values of the state at a place, and the length of the recordings.
+#[derive(Debug, Clone, Copy)]
+pub struct Largest {
+    /// Of the angle (rad); of a strip or tip 0.
+    pub angle: f64,
+    /// Of the rate (rad/s), or of the wind (m/s).
+    pub rate: f64,
+    /// Seconds.
+    pub time_s: f64,
+}
+
+/// A shape of one state.
+struct Shape {
+    words: &'static str,
+    /// Of the state u; b and c are further coefficients.
+    formula: &'static str,
+    /// The power of the state's unit that it has.
+    power: i32,
+    /// Starts of b and c, as parts of the largest u.
+    starts: &'static [&'static [f64]],
+}
+
+const fn plain(words: &'static str, formula: &'static str, power: i32) -> Shape {
+    Shape { words, formula, power, starts: &[] }
+}
+
+/// Of any state.
+const POWERS: [Shape; 5] = [
+    plain("in proportion", "u", 1),
+    plain("sign", "sign(u)", 0),
+    plain("square with its sign", "u * abs(u)", 2),
+    plain("cube", "u ^ 3", 3),
+    plain("one-sided", "max(u, 0)", 1),
+];
+/// Of an angle.
+const OF_ANGLE: [Shape; 3] = [
+    plain("square", "u ^ 2", 2),
+    Shape { words: "with play", formula: "sign(u) * max(abs(u) - b, 0)", power: 1, starts: &[&[0.15], &[0.4], &[0.7]] },
+    Shape {
+        words: BUMP,
+        formula: "exp(-((u - b) / c) ^ 2 / 2)",
+        power: 0,
+        starts: &[&[-0.5, 0.15], &[0.0, 0.15], &[0.5, 0.15], &[-0.5, 0.4], &[0.0, 0.4], &[0.5, 0.4]],
+    },
+];
+/// The shape whose b may be negative.
+const BUMP: &str = "bump";
+/// Of a rate.
+const OF_RATE: [Shape; 1] = [Shape {
+    words: "sign that fades with speed",
+    formula: "sign(u) * exp(-abs(u) / b)",
+    power: 0,
+    starts: &[&[0.05], &[0.2]],
+}];
+
+/// How an amplitude changes.
+struct Modulation {
+    words: &'static str,
+    /// What the shape is multiplied by; d is a time.
+    formula: &'static str,
+    /// Starts of d, as parts of the recordings' length.
+    starts: &'static [f64],
+    /// The powers of rad and s that it has.
+    powers: [i32; 2],
+}
+
+/// With time.
+const WITH_TIME: [Modulation; 3] = [
+    Modulation { words: "growing with time", formula: "t", starts: &[], powers: [0, 1] },
+    Modulation { words: "fading with time", formula: "exp(-t / d)", starts: &[0.3], powers: [0, 0] },
+    Modulation { words: "from an instant on", formula: "step(t - d)", starts: &[0.35, 0.65], powers: [0, 0] },
+];
+/// Of a friction, with the angle.
+const WITH_ANGLE: Modulation =
+    Modulation { words: "growing with the square of the angle", formula: "angle ^ 2", starts: &[], powers: [2, 0] };
+
+/// Every term at a place.
+pub fn terms(place: LawPlace, largest: Largest) -> Vec<Term> {
+    let variables = place.variables();
+    let states = &variables[..variables.len() - 1];
+    states.iter().flat_map(|state| of_state(place, state, largest)).collect()
+}
+
+fn of_state(place: LawPlace, state: &'static str, largest: Largest) -> Vec<Term> {
+    let (size, own): (f64, &[Shape]) = match state {
+        "angle" => (largest.angle, &OF_ANGLE),
+        "rate" => (largest.rate, &OF_RATE),
+        _ => (largest.rate, &[]),
+    };
+    let mut all = Vec::new();
+    for shape in POWERS.iter().chain(own) {
+        let none: &[&[f64]] = &[&[]];
+        for starts in if shape.starts.is_empty() { none } else { shape.starts } {
+            let starts: Vec<f64> = starts.iter().map(|part| part * size).collect();
+            all.push(term(place, state, (shape, &starts), None));
+        }
+        // what changes is plain: a damper, a spring, a dry friction
+        let is_plain = shape.starts.is_empty() && shape.words != "one-sided";
+        let of_time = WITH_TIME.iter().filter(|_| is_plain && shape.power < 2);
+        let of_angle = std::iter::once(&WITH_ANGLE).filter(|_| is_plain && state == "rate");
+        for modulation in of_time.chain(of_angle) {
+            let times = modulation.starts.iter().map(|part| Some(part * largest.time_s));
+            let times: Vec<Option<f64>> = if modulation.starts.is_empty() { vec![None] } else { times.collect() };
+            all.extend(times.into_iter().map(|d| term(place, state, (shape, &[]), Some((modulation, d)))));
+        }
+    }
+    all
+}
+
+/// A shape of a state, its further coefficients b, c beginning as given, and how it changes, with the start of d.
+fn term(
+    place: LawPlace,
+    state: &'static str,
+    (shape, starts): (&Shape, &[f64]),
+    changes: Option<(&Modulation, Option<f64>)>,
+) -> Term {
+    let coefficient = |start: f64, min: Option<f64>, unit: &str| Coefficient { start, min, unit: unit.to_owned() };
+    let times = changes.map_or(String::new(), |(modulation, _)| format!(" * {}", modulation.formula));
+    let formula = format!("-a * {}{times}", with_state(shape.formula, state));
+    let of_state = match state {
+        "angle" => "rad",
+        "rate" => "rad/s",
+        _ => "m/s",
+    };
+    let powers = changes.map_or([0; 2], |(modulation, _)| modulation.powers);
+    let amplitude = coefficient(0.0, None, &unit_of(place, state, shape.power, powers));
+    let mut parameters = BTreeMap::from([("a".to_owned(), amplitude)]);
+    for (name, start) in ["b", "c"].into_iter().zip(starts) {
+        // a width or a threshold has no meaning below nothing; the middle of a bump has
+        let least = (name == "c" || shape.words != BUMP).then_some(1e-3 * start.abs());
+        parameters.insert(name.to_owned(), coefficient(*start, least, of_state));
+    }
+    if let Some(d) = changes.and_then(|(_, d)| d) {
+        parameters.insert("d".to_owned(), coefficient(d, Some(1e-3 * d), "s"));
+    }
+    let law = Law { name: "learnt".to_owned(), place, formula, parameters };
+    let modulation = changes.map_or("none", |(modulation, _)| modulation.words);
+    let drifts = WITH_TIME.iter().any(|own| own.words == modulation);
+    Term { law, state, shape: shape.words, modulation, drifts }
+}
+
+/// A shape's formula with its state in the place of u.
+fn with_state(formula: &str, state: &str) -> String {
+    let is_word = |c: char| c.is_alphanumeric() || c == '_';
+    let mut text = String::new();
+    let mut word = String::new();
+    for c in formula.chars().chain([' ']) {
+        if is_word(c) {
+            word.push(c);
+            continue;
+        }
+        text.push_str(if word == "u" { state } else { &word });
+        word.clear();
+        text.push(c);
+    }
+    text.trim_end().to_owned()
+}
+
+/// The unit of an amplitude: the place's own over that of a power of the state and of what it changes with, powers of rad and s.
+fn unit_of(place: LawPlace, state: &str, power: i32, [rad, s]: [i32; 2]) -> String {
+    let of_wind = state == "wind";
+    let exponents = [
+        ("rad", -rad - if of_wind { 0 } else { power }),
+        ("m", if of_wind { -power } else { 0 }),
+        ("s", if state == "angle" { 0 } else { power } - s),
+    ];
+    let raised = |(unit, exponent): &(&str, i32)| match exponent.abs() {
+        1 => (*unit).to_owned(),
+        more => format!("{unit}{more}"),
+    };
+    let above = exponents.iter().filter(|e| e.1 > 0).map(|e| format!(" {}", raised(e)));
+    let below = exponents.iter().filter(|e| e.1 < 0).map(|e| format!("/{}", raised(e)));
+    std::iter::once(place.unit().to_owned()).chain(above).chain(below).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::model::effects::Effect;
+    use crate::model::effects::formula::Formula;
+    use crate::model::{Chain, Motion};
+
+    const LARGEST: Largest = Largest { angle: 0.5, rate: 4.0, time_s: 30.0 };
+    const PLACES: [LawPlace; 4] = [LawPlace::Hinge, LawPlace::Joint, LawPlace::Strip, LawPlace::Tip];
+
+    #[test]
+    fn every_term_is_a_law_that_a_file_could_state_and_exerts_something() {
+        let chain = Chain::of(&crate::experiment::Specimen::default()).unwrap();
+        let mut motion = Motion::zero(2, 0);
+        motion.place(&[0.3, -0.1]);
+        motion.rate.copy_from_slice(&[2.0, 3.5]);
+        motion.t_s = 25.0;
+        for place in PLACES {
+            let mut formulas = Vec::new();
+            for mut term in terms(place, LARGEST) {
+                term.law.parameters.get_mut("a").unwrap().start = 1.0;
+                let mut q = [0.0; 2];
+                Formula::of(&term.law)
+                    .unwrap_or_else(|| panic!("{:?}", term.law.expression()))
+                    .add_torque(&chain, &motion, &mut q);
+                let one_sided_or_far = term.shape == "one-sided" || matches!(term.shape, "bump" | "with play");
+                assert!(q.iter().any(|q| *q != 0.0) || one_sided_or_far, "{} does nothing", term.law.formula);
+                let starts: Vec<String> = term.law.parameters.values().map(|own| own.start.to_string()).collect();
+                formulas.push(format!("{} {starts:?}", term.law.formula));
+            }
+            let count = formulas.len();
+            formulas.sort();
+            formulas.dedup();
+            assert_eq!(formulas.len(), count, "a term stands twice");
+        }
+    }
+
+    #[test]
+    fn amplitudes_have_the_units_that_make_the_place_s_own() {
+        let unit = |place, formula: &str| {
+            let term = terms(place, LARGEST).into_iter().find(|term| term.law.formula == formula).unwrap();
+            term.law.parameters["a"].unit.clone()
+        };
+        assert_eq!(unit(LawPlace::Hinge, "-a * rate"), "N m s/rad");
+        assert_eq!(unit(LawPlace::Hinge, "-a * sign(rate)"), "N m");
+        assert_eq!(unit(LawPlace::Hinge, "-a * rate ^ 3"), "N m s3/rad3");
+        assert_eq!(unit(LawPlace::Joint, "-a * angle ^ 2"), "N m/rad2");
+        assert_eq!(unit(LawPlace::Hinge, "-a * angle * t"), "N m/rad/s");
+        assert_eq!(unit(LawPlace::Hinge, "-a * sign(rate) * angle ^ 2"), "N m/rad2");
+        assert_eq!(unit(LawPlace::Strip, "-a * wind * abs(wind)"), "N/m s2/m2");
+    }
+}

@@ -1,0 +1,61 @@
+//! A search of the first part of recordings, where a fit of the whole is too dear for one.
+//!
+//! A search fits some hundred hypotheses. Where the budget does not allow that of the whole recordings, it is made on as much of their beginning as the budget
+//! allows; the best fits of each number of coefficients then follow the recordings to their end, part after part.
+
+use super::super::base::candidates;
+use super::super::context::first_part;
+use super::super::laws;
+use super::super::refit::Refit;
+use super::super::screen::Screen;
+use super::rounds::{Round, Tried};
+use super::{Search, horizon};
+
+impl<'a> Search<'a, '_> {
+    /// Searches with single effects and pairs, then from further starts: the whole recordings, or the part that can be afforded.
+    pub(super) fn begin(&mut self) {
+        if self.prepared.part < 1.0 {
+            self.begin_on(self.prepared.part);
+        } else {
+            self.usual();
+            self.restarts();
+        }
+    }
+
+    fn begin_on(&mut self, part: f64) {
+        let records = first_part(self.context.records, part);
+        let context = self.context.on(&records);
+        let Some(base) = horizon::on_the_beginning(&self.context, &context, self.base()) else { return };
+        let effects = candidates(&context);
+        let scored = laws::cheap_to_score(&context, &effects);
+        let scores = Screen::at(&context, &base).map(|screen| laws::scores(&screen, &scored)).unwrap_or_default();
+        let mut early = Search {
+            prepared: self.prepared,
+            context,
+            effects,
+            fits: vec![base],
+            rounds: Vec::new(),
+            undecided: Vec::new(),
+            scores,
+            is_loose: self.is_loose,
+            begun_at: self.begun_at,
+            until: self.until,
+            part,
+            progress: self.progress,
+        };
+        early.usual();
+        early.restarts();
+        early.allow(self.context.settings.search.shares.certified);
+        early.round(Round::OneMore, &mut Tried::default());
+        let Search { context, fits, rounds, undecided, .. } = early;
+        self.context.fine_strip = context.fine_strip;
+        self.part = part;
+        self.rounds.extend(rounds);
+        self.undecided.extend(undecided);
+        self.progress.begin("to the end", None);
+        let noise = &self.base().problem.noise;
+        let found: Vec<Refit<'a>> = horizon::carried(&self.context, fits, part, noise);
+        self.keep(found);
+        self.learn_noise();
+    }
+}

@@ -1,0 +1,165 @@
+//! `[[model.law]]`: laws that a file states by a formula.
+
+use std::collections::BTreeMap;
+
+use serde::Deserialize;
+
+use super::finite;
+use crate::model::{Expression, LawCoefficient};
+
+/// Where a stated law acts, and what its formula is.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum LawPlace {
+    /// A torque on the first link (N·m) from its `angle` (rad) and `rate` (rad/s).
+    Hinge,
+    /// A torque on the lower link of every joint (N·m), and back on the upper one, from the bend `angle` and its `rate`.
+    Joint,
+    /// A force per length across the strip (N/m) from the speed across itself, `wind` (m/s).
+    Strip,
+    /// A force across the last link at its lower end (N) from the speed there, `wind` (m/s).
+    Tip,
+    /// The sideways acceleration of the pivot (m/s²).
+    Support,
+}
+
+impl LawPlace {
+    /// The name in files.
+    pub fn id(self) -> &'static str {
+        match self {
+            Self::Hinge => "hinge",
+            Self::Joint => "joint",
+            Self::Strip => "strip",
+            Self::Tip => "tip",
+            Self::Support => "support",
+        }
+    }
+
+    /// The variables of a formula there; the time `t` (s) is the last.
+    pub fn variables(self) -> &'static [&'static str] {
+        match self {
+            Self::Hinge | Self::Joint => &["angle", "rate", "t"],
+            Self::Strip | Self::Tip => &["wind", "t"],
+            Self::Support => &["t"],
+        }
+    }
+
+    /// The unit of what a formula gives there.
+    pub fn unit(self) -> &'static str {
+        match self {
+            Self::Hinge | Self::Joint => "N m",
+            Self::Strip => "N/m",
+            Self::Tip => "N",
+            Self::Support => "m/s2",
+        }
+    }
+}
+
+/// A coefficient of a stated law.
+#[derive(Debug, Clone, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Coefficient {
+    /// Where a fit begins, and the value that `simulate` takes.
+    pub start: f64,
+    /// Least value that a fit may take.
+    #[serde(default)]
+    pub min: Option<f64>,
+    /// For what is printed.
+    #[serde(default = "one")]
+    pub unit: String,
+}
+
+fn one() -> String {
+    "1".to_owned()
+}
+
+/// A law stated by a formula.
+#[derive(Debug, Clone, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Law {
+    /// What it is called.
+    pub name: String,
+    /// Where it acts.
+    pub place: LawPlace,
+    /// What it exerts, of the state there and its coefficients.
+    #[serde(rename = "torque_n_m", alias = "force_n_per_m", alias = "force_n", alias = "acceleration_m_s2")]
+    pub formula: String,
+    /// Its coefficients by their names.
+    #[serde(default)]
+    pub parameters: BTreeMap<String, Coefficient>,
+}
+
+impl Law {
+    /// The formula, its variables those of the place, then the coefficients in the order of their names.
+    ///
+    /// # Errors
+    /// What is wrong with the formula, in words.
+    pub fn expression(&self) -> Result<Expression, String> {
+        let names: Vec<&str> =
+            self.place.variables().iter().copied().chain(self.parameters.keys().map(String::as_str)).collect();
+        Expression::parse(&self.formula, &names)
+    }
+
+    /// The coefficients, as a fit knows them.
+    pub fn coefficients(&self) -> impl Iterator<Item = (LawCoefficient, &Coefficient)> {
+        let of = |(name, own): (&String, &'_ Coefficient)| LawCoefficient::new(&self.name, name, &own.unit);
+        self.parameters.iter().map(move |named| (of(named), named.1))
+    }
+
+    pub(super) fn validate(&self) -> Result<(), String> {
+        let wrong = |message: String| format!("model.law \"{}\": {message}", self.name);
+        let expression = self.expression().map_err(wrong)?;
+        let state = self.place.variables();
+        for (index, (name, own)) in self.parameters.iter().enumerate() {
+            let key = format!("parameters.{name}.start");
+            finite(&key, own.start).map_err(wrong)?;
+            if let Some(min) = own.min.filter(|min| !(own.start >= *min)) {
+                return Err(wrong(format!("{key} = {} lies below its min = {min}", own.start)));
+            }
+            if state.contains(&name.as_str()) {
+                return Err(wrong(format!("a parameter cannot be called {name}: that is a variable of its place")));
+            }
+            if !expression.uses(state.len() + index) {
+                return Err(wrong(format!("the formula does not use its parameter {name}")));
+            }
+        }
+        Ok(())
+    }
+}
+
+/// Laws with different names, each sound.
+pub(super) fn validate(laws: &[Law]) -> Result<(), String> {
+    for (index, law) in laws.iter().enumerate() {
+        if laws[..index].iter().any(|other| other.name == law.name) {
+            return Err(format!("two laws of [[model.law]] are called \"{}\"; each needs a name of its own", law.name));
+        }
+        law.validate()?;
+    }
+    Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use crate::experiment::Experiment;
+
+    fn refused(law: &str) -> String {
+        let text = format!("[[model.law]]\nname = \"rub\"\nplace = \"hinge\"\n{law}\n");
+        Experiment::parse(&text, std::path::Path::new("e.toml")).unwrap_err().to_string()
+    }
+
+    #[test]
+    fn what_is_wrong_with_a_law_is_said_by_its_name() {
+        let of_a = "parameters.a = { start = 1e-7, min = 0.0, unit = \"N m\" }";
+        let wrong = refused(&format!("torque_n_m = \"-a * rat\"\n{of_a}"));
+        assert!(
+            wrong.starts_with("e.toml: model.law \"rub\": \"rat\" in \"-a * rat\" is not known; there are angle"),
+            "{wrong}"
+        );
+        let wrong = refused(&format!("torque_n_m = \"-rate\"\n{of_a}"));
+        assert_eq!(wrong, "e.toml: model.law \"rub\": the formula does not use its parameter a");
+        let wrong = refused("torque_n_m = \"-a * rate\"\nparameters.a = { start = -1.0, min = 0.0 }");
+        assert_eq!(wrong, "e.toml: model.law \"rub\": parameters.a.start = -1 lies below its min = 0");
+        let wrong = refused("torque_n_m = \"-t * rate\"\nparameters.t = { start = 1.0 }");
+        assert!(wrong.contains("a parameter cannot be called t"), "{wrong}");
+    }
+}

@@ -1,0 +1,132 @@
+//! A law that a file states by a formula (`[[model.law]]`).
+
+use super::{Effect, air};
+use crate::experiment::{Law, LawPlace};
+use crate::model::expression::{Dual, Expression};
+use crate::model::{Chain, LawCoefficient, Motion, Parameter, Partials};
+
+/// The law.
+#[derive(Debug, Clone)]
+pub struct Formula {
+    place: LawPlace,
+    expression: Expression,
+    coefficients: Vec<LawCoefficient>,
+    /// The state where it is looked at, then the values of the coefficients.
+    values: Vec<f64>,
+}
+
+/// What a formula gives at one place, and how it acts there.
+enum Acts<'s> {
+    /// A torque on the first link.
+    Hinge,
+    /// A torque between a link and the next.
+    Joint(usize),
+    /// A force per length, or a force.
+    Across(&'s air::Station<'s>),
+    /// An acceleration of the pivot.
+    Support,
+}
+
+impl Formula {
+    /// From a file's law; `None` where its formula is not sound.
+    pub fn of(law: &Law) -> Option<Self> {
+        let state = vec![0.0; law.place.variables().len()];
+        let values = state.into_iter().chain(law.parameters.values().map(|own| own.start)).collect();
+        let coefficients = law.coefficients().map(|(coefficient, _)| coefficient).collect();
+        Some(Self { place: law.place, expression: law.expression().ok()?, coefficients, values })
+    }
+
+    fn at(&self, state: &[f64]) -> Dual {
+        let mut values = self.values.clone();
+        values[..state.len()].copy_from_slice(state);
+        self.expression.at(&values)
+    }
+
+    /// Where the derivative with a coefficient stands.
+    fn slope_of(&self, parameter: Parameter) -> Option<usize> {
+        let index = self.coefficients.iter().position(|own| Parameter::Law(*own) == parameter)?;
+        Some(self.place.variables().len() + index)
+    }
+
+    /// The formula at every place of the chain where it acts.
+    fn visit(&self, chain: &Chain, motion: &Motion, mut each: impl FnMut(&Acts<'_>, Dual)) {
+        let (theta, rate, t_s) = (&motion.theta_rad, &motion.rate, motion.t_s);
+        match self.place {
+            LawPlace::Hinge => each(&Acts::Hinge, self.at(&[theta[0], rate[0], t_s])),
+            LawPlace::Joint => (1..chain.count()).for_each(|i| {
+                each(&Acts::Joint(i), self.at(&[theta[i] - theta[i - 1], rate[i] - rate[i - 1], t_s]));
+            }),
+            LawPlace::Strip => {
+                air::fine_stations(chain, motion, |at| each(&Acts::Across(at), self.at(&[at.speed_m_s, t_s])))
+            }
+            LawPlace::Tip => air::tip(chain, motion, |at| each(&Acts::Across(at), self.at(&[at.speed_m_s, t_s]))),
+            LawPlace::Support => each(&Acts::Support, self.at(&[t_s])),
+        }
+    }
+
+    /// Adds what a value of the formula exerts at a place.
+    fn exert(acts: &Acts<'_>, value: f64, chain: &Chain, motion: &Motion, q: &mut [f64]) {
+        match acts {
+            Acts::Hinge => q[0] += value,
+            Acts::Joint(i) => {
+                q[i - 1] -= value;
+                q[*i] += value;
+            }
+            Acts::Across(station) => station.add_force(value, q),
+            Acts::Support => {
+                (0..chain.count()).for_each(|i| q[i] -= value * chain.static_moment_kg_m(i) * motion.cos[i]);
+            }
+        }
+    }
+}
+
+impl Effect for Formula {
+    fn add_torque(&self, chain: &Chain, motion: &Motion, q: &mut [f64]) {
+        self.visit(chain, motion, |acts, dual| Self::exert(acts, dual.value, chain, motion, q));
+    }
+
+    fn add_partials(&self, chain: &Chain, motion: &Motion, partials: &mut Partials) {
+        self.visit(chain, motion, |acts, dual| {
+            let [with_angle, with_rate] = [dual.slopes[0], dual.slopes[1]];
+            match acts {
+                Acts::Hinge => {
+                    partials.theta[(0, 0)] += with_angle;
+                    partials.rate[(0, 0)] += with_rate;
+                }
+                Acts::Joint(i) => {
+                    for (own, sign) in [(*i, 1.0), (i - 1, -1.0)] {
+                        for (other, along) in [(*i, 1.0), (i - 1, -1.0)] {
+                            partials.theta[(own, other)] += sign * along * with_angle;
+                            partials.rate[(own, other)] += sign * along * with_rate;
+                        }
+                    }
+                }
+                Acts::Across(station) => station.add_force_partials(dual.value, dual.slopes[0], partials),
+                Acts::Support => (0..chain.count()).for_each(|i| {
+                    partials.theta[(i, i)] += dual.value * chain.static_moment_kg_m(i) * motion.sin[i];
+                }),
+            }
+        });
+    }
+
+    fn sideways_m_s2(&self, motion: &Motion) -> f64 {
+        if self.place == LawPlace::Support { -self.at(&[motion.t_s]).value } else { 0.0 }
+    }
+
+    fn parameters(&self) -> Vec<(Parameter, f64)> {
+        let values = &self.values[self.place.variables().len()..];
+        self.coefficients.iter().zip(values).map(|(own, value)| (Parameter::Law(*own), *value)).collect()
+    }
+
+    fn set(&mut self, parameter: Parameter, value: f64) {
+        if let Some(place) = self.slope_of(parameter) {
+            self.values[place] = value;
+        }
+    }
+
+    fn add_sensitivity(&self, parameter: Parameter, chain: &Chain, motion: &Motion, q: &mut [f64]) {
+        if let Some(place) = self.slope_of(parameter) {
+            self.visit(chain, motion, |acts, dual| Self::exert(acts, dual.slopes[place], chain, motion, q));
+        }
+    }
+}

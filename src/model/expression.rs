@@ -1,0 +1,398 @@
+//! Formulas of a law: text with variables, and their values with exact derivatives.
+//!
+//! ```text
+//! sum     = product { (+ | −) product }
+//! product = power { (* | /) power }
+//! power   = [ − ] value [ ^ power ]
+//! value   = number | variable | function ( sum { , sum } ) | ( sum )
+//! ```
+//!
+//! Functions: `abs sign step max min exp sin cos sqrt tanh`. `sign` and `step` rise within ±10⁻³ of the unit of what they are of, as tanh does: an integrator
+//! cannot step over a jump. Derivatives are taken forward, with all variables at once.
+
+/// Most variables of one formula: the state and the coefficients.
+pub const MOST_VARIABLES: usize = 12;
+/// Half the width over which a sign goes from −1 to 1, in the unit of what it is of.
+const SIGN_WIDTH: f64 = 1e-3;
+
+/// A formula, ready to be evaluated.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Expression {
+    /// In the order of evaluation: operands before what takes them.
+    nodes: Vec<Node>,
+    variables: usize,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq)]
+enum Node {
+    Number(f64),
+    Variable(usize),
+    Negate,
+    Add,
+    Subtract,
+    Multiply,
+    Divide,
+    Power,
+    Call(Function),
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Function {
+    Abs,
+    Sign,
+    Step,
+    Max,
+    Min,
+    Exp,
+    Sin,
+    Cos,
+    Sqrt,
+    Tanh,
+}
+
+const FUNCTIONS: [(&str, Function, usize); 10] = [
+    ("abs", Function::Abs, 1),
+    ("sign", Function::Sign, 1),
+    ("step", Function::Step, 1),
+    ("max", Function::Max, 2),
+    ("min", Function::Min, 2),
+    ("exp", Function::Exp, 1),
+    ("sin", Function::Sin, 1),
+    ("cos", Function::Cos, 1),
+    ("sqrt", Function::Sqrt, 1),
+    ("tanh", Function::Tanh, 1),
+];
+
+/// A value with its derivatives.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Dual {
+    /// The value.
+    pub value: f64,
+    /// With each variable.
+    pub slopes: [f64; MOST_VARIABLES],
+}
+
+impl Dual {
+    fn constant(value: f64) -> Self {
+        Self { value, slopes: [0.0; MOST_VARIABLES] }
+    }
+
+    /// A function of this one with a value and a slope.
+    fn chain(self, value: f64, slope: f64) -> Self {
+        Self { value, slopes: self.slopes.map(|s| slope * s) }
+    }
+
+    /// A function of two with a value and both slopes.
+    fn join(self, other: Self, value: f64, [own, others]: [f64; 2]) -> Self {
+        Self { value, slopes: std::array::from_fn(|i| own * self.slopes[i] + others * other.slopes[i]) }
+    }
+}
+
+impl Expression {
+    /// Reads a formula of some variables.
+    ///
+    /// # Errors
+    /// What is wrong and where, in words.
+    pub fn parse(text: &str, variables: &[&str]) -> Result<Self, String> {
+        if variables.len() > MOST_VARIABLES {
+            return Err(format!("a formula has at most {MOST_VARIABLES} variables and coefficients"));
+        }
+        let mut parser = Parser { text, rest: text, variables, nodes: Vec::new(), depth: 0 };
+        parser.sum()?;
+        parser.skip_space();
+        if !parser.rest.is_empty() {
+            return Err(parser.unexpected("an operator or the end"));
+        }
+        Ok(Self { nodes: parser.nodes, variables: variables.len() })
+    }
+
+    /// Whether a variable occurs.
+    pub fn uses(&self, variable: usize) -> bool {
+        self.nodes.contains(&Node::Variable(variable))
+    }
+
+    /// The value and its derivatives with every variable.
+    pub fn at(&self, variables: &[f64]) -> Dual {
+        let mut stack: Vec<Dual> = Vec::with_capacity(8);
+        for node in &self.nodes {
+            let result = match *node {
+                Node::Number(value) => Dual::constant(value),
+                Node::Variable(i) => {
+                    let mut dual = Dual::constant(variables.get(i).copied().unwrap_or(f64::NAN));
+                    dual.slopes[i] = 1.0;
+                    dual
+                }
+                Node::Negate => pop(&mut stack).chain_with(|v| (-v, -1.0)),
+                Node::Call(function) if function.takes_one() => pop(&mut stack).chain_with(|v| function.of(v)),
+                two => {
+                    let (b, a) = (pop(&mut stack), pop(&mut stack));
+                    of_two(two, a, b)
+                }
+            };
+            stack.push(result);
+        }
+        debug_assert!(stack.len() == 1 && variables.len() == self.variables);
+        pop(&mut stack)
+    }
+}
+
+impl Dual {
+    fn chain_with(self, of: impl Fn(f64) -> (f64, f64)) -> Self {
+        let (value, slope) = of(self.value);
+        self.chain(value, slope)
+    }
+}
+
+/// The parser leaves no operator without its operands.
+fn pop(stack: &mut Vec<Dual>) -> Dual {
+    stack.pop().unwrap_or(Dual::constant(f64::NAN))
+}
+
+fn of_two(node: Node, a: Dual, b: Dual) -> Dual {
+    let (x, y) = (a.value, b.value);
+    match node {
+        Node::Add => a.join(b, x + y, [1.0, 1.0]),
+        Node::Subtract => a.join(b, x - y, [1.0, -1.0]),
+        Node::Multiply => a.join(b, x * y, [y, x]),
+        Node::Divide => a.join(b, x / y, [1.0 / y, -x / (y * y)]),
+        Node::Power => {
+            let value = x.powf(y);
+            let own = if y == 0.0 { 0.0 } else { y * x.powf(y - 1.0) };
+            a.join(b, value, [own, if x > 0.0 { value * x.ln() } else { 0.0 }])
+        }
+        Node::Call(Function::Max) => {
+            if x >= y {
+                a
+            } else {
+                b
+            }
+        }
+        Node::Call(Function::Min) => {
+            if x <= y {
+                a
+            } else {
+                b
+            }
+        }
+        _ => Dual::constant(f64::NAN),
+    }
+}
+
+impl Function {
+    fn takes_one(self) -> bool {
+        !matches!(self, Self::Max | Self::Min)
+    }
+
+    /// The value and the slope of a function of one value.
+    fn of(self, v: f64) -> (f64, f64) {
+        match self {
+            Self::Abs => (v.abs(), if v < 0.0 { -1.0 } else { 1.0 }),
+            Self::Sign => {
+                let sign = (v / SIGN_WIDTH).tanh();
+                (sign, (1.0 - sign * sign) / SIGN_WIDTH)
+            }
+            Self::Step => {
+                let sign = (v / SIGN_WIDTH).tanh();
+                (0.5 * (1.0 + sign), 0.5 * (1.0 - sign * sign) / SIGN_WIDTH)
+            }
+            Self::Exp => (v.exp(), v.exp()),
+            Self::Sin => (v.sin(), v.cos()),
+            Self::Cos => (v.cos(), -v.sin()),
+            Self::Sqrt => (v.sqrt(), 0.5 / v.sqrt()),
+            Self::Tanh => (v.tanh(), 1.0 - v.tanh().powi(2)),
+            Self::Max | Self::Min => (f64::NAN, f64::NAN),
+        }
+    }
+}
+
+/// Brackets within brackets, at most.
+const DEEPEST: usize = 64;
+
+struct Parser<'t> {
+    text: &'t str,
+    rest: &'t str,
+    variables: &'t [&'t str],
+    nodes: Vec<Node>,
+    depth: usize,
+}
+
+impl Parser<'_> {
+    fn sum(&mut self) -> Result<(), String> {
+        self.depth += 1;
+        if self.depth > DEEPEST {
+            return Err(format!("\"{}\" has more than {DEEPEST} brackets within brackets", self.text));
+        }
+        self.product()?;
+        while let Some(operator) = self.one_of(&['+', '-', '−']) {
+            self.product()?;
+            self.nodes.push(if operator == '+' { Node::Add } else { Node::Subtract });
+        }
+        self.depth -= 1;
+        Ok(())
+    }
+
+    fn product(&mut self) -> Result<(), String> {
+        self.power()?;
+        while let Some(operator) = self.one_of(&['*', '/']) {
+            self.power()?;
+            self.nodes.push(if operator == '*' { Node::Multiply } else { Node::Divide });
+        }
+        Ok(())
+    }
+
+    fn power(&mut self) -> Result<(), String> {
+        self.depth += 1;
+        if self.depth > DEEPEST {
+            return Err(format!("\"{}\" has too many signs and powers in a row", self.text));
+        }
+        let is_negative = self.one_of(&['-', '−']).is_some();
+        if is_negative {
+            self.power()?;
+            self.nodes.push(Node::Negate);
+        } else {
+            self.value()?;
+            if self.one_of(&['^']).is_some() {
+                self.power()?;
+                self.nodes.push(Node::Power);
+            }
+        }
+        self.depth -= 1;
+        Ok(())
+    }
+
+    fn value(&mut self) -> Result<(), String> {
+        if self.one_of(&['(']).is_some() {
+            self.sum()?;
+            return self.close();
+        }
+        if let Some(number) = self.number() {
+            self.nodes.push(Node::Number(number));
+            return Ok(());
+        }
+        let name = self.name();
+        if name.is_empty() {
+            return Err(self.unexpected("a number, a variable or a bracket"));
+        }
+        if let Some((_, function, operands)) = FUNCTIONS.iter().find(|(known, _, _)| *known == name) {
+            return self.call(*function, *operands);
+        }
+        let place = self.variables.iter().position(|variable| *variable == name);
+        let known = || [self.variables, &FUNCTIONS.map(|(name, _, _)| name)].concat().join(", ");
+        let place =
+            place.ok_or_else(|| format!("\"{name}\" in \"{}\" is not known; there are {}", self.text, known()))?;
+        self.nodes.push(Node::Variable(place));
+        Ok(())
+    }
+
+    fn call(&mut self, function: Function, operands: usize) -> Result<(), String> {
+        if self.one_of(&['(']).is_none() {
+            return Err(self.unexpected("a bracket after the function"));
+        }
+        for operand in 0..operands {
+            if operand > 0 && self.one_of(&[',']).is_none() {
+                return Err(self.unexpected("a comma"));
+            }
+            self.sum()?;
+        }
+        self.close()?;
+        self.nodes.push(Node::Call(function));
+        Ok(())
+    }
+
+    fn close(&mut self) -> Result<(), String> {
+        self.one_of(&[')']).map(|_| ()).ok_or_else(|| self.unexpected("a closing bracket"))
+    }
+
+    fn number(&mut self) -> Option<f64> {
+        self.skip_space();
+        let is_digit = |c: char| c.is_ascii_digit() || c == '.';
+        let digits = self.rest.find(|c| !is_digit(c)).unwrap_or(self.rest.len());
+        let exponent = self.rest[digits..].strip_prefix(['e', 'E']).map_or(0, |rest| {
+            let sign = usize::from(rest.starts_with(['+', '-']));
+            let power = rest[sign..].find(|c: char| !c.is_ascii_digit()).unwrap_or(rest.len() - sign);
+            if power == 0 { 0 } else { 1 + sign + power }
+        });
+        let number = self.rest[..digits + exponent].parse().ok().filter(|_| digits > 0)?;
+        self.rest = &self.rest[digits + exponent..];
+        Some(number)
+    }
+
+    fn name(&mut self) -> String {
+        self.skip_space();
+        let end = self.rest.find(|c: char| !c.is_alphanumeric() && c != '_').unwrap_or(self.rest.len());
+        let name = self.rest[..end].to_owned();
+        self.rest = &self.rest[end..];
+        name
+    }
+
+    fn one_of(&mut self, wanted: &[char]) -> Option<char> {
+        self.skip_space();
+        let next = self.rest.chars().next().filter(|c| wanted.contains(c))?;
+        self.rest = &self.rest[next.len_utf8()..];
+        Some(next)
+    }
+
+    fn skip_space(&mut self) {
+        self.rest = self.rest.trim_start();
+    }
+
+    fn unexpected(&self, wanted: &str) -> String {
+        let found = self.rest.chars().next().map_or("the end".to_owned(), |c| format!("\"{c}\""));
+        format!("\"{}\": expected {wanted}, found {found}", self.text)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn value(text: &str, variables: &[(&str, f64)]) -> f64 {
+        let names: Vec<&str> = variables.iter().map(|(name, _)| *name).collect();
+        let values: Vec<f64> = variables.iter().map(|(_, value)| *value).collect();
+        Expression::parse(text, &names).unwrap().at(&values).value
+    }
+
+    #[test]
+    fn operators_bind_as_on_paper() {
+        assert_eq!(value("1 + 2 * 3 ^ 2", &[]), 19.0);
+        assert_eq!(value("-2 ^ 2", &[]), -4.0);
+        assert_eq!(value("2 ^ 3 ^ 0", &[]), 2.0);
+        assert_eq!(value("(1 - 2) - 3 / 4 / 2", &[]), -1.375);
+        assert_eq!(value("2 * -x", &[("x", 3.0)]), -6.0);
+        assert_eq!(value("1.5e-3*x", &[("x", 2.0)]), 3e-3);
+        assert_eq!(value("max(x, 0) + min(x, 1)", &[("x", 3.0)]), 4.0);
+    }
+
+    #[test]
+    fn derivatives_are_those_of_differences() {
+        let text = "-a * max(rate, 0) + b * exp(-abs(rate) / c) * tanh(angle) ^ 3 - sin(angle) / cos(rate) + sqrt(abs(angle)) * step(rate) + a * sign(angle)";
+        let names = ["angle", "rate", "a", "b", "c"];
+        let formula = Expression::parse(text, &names).unwrap();
+        for at in [[0.3, 0.7, 2.0, 0.5, 0.2], [-0.4, -0.9, 1.0, -2.0, 0.6], [0.002, 0.0012, 1.0, 1.0, 1.0]] {
+            let exact = formula.at(&at);
+            for variable in 0..names.len() {
+                let step = 1e-7;
+                let moved = |by: f64| {
+                    let mut moved = at;
+                    moved[variable] += by;
+                    formula.at(&moved).value
+                };
+                let difference = (moved(step) - moved(-step)) / (2.0 * step);
+                let error = (exact.slopes[variable] - difference).abs();
+                assert!(error < 1e-5 * (1.0 + difference.abs()), "{variable}: {} {difference}", exact.slopes[variable]);
+            }
+        }
+    }
+
+    #[test]
+    fn what_is_wrong_is_said_with_its_place() {
+        let wrong = |text: &str| Expression::parse(text, &["rate", "a"]).unwrap_err();
+        assert!(wrong("-a * rat").starts_with("\"rat\" in \"-a * rat\" is not known; there are rate, a, abs"));
+        assert_eq!(wrong("a * (rate"), "\"a * (rate\": expected a closing bracket, found the end");
+        assert_eq!(wrong("a rate"), "\"a rate\": expected an operator or the end, found \"r\"");
+        assert_eq!(wrong("max(rate)"), "\"max(rate)\": expected a comma, found \")\"");
+        assert_eq!(wrong(""), "\"\": expected a number, a variable or a bracket, found the end");
+        assert!(wrong(&"(".repeat(100_000)).contains("brackets"));
+        assert!(wrong(&"-".repeat(100_000)).contains("in a row"));
+    }
+}

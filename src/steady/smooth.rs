@@ -1,0 +1,60 @@
+//! A picture without its noise, for choosing what of it can be found again.
+
+use super::{HALF, Luma};
+
+/// Half the side of the square over which the picture is smoothed for its gradients, and half the distance between
+/// the two means that make one, px: farther than the noise of one pixel reaches.
+const SMOOTH_HALF: usize = 2;
+const GRADIENT_HALF: usize = 3;
+/// The picture smoothed, in which noise has hardly a gradient.
+pub(super) struct Smooth {
+    width: usize,
+    height: usize,
+    /// Means of squares of 5 × 5 pixels about each pixel, row by row; next to the edge, 0.
+    means: Vec<f32>,
+}
+
+impl Smooth {
+    pub fn of(luma: &Luma<'_>) -> Self {
+        let (width, height, side) = (luma.width, luma.height, 2 * SMOOTH_HALF + 1);
+        let mut across = vec![0.0f32; width * height];
+        for y in 0..height {
+            let row: Vec<f32> = (0..width).map(|x| luma.code(x as i64, y as i64)).collect();
+            for (x, run) in row.windows(side).enumerate() {
+                across[y * width + x + SMOOTH_HALF] = run.iter().sum();
+            }
+        }
+        let mut means = vec![0.0f32; width * height];
+        for y in SMOOTH_HALF..height.saturating_sub(SMOOTH_HALF) {
+            for x in 0..width {
+                let column = y - SMOOTH_HALF..=y + SMOOTH_HALF;
+                means[y * width + x] = column.map(|j| across[j * width + x]).sum::<f32>() / (side * side) as f32;
+            }
+        }
+        Self { width, height, means }
+    }
+
+    /// Mean square of the weaker gradient of the patch at (x, y), of what of it has smooth surroundings; 0 outside the
+    /// picture.
+    pub fn weaker_gradient(&self, luma: &Luma<'_>, x: i64, y: i64) -> f64 {
+        if !luma.holds(x, y) {
+            return 0.0;
+        }
+        let (half, reach) = (HALF as usize, GRADIENT_HALF + SMOOTH_HALF);
+        let inside = |at: i64, size: usize| {
+            (at as usize - half).max(reach)..(at as usize + half + 1).min(size.saturating_sub(reach))
+        };
+        let [mut xx, mut xy, mut yy, mut count] = [0.0f32; 4];
+        let per_px = 0.5 / GRADIENT_HALF as f32;
+        for j in inside(y, self.height) {
+            for i in inside(x, self.width) {
+                let at = j * self.width + i;
+                let gx = per_px * (self.means[at + GRADIENT_HALF] - self.means[at - GRADIENT_HALF]);
+                let along = GRADIENT_HALF * self.width;
+                let gy = per_px * (self.means[at + along] - self.means[at - along]);
+                (xx, xy, yy, count) = (xx + gx * gx, xy + gx * gy, yy + gy * gy, count + 1.0);
+            }
+        }
+        f64::from((0.5 * (xx + yy) - (0.25 * (xx - yy).powi(2) + xy * xy).sqrt()) / count.max(1.0))
+    }
+}
