@@ -88,6 +88,18 @@ pub enum Error {
     #[error("the motion cannot be simulated: {detail}")]
     Simulation { detail: String },
 
+    /// A folder below which there is no recording.
+    #[error("{}: holds no recording and no table of angles; give the folder above them", path.display())]
+    NothingToDo { path: PathBuf },
+
+    /// An output folder in which another batch works.
+    #[error("{}: {holder} works here; wait for it, or give another --out", path.display())]
+    Busy { path: PathBuf, holder: String },
+
+    /// Results that cannot be kept, as the run of a recording says.
+    #[error("{line}; what was finished is kept, and the batch goes on from there when it is started again")]
+    Results { line: String },
+
     /// Stopped by the user.
     #[error("interrupted; nothing was written")]
     Interrupted,

@@ -18,6 +18,7 @@
 //! | fit | [`fit`] | angles and model → parameters, residuals, verdict |
 //! | diagnose | [`diagnose`] | angles and model → what the model lacks, how probable, and the proof |
 //! | paper | [`paper`] | the published tables, recomputed |
+//! | batch | [`batch`] | a folder of recordings → a folder of results, and their summary |
 //! | synth | [`synth`] | exact swings, rendered recordings with known truth |
 
 pub mod error;
@@ -25,6 +26,7 @@ pub mod experiment;
 pub mod output;
 pub mod progress;
 mod digits;
+mod digest;
 mod statistics;
 
 pub mod video;
@@ -47,6 +49,7 @@ pub mod fit;
 pub mod diagnose;
 pub mod paper;
 pub mod synth;
+pub mod batch;
 #[doc(hidden)]
 pub mod cli;
 

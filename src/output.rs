@@ -136,6 +136,15 @@ impl OutputFile {
     }
 }
 
+/// A copy of a file, whole or not at all.
+///
+/// # Errors
+/// [`Error::Unreadable`], [`Error::Unwritable`].
+pub fn copy(from: &Path, to: &Path) -> Result<()> {
+    let contents = std::fs::read(from).map_err(|e| Error::unreadable(from, e))?;
+    OutputFile::create(to)?.commit(&contents)
+}
+
 /// Standard output; a reader that has seen enough, such as `head`, is no failure.
 ///
 /// # Errors
@@ -145,6 +154,18 @@ pub fn to_standard_output(contents: &[u8]) -> std::io::Result<()> {
     match standard_output.write_all(contents).and_then(|()| standard_output.flush()) {
         Err(error) if error.kind() != ErrorKind::BrokenPipe => Err(error),
         _ => Ok(()),
+    }
+}
+
+/// How the names of temporary files begin.
+const TEMPORARY: &str = ".freeswing-";
+
+/// Removes what programs that were ended from outside have left in a folder, as well as that can be done.
+pub fn remove_left_temporaries(folder: &Path) {
+    for entry in std::fs::read_dir(folder).into_iter().flatten().flatten() {
+        if entry.file_name().to_string_lossy().starts_with(TEMPORARY) && entry.path().is_file() {
+            let _ = std::fs::remove_file(entry.path());
+        }
     }
 }
 
@@ -159,7 +180,7 @@ pub fn temporary_beside(path: &Path) -> Result<Temporary> {
     };
     let suffix = path.extension().map(|e| format!(".{}", e.to_string_lossy())).unwrap_or_default();
     let mut builder = tempfile::Builder::new();
-    builder.prefix(".freeswing-").suffix(&suffix);
+    builder.prefix(TEMPORARY).suffix(&suffix);
     #[cfg(unix)]
     {
         use std::os::unix::fs::PermissionsExt;

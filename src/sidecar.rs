@@ -3,14 +3,14 @@
 use std::path::Path;
 
 use serde::Serialize;
-use sha2::{Digest, Sha256};
 
 use crate::angles::AngleSource;
 use crate::caution::cautions;
-use crate::error::{Error, Result};
+use crate::digest;
+use crate::error::Result;
 use crate::measure::{Measurement, Options};
 use crate::track::Point;
-use crate::video::{Timing, stills_in};
+use crate::video::Timing;
 
 /// The file, ready to be written.
 #[derive(Debug, Serialize)]
@@ -253,35 +253,11 @@ impl Sidecar {
 
 impl Source {
     fn read(path: &Path) -> Result<Self> {
-        let (files, sha256_of) = if path.is_dir() {
-            (stills_in(path)?, "the bytes of the stills, one after the other in order")
-        } else {
-            (vec![path.to_owned()], "the file")
-        };
-        let mut digest = Sha256::new();
-        let mut bytes = 0;
-        for file in &files {
-            bytes += digest_file(file, &mut digest)?;
-        }
-        let sha256 = digest.finalize().iter().map(|b| format!("{b:02x}")).collect();
+        let sha256_of =
+            if path.is_dir() { "the bytes of the stills, one after the other in order" } else { "the file" };
+        let (sha256, bytes) = digest::of_recording(path)?;
         let file = path.file_name().map(|n| n.to_string_lossy().into_owned()).unwrap_or_default();
         Ok(Self { file, bytes, sha256, sha256_of })
-    }
-}
-
-/// Adds a file to a digest; returns its length.
-fn digest_file(path: &Path, digest: &mut Sha256) -> Result<u64> {
-    let failed = |e| Error::unreadable(path, e);
-    let mut file = std::fs::File::open(path).map_err(failed)?;
-    let mut buffer = vec![0u8; 1 << 20];
-    let mut bytes = 0;
-    loop {
-        let n = std::io::Read::read(&mut file, &mut buffer).map_err(failed)?;
-        if n == 0 {
-            return Ok(bytes);
-        }
-        bytes += n as u64;
-        digest.update(&buffer[..n]);
     }
 }
 

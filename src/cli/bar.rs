@@ -8,7 +8,7 @@ use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 
 use crate::error::Error;
 use crate::output;
-use crate::progress::Progress;
+use crate::progress::{Heard, Progress};
 
 static CANCELLED: AtomicBool = AtomicBool::new(false);
 /// Bars whose work stops by itself when it is asked to.
@@ -33,28 +33,45 @@ pub fn hear_interrupts() {
     });
 }
 
+/// Where progress is shown.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Shown {
+    /// On standard error, where that is a terminal.
+    OnTerminal,
+    /// On standard output, a line each time, for a program that watches.
+    AsLines,
+    /// Nowhere.
+    Nowhere,
+}
+
+/// Tells a program that watches. One that has gone hears nothing.
+fn tell(heard: &Heard) {
+    let line = serde_json::to_string(heard).unwrap_or_default() + "\n";
+    let _ = output::to_standard_output(line.as_bytes());
+}
+
 /// Shows progress; hears Ctrl-C.
 pub struct Bar {
     bar: Mutex<ProgressBar>,
-    quiet: bool,
+    shown: Shown,
     /// Whether it counts frames, all alike, not fits, some of which take a hundred times as long as others.
     frames: bool,
 }
 
 impl Bar {
-    /// A bar of frames that stays silent with `quiet`. While it lives, Ctrl-C asks the work to stop instead of ending it.
-    pub fn new(quiet: bool) -> Self {
+    /// A bar of frames. While it lives, Ctrl-C asks the work to stop instead of ending it.
+    pub fn of_frames(shown: Shown) -> Self {
         LISTENERS.fetch_add(1, Ordering::SeqCst);
-        Self::counting(true, quiet)
+        Self::counting(true, shown)
     }
 
     /// The same for work that counts fits: Ctrl-C ends it at once.
-    pub fn of_fits(quiet: bool) -> Self {
-        Self::counting(false, quiet)
+    pub fn of_fits(shown: Shown) -> Self {
+        Self::counting(false, shown)
     }
 
-    fn counting(frames: bool, quiet: bool) -> Self {
-        Self { bar: Mutex::new(ProgressBar::hidden()), quiet, frames }
+    fn counting(frames: bool, shown: Shown) -> Self {
+        Self { bar: Mutex::new(ProgressBar::hidden()), shown, frames }
     }
 
     /// What is shown of a stage. The time that is left can be told only where the steps are alike; elsewhere the time that has passed says as much.
@@ -86,7 +103,13 @@ impl Drop for Bar {
 impl Progress for Bar {
     fn begin(&self, stage: &'static str, total: Option<u64>) {
         // indicatif itself stays silent where standard error is no terminal
-        let target = if self.quiet { ProgressDrawTarget::hidden() } else { ProgressDrawTarget::stderr() };
+        let target = match self.shown {
+            Shown::OnTerminal => ProgressDrawTarget::stderr(),
+            Shown::AsLines | Shown::Nowhere => ProgressDrawTarget::hidden(),
+        };
+        if self.shown == Shown::AsLines {
+            tell(&Heard::Began { stage: stage.to_owned(), total });
+        }
         let new = ProgressBar::with_draw_target(total, target);
         if let Ok(style) = ProgressStyle::with_template(self.template(total)) {
             new.set_style(style);
@@ -95,14 +118,19 @@ impl Progress for Bar {
         self.with(|bar| {
             bar.finish_and_clear();
             *bar = new;
-            if !self.quiet {
+            if self.shown == Shown::OnTerminal {
                 bar.enable_steady_tick(TICK);
             }
         });
     }
 
     fn advance(&self, steps: u64) {
-        self.with(|bar| bar.inc(steps));
+        self.with(|bar| {
+            bar.inc(steps);
+            if self.shown == Shown::AsLines {
+                tell(&Heard::Stands { at: bar.position() });
+            }
+        });
     }
 
     fn is_cancelled(&self) -> bool {
@@ -116,8 +144,8 @@ mod tests {
 
     #[test]
     fn only_steps_that_are_alike_promise_a_time_that_is_left() {
-        assert!(Bar::new(true).template(Some(10)).contains("{eta} left"));
-        let fits = Bar::of_fits(true);
+        assert!(Bar::of_frames(Shown::Nowhere).template(Some(10)).contains("{eta} left"));
+        let fits = Bar::of_fits(Shown::Nowhere);
         assert!([Some(10), None].into_iter().all(|total| !fits.template(total).contains("eta")));
         assert!(fits.template(Some(10)).contains("{elapsed}"));
     }

@@ -5,7 +5,7 @@ use std::path::PathBuf;
 
 use serde_json::{Value, json};
 
-use super::Bar;
+use super::Console;
 use super::table::{Table, number, paragraph};
 use crate::error::{Error, Result};
 use crate::experiment::Experiment;
@@ -57,17 +57,17 @@ impl FitArgs {
     ///
     /// # Errors
     /// One line: what, where, what to do.
-    pub fn run(&self) -> Result<()> {
-        let experiment = super::read_experiment(&self.config)?;
+    pub fn run(&self, console: &Console) -> Result<()> {
+        let experiment = super::read_experiment(&self.config, console)?;
         let model = ForwardModel::of(&experiment)?;
         let marks = model.chain().groups().len();
-        let records = super::recordings(&self.angles, marks, (self.from, self.until))?;
+        let records = super::recordings(&self.angles, marks, (self.from, self.until), console)?;
         let free = free_parameters(&experiment, marks, &self.free, &self.fix)?;
         if experiment.model.effects.dropped_frames.is_some() {
             let id = Parameter::DroppedFrames.id();
-            eprintln!(
-                "warning: model.effects.{id} is not fitted: where frames are missing only `freeswing diagnose` finds"
-            );
+            console.warning(format!(
+                "model.effects.{id} is not fitted: where frames are missing only `freeswing diagnose` finds"
+            ));
         }
         let json = self.json.as_deref().map(OutputFile::create).transpose()?;
         let seen: Vec<Option<Seen>> = records.iter().map(Seen::of).collect();
@@ -75,7 +75,7 @@ impl FitArgs {
             seen.as_ref().map_or(Ok(()), |seen| fit::refuse_another_pace(record, seen, &experiment))?;
         }
         let window_s = std::f64::consts::TAU / model.pace_rad_s();
-        let bar = Bar::of_fits(self.quiet);
+        let bar = console.bar_of_fits(self.quiet);
         bar.begin("fitting", Some(fit::stages(&[]) + fit::stages(&free)));
         let side = |free: &[Parameter]| Ok(Side::of(fit::fit_watched(&records, &experiment, free, &bar)?, window_s));
         let report = Report {
@@ -88,7 +88,7 @@ impl FitArgs {
         };
         drop(bar);
         let text = if self.quiet { String::new() } else { report.text() };
-        super::deliver(&text, &report.json(), json)
+        super::deliver(&text, &report.json(), json, console)
     }
 }
 

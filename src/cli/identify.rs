@@ -2,6 +2,7 @@
 
 use std::path::PathBuf;
 
+use super::Console;
 use crate::error::{Error, Result};
 use crate::experiment::Experiment;
 use crate::identify::identify;
@@ -46,18 +47,19 @@ impl IdentifyArgs {
     ///
     /// # Errors
     /// One line: what, where, what to do.
-    pub fn run(&self) -> Result<()> {
-        let experiment = self.config.as_deref().map(Experiment::read).transpose()?.filter(describes_specimen);
+    pub fn run(&self, console: &Console) -> Result<()> {
+        let experiment = self.config.as_deref().map(Experiment::read).transpose()?;
+        let experiment = experiment.filter(|experiment| describes_specimen(experiment, console));
         self.keep_inputs()?;
         let json = self.json.as_deref().map(OutputFile::create).transpose()?;
-        let series = self.stretch(super::read_angles(&self.angles)?)?;
+        let series = self.stretch(super::read_angles(&self.angles, console)?)?;
         let found = identify(&series, experiment.as_ref())?;
         // where the first line of the report is not read, an answer without a mode must not pass for one
         if found.modes.is_empty() && !self.quiet {
-            eprintln!("warning: {}: {}", series.path.display(), found.summary);
+            console.warning(format!("{}: {}", series.path.display(), found.summary));
         }
         let text = if self.quiet { String::new() } else { found.to_string() };
-        super::deliver(&text, &found, json)
+        super::deliver(&text, &found, json, console)
     }
 
     /// The wanted stretch of time.
@@ -89,10 +91,10 @@ impl IdentifyArgs {
 }
 
 /// Whether a file describes a specimen; what is missing or odd is said on standard error.
-fn describes_specimen(experiment: &Experiment) -> bool {
-    experiment.warnings.iter().for_each(|warning| eprintln!("warning: {warning}"));
+fn describes_specimen(experiment: &Experiment, console: &Console) -> bool {
+    experiment.warnings.iter().for_each(|warning| console.warning(warning));
     if let Some(missing) = &experiment.missing {
-        eprintln!("warning: {missing}; going on without the specimen");
+        console.warning(format!("{missing}; going on without the specimen"));
     }
     experiment.missing.is_none()
 }

@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use super::Bar;
+use super::Console;
 use crate::error::{Error, Result};
 use crate::look::{Finding, look, preview, to_toml};
 use crate::measure::Options;
@@ -42,13 +42,13 @@ impl InitArgs {
     ///
     /// # Errors
     /// One line: what, where, what to do.
-    pub fn run(&self) -> Result<()> {
+    pub fn run(&self, console: &Console) -> Result<()> {
         self.keep_inputs()?;
         if self.out.exists() && !self.force && self.out.as_os_str() != "-" {
             let message = format!("{} exists already; name another file, or say --force", self.out.display());
             return Err(Error::Option { option: "--out".to_owned(), message });
         }
-        let bar = Bar::new(self.quiet);
+        let bar = console.bar_of_frames(self.quiet);
         let out = OutputFile::create(&self.out)?;
         let picture = self.preview.as_deref().map(OutputFile::create).transpose()?;
         let finding = look(&self.video, &Options::default(), Path::new(""), &bar)?;
@@ -59,7 +59,7 @@ impl InitArgs {
         let name = self.video.file_name().map_or_else(String::new, |n| n.to_string_lossy().into_owned());
         out.commit(to_toml(&finding, &name).as_bytes())?;
         if !self.quiet {
-            self.report(&finding);
+            self.report(&finding, console);
         }
         Ok(())
     }
@@ -84,22 +84,29 @@ impl InitArgs {
         Ok(())
     }
 
-    fn report(&self, finding: &Finding) {
+    fn report(&self, finding: &Finding, console: &Console) {
         let colours: Vec<&str> = finding.marks.iter().map(|m| m.colour.as_str()).collect();
         let (video, out) = (self.video.display(), self.out.display());
         match colours[..] {
-            [one] => eprintln!("{video}: 1 mark: {one}"),
-            _ => eprintln!("{video}: {} marks, from the hinge down: {}", colours.len(), colours.join(", ")),
+            [one] => console.remark(format!("{video}: 1 mark: {one}")),
+            _ => {
+                console.remark(format!("{video}: {} marks, from the hinge down: {}", colours.len(), colours.join(", ")))
+            }
         }
-        eprintln!("{}", hinge_in_words(finding));
+        console.remark(hinge_in_words(finding));
         match &self.preview {
-            Some(picture) => eprintln!("look at {} to see whether these are the marks", picture.display()),
-            None => eprintln!("to see whether these are the marks, run it again with --force --preview seen.png"),
+            Some(picture) => {
+                console.remark(format!("look at {} to see whether these are the marks", picture.display()))
+            }
+            None => console
+                .remark(format!("to see whether these are the marks, run it again with --force --preview seen.png")),
         }
         if self.out.as_os_str() == "-" {
-            eprintln!("keep what was written in a file; next: track {video} --config THE_FILE --out angles.csv");
+            console.remark(format!(
+                "keep what was written in a file; next: track {video} --config THE_FILE --out angles.csv"
+            ));
         } else {
-            eprintln!("written to {out}; next: track {video} --config {out} --out angles.csv");
+            console.remark(format!("written to {out}; next: track {video} --config {out} --out angles.csv"));
         }
     }
 }

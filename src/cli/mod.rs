@@ -1,6 +1,8 @@
 //! The command line: parse → options → stage → write → exit code. One file a command.
 
 mod bar;
+mod batch;
+mod console;
 mod diagnose;
 mod fit;
 mod identify;
@@ -8,6 +10,7 @@ mod init;
 mod modes;
 mod paper;
 mod render;
+mod run;
 mod simulate;
 mod svg;
 mod table;
@@ -19,6 +22,7 @@ use std::process::ExitCode;
 use clap::{Parser, Subcommand};
 
 pub use bar::Bar;
+use console::Console;
 
 use crate::experiment::Experiment;
 use crate::fit::Record;
@@ -44,6 +48,8 @@ enum Command {
     Modes(modes::ModesArgs),
     Render(render::RenderArgs),
     Paper(paper::PaperArgs),
+    Run(run::RunArgs),
+    Batch(batch::BatchArgs),
 }
 
 /// `track` alone, so that `track VIDEO --out angles.csv` works as typed.
@@ -58,17 +64,27 @@ impl Cli {
     /// Runs the command.
     pub fn run() -> ExitCode {
         bar::hear_interrupts();
-        exit(match Self::parse().command {
-            Command::Init(args) => args.run(),
-            Command::Track(args) => args.run(),
-            Command::Fit(args) => args.run(),
-            Command::Diagnose(args) => args.run(),
-            Command::Simulate(args) => args.run(),
-            Command::Identify(args) => args.run(),
-            Command::Render(args) => args.run(),
-            Command::Modes(args) => args.run(),
-            Command::Paper(args) => args.run(),
-        })
+        exit(Self::parse().command.run(&Console::default()))
+    }
+}
+
+impl Command {
+    fn run(&self, console: &Console) -> crate::Result<ExitCode> {
+        match self {
+            // a batch of which some failed is neither a success nor a failure
+            Self::Batch(args) => return args.run(console),
+            Self::Init(args) => args.run(console),
+            Self::Track(args) => args.run(console),
+            Self::Fit(args) => args.run(console),
+            Self::Diagnose(args) => args.run(console),
+            Self::Simulate(args) => args.run(console),
+            Self::Identify(args) => args.run(console),
+            Self::Render(args) => args.run(console),
+            Self::Modes(args) => args.run(console),
+            Self::Paper(args) => args.run(console),
+            Self::Run(args) => args.run(console),
+        }?;
+        Ok(ExitCode::SUCCESS)
     }
 }
 
@@ -76,14 +92,14 @@ impl TrackCli {
     /// Runs `track`.
     pub fn run() -> ExitCode {
         bar::hear_interrupts();
-        exit(Self::parse().args.run())
+        exit(Self::parse().args.run(&Console::default()).map(|()| ExitCode::SUCCESS))
     }
 }
 
 /// 0 done, 2 bad input or a failed stage, with one line on standard error.
-fn exit(outcome: crate::Result<()>) -> ExitCode {
+fn exit(outcome: crate::Result<ExitCode>) -> ExitCode {
     match outcome {
-        Ok(()) => ExitCode::SUCCESS,
+        Ok(code) => code,
         Err(error) => {
             eprintln!("error: {error}");
             ExitCode::from(2)
@@ -92,27 +108,32 @@ fn exit(outcome: crate::Result<()>) -> ExitCode {
 }
 
 /// A table of angles; what of it is passed over is said on standard error.
-fn read_angles(path: &Path) -> crate::Result<AngleSeries> {
+fn read_angles(path: &Path, console: &Console) -> crate::Result<AngleSeries> {
     let series = AngleSeries::read(path)?;
     for warning in &series.warnings {
-        eprintln!("warning: {warning}");
+        console.warning(warning);
     }
     Ok(series)
 }
 
 /// An experiment file for a command that needs the specimen; what is odd in it is said on standard error.
-fn read_experiment(path: &Path) -> crate::Result<Experiment> {
+fn read_experiment(path: &Path, console: &Console) -> crate::Result<Experiment> {
     let experiment = Experiment::read_with_specimen(path)?;
     for warning in &experiment.warnings {
-        eprintln!("warning: {warning}");
+        console.warning(warning);
     }
     Ok(experiment)
 }
 
 /// The tables of some recordings, from one stamp until another.
-fn recordings(paths: &[PathBuf], marks: usize, (from_s, until_s): (f64, f64)) -> crate::Result<Vec<Record>> {
+fn recordings(
+    paths: &[PathBuf],
+    marks: usize,
+    (from_s, until_s): (f64, f64),
+    console: &Console,
+) -> crate::Result<Vec<Record>> {
     let read = |path: &PathBuf| {
-        let series = read_angles(path)?;
+        let series = read_angles(path, console)?;
         let kept = series.slice(series.rows(from_s, until_s));
         if kept.len() < crate::series::FEWEST_ROWS {
             let message = format!("{} rows between --from and --until; widen them", kept.len());
@@ -124,18 +145,17 @@ fn recordings(paths: &[PathBuf], marks: usize, (from_s, until_s): (f64, f64)) ->
 }
 
 /// Prints a report; with a file for JSON writes it there, and prints nothing where that file is standard output.
-fn deliver(text: &str, report: &impl serde::Serialize, json: Option<OutputFile>) -> crate::Result<()> {
+fn deliver(
+    text: &str,
+    report: &impl serde::Serialize,
+    json: Option<OutputFile>,
+    console: &Console,
+) -> crate::Result<()> {
     if !json.as_ref().is_some_and(OutputFile::is_standard_output) {
-        print(text)?;
+        console.print(text)?;
     }
     let Some(json) = json else { return Ok(()) };
     // numbers, strings and lists of them cannot fail to serialise
     let contents = serde_json::to_string_pretty(report).unwrap_or_default() + "\n";
     json.commit(contents.as_bytes())
-}
-
-/// Standard output.
-fn print(text: &str) -> crate::Result<()> {
-    crate::output::to_standard_output(text.as_bytes())
-        .map_err(|e| crate::Error::unwritable("standard output".as_ref(), e))
 }

@@ -4,6 +4,7 @@ use std::f64::consts::PI;
 use std::fmt::Write;
 use std::path::PathBuf;
 
+use super::Console;
 use super::table::{Table, number, paragraph, setting};
 use crate::error::Result;
 use crate::model::modes::{Component, RodMode, Survey};
@@ -36,10 +37,15 @@ impl ModesArgs {
     ///
     /// # Errors
     /// One line: what, where, what to do.
-    pub fn run(&self) -> Result<()> {
-        let experiment = super::read_experiment(&self.config)?;
+    pub fn run(&self, console: &Console) -> Result<()> {
+        let experiment = super::read_experiment(&self.config, console)?;
         let survey = Survey::of(&experiment)?;
-        super::deliver(&survey_text(&survey), &survey, self.json.as_deref().map(OutputFile::create).transpose()?)
+        super::deliver(
+            &survey_text(&survey),
+            &survey,
+            self.json.as_deref().map(OutputFile::create).transpose()?,
+            console,
+        )
     }
 }
 

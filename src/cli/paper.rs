@@ -3,6 +3,7 @@
 use std::fmt::Write;
 use std::path::PathBuf;
 
+use super::Console;
 use super::table::{Table, number, paragraph};
 use crate::error::Result;
 use crate::output::OutputFile;
@@ -30,10 +31,10 @@ impl PaperArgs {
     ///
     /// # Errors
     /// One line: what, where, what to do.
-    pub fn run(&self) -> Result<()> {
+    pub fn run(&self, console: &Console) -> Result<()> {
         let json = self.json.as_deref().map(OutputFile::create).transpose()?;
         let reproduction = Reproduction::of(self.distance_m)?;
-        super::deliver(&reproduction_text(&reproduction), &reproduction, json)
+        super::deliver(&reproduction_text(&reproduction), &reproduction, json, console)
     }
 }
 

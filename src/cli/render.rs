@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use super::Bar;
+use super::Console;
 use crate::error::{Error, Result};
 use crate::progress::Progress;
 use crate::synth::Recording;
@@ -41,8 +41,8 @@ impl RenderArgs {
     ///
     /// # Errors
     /// One line: what, where, what to do.
-    pub fn run(&self) -> Result<()> {
-        let mut experiment = super::read_experiment(&self.config)?;
+    pub fn run(&self, console: &Console) -> Result<()> {
+        let mut experiment = super::read_experiment(&self.config, console)?;
         let render = &mut experiment.render;
         render.seed = self.seed.unwrap_or(render.seed);
         render.duration_s = self.duration.unwrap_or(render.duration_s);
@@ -54,7 +54,7 @@ impl RenderArgs {
             return Err(Error::Option { option: "--out".to_owned(), message });
         }
         let recording = Recording::of(&experiment)?;
-        let bar = Bar::new(self.quiet);
+        let bar = console.bar_of_frames(self.quiet);
         bar.begin("rendering", Some(recording.len() as u64));
         recording.write(&self.out, self.truth.as_deref(), &mut |_| {
             bar.advance(1);

@@ -6,6 +6,7 @@ use std::path::PathBuf;
 use rand::SeedableRng;
 use rand_distr::{Distribution, Normal};
 
+use super::Console;
 use crate::error::{Error, Result};
 use crate::output::OutputFile;
 use crate::synth::Swing;
@@ -47,8 +48,8 @@ impl SimulateArgs {
     ///
     /// # Errors
     /// One line: what, where, what to do.
-    pub fn run(&self) -> Result<()> {
-        let mut experiment = super::read_experiment(&self.config)?;
+    pub fn run(&self, console: &Console) -> Result<()> {
+        let mut experiment = super::read_experiment(&self.config, console)?;
         let render = &mut experiment.render;
         render.duration_s = positive("--duration", self.duration.unwrap_or(render.duration_s))?;
         render.fps = positive("--rate", self.rate.unwrap_or(render.fps))?;

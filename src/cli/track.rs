@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use clap::{Args, ValueEnum};
 
-use super::Bar;
+use super::Console;
 use crate::angles::{self, AngleSource};
 use crate::caution::slow_motion;
 use crate::detect::debug::DebugFolder;
@@ -149,13 +149,13 @@ impl TrackArgs {
     ///
     /// # Errors
     /// Whatever [`measure`] and the outputs report.
-    pub fn run(&self) -> Result<()> {
+    pub fn run(&self, console: &Console) -> Result<()> {
         let experiment = self.config.as_deref().map(Experiment::read_rig).transpose()?;
         let folder = self.config.as_deref().and_then(Path::parent).unwrap_or(Path::new("")).to_owned();
         let options = self.options(experiment.clone().unwrap_or_default())?;
         self.keep_inputs()?;
         // before the first temporary file, so that Ctrl-C leaves none behind
-        let bar = Bar::new(self.quiet);
+        let bar = console.bar_of_frames(self.quiet);
         let mut table = OutputFile::create(&self.out)?;
         let mut beside = self.sidecar_path().map(|path| OutputFile::create(&path)).transpose()?;
         self.overlay.as_deref().map(overlay::check_target).transpose()?;
@@ -188,7 +188,7 @@ impl TrackArgs {
         table.appear()?;
         beside.map_or(Ok(()), OutputFile::appear)?;
         if !self.quiet {
-            self.report(&measurement, &sidecar);
+            self.report(&measurement, &sidecar, console);
         }
         Ok(())
     }
@@ -286,19 +286,19 @@ impl TrackArgs {
             .then(|| self.out.with_extension("json"))
     }
 
-    fn report(&self, measurement: &Measurement, sidecar: &Sidecar) {
+    fn report(&self, measurement: &Measurement, sidecar: &Sidecar, console: &Console) {
         for warning in &sidecar.warnings {
-            eprintln!("warning: {warning}");
+            console.warning(warning);
         }
         let links = &measurement.angles.links;
         let measured = (0..measurement.timing.frames).filter(|f| links.iter().all(|l| l[*f].is_some())).count();
-        eprintln!(
+        console.remark(format!(
             "{}: {} frame{}, all angles in {measured}, written to {}",
             self.video.display(),
             measurement.timing.frames,
             if measurement.timing.frames == 1 { "" } else { "s" },
             self.out.display()
-        );
+        ));
     }
 }
 

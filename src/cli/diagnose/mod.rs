@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 
 use serde_json::json;
 
-use super::Bar;
+use super::Console;
 use super::table::number;
 use crate::diagnose::{self, report::Limits};
 use crate::error::{Error, Result};
@@ -76,17 +76,17 @@ impl DiagnoseArgs {
     ///
     /// # Errors
     /// One line: what, where, what to do.
-    pub fn run(&self) -> Result<()> {
+    pub fn run(&self, console: &Console) -> Result<()> {
         self.figure.as_deref().map(check_figure).transpose()?;
-        let experiment = super::read_experiment(&self.config)?;
+        let experiment = super::read_experiment(&self.config, console)?;
         if self.detectable {
-            return self.plan(&experiment);
+            return self.plan(&experiment, console);
         }
         let marks = ForwardModel::of(&experiment)?.chain().groups().len();
-        let records = super::recordings(&self.angles, marks, (self.from, self.until))?;
+        let records = super::recordings(&self.angles, marks, (self.from, self.until), console)?;
         let json = self.json.as_deref().map(OutputFile::create).transpose()?;
         let figure = self.figure.as_deref().map(OutputFile::create).transpose()?;
-        let bar = Bar::of_fits(self.quiet);
+        let bar = console.bar_of_fits(self.quiet);
         let diagnosis = diagnose::diagnose(&records, &experiment, &self.options(), &bar)?;
         drop(bar);
         let alone = figure.as_ref().is_some_and(OutputFile::is_standard_output);
@@ -94,7 +94,7 @@ impl DiagnoseArgs {
         if let Some(file) = figure {
             file.commit(Figure::of(&diagnosis)?.svg().as_bytes())?;
         }
-        super::deliver(&text, &json!(diagnosis), json)
+        super::deliver(&text, &json!(diagnosis), json, console)
     }
 
     fn options(&self) -> diagnose::Options {
@@ -106,7 +106,7 @@ impl DiagnoseArgs {
     }
 
     /// What a planned recording could show.
-    fn plan(&self, experiment: &Experiment) -> Result<()> {
+    fn plan(&self, experiment: &Experiment, console: &Console) -> Result<()> {
         for (option, value) in [("--duration", self.duration), ("--rate", self.rate), ("--noise-rad", self.noise_rad)] {
             if !(value.is_finite() && value > 0.0) {
                 let message = format!("{value}: must be a positive number");
@@ -128,7 +128,7 @@ impl DiagnoseArgs {
             number(1e3 * plan.noise_rad, 3)
         );
         let text = if self.quiet { String::new() } else { heading + &page::limits_table(&limits) };
-        super::deliver(&text, &json!({"schema": "freeswing.diagnosis/1", "detectable": Limits(limits)}), json)
+        super::deliver(&text, &json!({"schema": "freeswing.diagnosis/1", "detectable": Limits(limits)}), json, console)
     }
 }
 

@@ -1,0 +1,200 @@
+//! The runs of a batch: each a process of its own, as many at once as there are cores.
+//!
+//! The largest recordings come first, so that none is left over when the others are done. A run may use twice its share of the cores, and at least two: what one
+//! cannot use at the moment another does.
+
+use std::collections::VecDeque;
+use std::fs;
+use std::io::{BufRead, BufReader, Read};
+use std::path::{Path, PathBuf};
+use std::process::{ChildStderr, Command, Stdio};
+use std::sync::{Mutex, PoisonError};
+use std::time::{Instant, SystemTime};
+
+use super::Options;
+use super::find::Found;
+use super::layers::{self, Layered};
+use super::state::{self, Fingerprint, Finished, Status};
+use crate::error::{Error, Result};
+use crate::output::OutputFile;
+use crate::progress::Heard;
+
+/// A recording to be run.
+#[derive(Debug)]
+pub struct Job<'p> {
+    /// The recording.
+    pub found: &'p Found,
+    /// Of its results.
+    pub folder: PathBuf,
+    /// Its size, which tells about how long it takes.
+    pub bytes: u64,
+}
+
+/// Hears how a batch goes. A lane is one of the processes that run at a time.
+pub trait Watch: Sync {
+    /// So many recordings there are, and so many are to be run.
+    fn begin(&self, all: usize, to_run: usize);
+    /// A run begins.
+    fn begun(&self, lane: usize, name: &str);
+    /// How far it is.
+    fn heard(&self, lane: usize, heard: &Heard);
+    /// It has ended.
+    fn ended(&self, lane: usize, name: &str, finished: &Finished, seconds: f64);
+    /// Whether no further one is to be begun.
+    fn is_cancelled(&self) -> bool;
+}
+
+/// What runs the jobs.
+pub struct Crew<'o> {
+    /// What is asked for.
+    pub options: &'o Options,
+    /// Who hears of it.
+    pub watch: &'o dyn Watch,
+}
+
+impl Crew<'_> {
+    /// Runs all jobs.
+    ///
+    /// # Errors
+    /// [`Error::Interrupted`]; what keeps any result from being written. A recording that fails is none.
+    pub fn run(&self, mut jobs: Vec<Job<'_>>) -> Result<()> {
+        let whole = jobs.iter().map(|job| job.bytes).sum::<u64>().max(1);
+        jobs.sort_by(|a, b| b.bytes.cmp(&a.bytes).then_with(|| a.found.name.cmp(&b.found.name)));
+        let queue = Mutex::new(VecDeque::from(jobs));
+        let stopped = Mutex::new(None);
+        let next = || queue.lock().unwrap_or_else(PoisonError::into_inner).pop_front();
+        let has_stopped =
+            || stopped.lock().is_ok_and(|error: std::sync::MutexGuard<'_, Option<Error>>| error.is_some());
+        let lane = |lane: usize| {
+            while let Some(job) = next().filter(|_| !has_stopped()) {
+                let share = job.bytes as f64 / whole as f64;
+                let threads =
+                    ((2.0 * share * self.options.cores as f64).ceil() as usize).clamp(2, self.options.cores.max(2));
+                if let Err(error) = self.job(lane, &job, threads) {
+                    // the first says what happened, the others follow from it
+                    stopped.lock().unwrap_or_else(PoisonError::into_inner).get_or_insert(error);
+                }
+            }
+        };
+        std::thread::scope(|scope| {
+            let lane = &lane;
+            (0..self.options.cores).for_each(|own| _ = scope.spawn(move || lane(own)));
+        });
+        stopped.into_inner().unwrap_or_else(PoisonError::into_inner).map_or(Ok(()), Err)
+    }
+
+    /// One run, to its end and its `run.json`.
+    fn job(&self, lane: usize, job: &Job<'_>, threads: usize) -> Result<()> {
+        if self.watch.is_cancelled() {
+            return Err(Error::Interrupted);
+        }
+        self.watch.begun(lane, &job.found.name);
+        let began = Instant::now();
+        fs::create_dir_all(&job.folder).map_err(|e| Error::unwritable(&job.folder, e))?;
+        state::forget(&job.folder)?;
+        let before = seen(&job.found.path);
+        let fingerprint = Fingerprint::of(job.found, &self.options.words);
+        let mut ended = self.process(lane, job, threads)?;
+        if ended.is_none() && seen(&job.found.path) != before {
+            ended = Some(format!(
+                "error: {}: changed while it was processed; run the batch again",
+                job.found.path.display()
+            ));
+        }
+        // what has no fingerprint is done again the next time
+        let unknown = Fingerprint {
+            recording_sha256: String::new(),
+            config_sha256: String::new(),
+            words: Vec::new(),
+            version: String::new(),
+        };
+        let unchanged = seen(&job.found.path) == before;
+        let finished = Finished {
+            schema: "freeswing.run/1".to_owned(),
+            fingerprint: fingerprint.ok().filter(|_| unchanged).unwrap_or(unknown),
+            status: if ended.is_none() { Status::Done } else { Status::Failed },
+            reason: ended.unwrap_or_default(),
+        };
+        state::write(&job.folder, &finished)?;
+        self.watch.ended(lane, &job.found.name, &finished, began.elapsed().as_secs_f64());
+        Ok(())
+    }
+
+    /// The process of a run; the line with which it failed, if it did.
+    fn process(&self, lane: usize, job: &Job<'_>, threads: usize) -> Result<Option<String>> {
+        let config = match layers::together(&job.found.configs) {
+            Ok(Layered::None) => None,
+            Ok(Layered::One(path)) => Some(path),
+            Ok(Layered::Several(text)) => {
+                let path = job.folder.join("experiment.toml");
+                OutputFile::create(&path)?.commit(text.as_bytes())?;
+                Some(path)
+            }
+            Err(error) => return Ok(Some(format!("error: {error}"))),
+        };
+        let mut command = Command::new(&self.options.program);
+        command.arg("run").arg(as_argument(&job.found.path)).arg("--out").arg(as_argument(&job.folder));
+        command.args(config.iter().flat_map(|config| ["--config".into(), as_argument(config)]));
+        command.args(["--threads", &threads.to_string(), "--watched"]).args(&self.options.words);
+        // its standard input ends when this process does, however that comes about, and with it the run
+        let child = command.stdin(Stdio::piped()).stdout(Stdio::piped()).stderr(Stdio::piped()).spawn();
+        let mut child = child.map_err(|e| Error::unreadable(&self.options.program, e))?;
+        let (told, errors) = (child.stdout.take(), child.stderr.take());
+        let said = std::thread::scope(|scope| {
+            let said = scope.spawn(|| errors.map(whole_text).unwrap_or_default());
+            for line in told.into_iter().flat_map(|told| BufReader::new(told).lines()).map_while(std::io::Result::ok) {
+                // what another version would say is passed over
+                if let Ok(heard) = serde_json::from_str(&line) {
+                    self.watch.heard(lane, &heard);
+                }
+            }
+            said.join().unwrap_or_default()
+        });
+        let status = child.wait().map_err(|e| Error::unreadable(&self.options.program, e))?;
+        if status.success() {
+            return Ok(None);
+        }
+        let line = said.lines().rev().find(|line| line.starts_with("error: "));
+        let line = line.map_or_else(|| ended_without_a_word(&job.found.path, &status), str::to_owned);
+        self.unless_of_all(&line, &job.folder)?;
+        Ok(Some(line))
+    }
+
+    /// What is no fault of the recording: the user has stopped it all, or nothing can be written any more.
+    fn unless_of_all(&self, line: &str, folder: &Path) -> Result<()> {
+        let told = line.trim_start_matches("error: ");
+        if self.watch.is_cancelled() || told == Error::Interrupted.to_string() {
+            return Err(Error::Interrupted);
+        }
+        let is_result = told.starts_with(&folder.display().to_string());
+        if is_result && told.contains(": cannot be written: ") {
+            return Err(Error::Results { line: told.to_owned() });
+        }
+        Ok(())
+    }
+}
+
+/// Size and time of the last change, by which a file that changes meanwhile is known.
+fn seen(path: &Path) -> Option<(u64, SystemTime)> {
+    let own = fs::metadata(path).ok()?;
+    Some((own.len(), own.modified().ok()?))
+}
+
+/// A path that cannot be taken for an option.
+fn as_argument(path: &Path) -> PathBuf {
+    if path.as_os_str().as_encoded_bytes().starts_with(b"-") { Path::new(".").join(path) } else { path.to_owned() }
+}
+
+fn whole_text(mut errors: ChildStderr) -> String {
+    let mut bytes = Vec::new();
+    // what was said before it broke off is what there is
+    let _ = errors.read_to_end(&mut bytes);
+    String::from_utf8_lossy(&bytes).into_owned()
+}
+
+fn ended_without_a_word(path: &Path, status: &std::process::ExitStatus) -> String {
+    format!(
+        "error: {}: the run was ended from outside ({status}), perhaps for want of memory; run it alone to see",
+        path.display()
+    )
+}

@@ -1,0 +1,183 @@
+//! A folder of experiments → a folder of results: every recording and every table of angles below it, one run each, and one summary of all.
+//!
+//! | file | holds |
+//! |---|---|
+//! | [`find`] | the recordings below a folder, with the experiment files that hold for each |
+//! | [`layers`] | experiment files inherited downwards, put together |
+//! | [`state`] | what was finished, of which contents, and by which version |
+//! | [`lock`] | one batch at a time in an output folder |
+//! | [`crew`] | the runs: each a process of its own, as many at once as there are cores |
+//! | [`summary`] | a row a recording, as CSV and Parquet |
+//! | [`index`] | the same as a page |
+//!
+//! Every run is a process of its own: a recording that brings a decoder down, or takes all memory, is a row with its reason and not the end of the others, and
+//! what a recording leaves is by construction what the command alone leaves.
+
+pub mod crew;
+pub mod find;
+pub mod index;
+pub mod layers;
+pub mod lock;
+pub mod state;
+pub mod summary;
+
+use std::path::PathBuf;
+
+use crate::error::{Error, Result};
+use crew::{Crew, Job, Watch};
+use find::Found;
+use lock::Lock;
+use state::{Fingerprint, Finished, Status};
+use summary::Row;
+
+/// One part of several: of the recordings in order every `of`-th, beginning with number `part`, from 1.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Shard {
+    /// Which.
+    pub part: usize,
+    /// Of how many.
+    pub of: usize,
+}
+
+/// What a batch is asked for.
+#[derive(Debug, Clone)]
+pub struct Options {
+    /// Recordings and tables are below it.
+    pub input: PathBuf,
+    /// Results go below it.
+    pub output: PathBuf,
+    /// Only recordings whose path below the input folder matches.
+    pub only: Option<globset::GlobMatcher>,
+    /// Do failed ones again.
+    pub retry_failed: bool,
+    /// A part of all.
+    pub shard: Option<Shard>,
+    /// Cores.
+    pub cores: usize,
+    /// What every run is asked for besides, as words of its command.
+    pub words: Vec<String>,
+    /// The program that runs a recording.
+    pub program: PathBuf,
+}
+
+/// A recording, and what is to be done with it.
+#[derive(Debug)]
+pub struct Planned {
+    /// The recording.
+    pub found: Found,
+    /// What is to be done, and why.
+    pub plan: Plan,
+}
+
+/// What is to be done with a recording.
+#[derive(Debug)]
+pub enum Plan {
+    /// To be run.
+    Run,
+    /// Finished before, of the same contents.
+    Finished(Finished),
+    /// Not to be run, for a reason.
+    Skip(String),
+}
+
+/// How many of all came to what.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub struct Tally {
+    /// Done, now or before.
+    pub done: usize,
+    /// Failed, now or before.
+    pub failed: usize,
+    /// Left out.
+    pub skipped: usize,
+}
+
+/// Every recording below the input folder, sorted by path, with what is to be done.
+///
+/// # Errors
+/// [`Error::Unreadable`] for the input folder, [`Error::NothingToDo`] where it holds no recording.
+pub fn plan(options: &Options) -> Result<Vec<Planned>> {
+    let found = find::recordings(&options.input, &options.output)?;
+    if found.is_empty() {
+        return Err(Error::NothingToDo { path: options.input.clone() });
+    }
+    let names: Vec<PathBuf> = found.iter().map(|found| found.path.clone()).collect();
+    let planned = |(index, found): (usize, Found)| {
+        let plan = options.plan_of(index, &found, &names);
+        Planned { found, plan }
+    };
+    Ok(found.into_iter().enumerate().map(planned).collect())
+}
+
+impl Options {
+    fn plan_of(&self, index: usize, found: &Found, all: &[PathBuf]) -> Plan {
+        let folder = self.folder_of(found);
+        if self.shard.is_some_and(|shard| index % shard.of != shard.part - 1) {
+            return Plan::Skip("it belongs to another part (--shard)".to_owned());
+        }
+        if self.only.as_ref().is_some_and(|only| !only.is_match(&found.name)) {
+            // what was finished before stays what it was
+            return state::read(&folder)
+                .map_or_else(|| Plan::Skip("not asked for (--only)".to_owned()), Plan::Finished);
+        }
+        if let Some(recording) = found.made_from(all) {
+            return Plan::Skip(format!("made from {}, which is in this folder", recording.display()));
+        }
+        match state::read(&folder) {
+            Some(finished) if self.still_holds(&finished, found) => Plan::Finished(finished),
+            _ => Plan::Run,
+        }
+    }
+
+    /// Whether what was finished is what would be done now.
+    fn still_holds(&self, finished: &Finished, found: &Found) -> bool {
+        let wanted = finished.status == Status::Done || !self.retry_failed;
+        wanted && Fingerprint::of(found, &self.words).is_ok_and(|now| now == finished.fingerprint)
+    }
+
+    /// The folder of a recording's results.
+    pub fn folder_of(&self, found: &Found) -> PathBuf {
+        self.output.join(&found.name)
+    }
+}
+
+/// Runs what is to be run, and writes the summary of all: `summary.csv`, `summary.parquet`, `index.html`. A part of several writes none.
+///
+/// # Errors
+/// [`Error::Busy`] where another batch works in the output folder, [`Error::Unwritable`] where it cannot be written, [`Error::Interrupted`].
+pub fn run(options: &Options, watch: &dyn Watch) -> Result<Tally> {
+    std::fs::create_dir_all(&options.output).map_err(|e| Error::unwritable(&options.output, e))?;
+    let _lock = Lock::take(&options.output, options.shard)?;
+    let planned = plan(options)?;
+    let jobs: Vec<Job<'_>> = planned
+        .iter()
+        .filter(|planned| matches!(planned.plan, Plan::Run))
+        .map(|planned| options.job(planned))
+        .collect();
+    watch.begin(planned.len(), jobs.len());
+    Crew { options, watch }.run(jobs)?;
+    let rows = planned.iter().map(|planned| options.row(planned)).collect::<Vec<Row>>();
+    if options.shard.is_none() {
+        summary::write(&options.output, &rows)?;
+        index::write(&options.output, &rows)?;
+    }
+    let count = |status: Status| rows.iter().filter(|row| row.status == status).count();
+    Ok(Tally { done: count(Status::Done), failed: count(Status::Failed), skipped: count(Status::Skipped) })
+}
+
+impl Options {
+    fn job<'p>(&self, planned: &'p Planned) -> Job<'p> {
+        Job { found: &planned.found, folder: self.folder_of(&planned.found), bytes: planned.found.bytes() }
+    }
+
+    /// The row of a recording, from what stands in its folder.
+    fn row(&self, planned: &Planned) -> Row {
+        let folder = self.folder_of(&planned.found);
+        match &planned.plan {
+            Plan::Skip(reason) => Row::skipped(&planned.found.name, reason),
+            Plan::Run | Plan::Finished(_) => state::read(&folder).map_or_else(
+                || Row::skipped(&planned.found.name, "not finished; run the batch again"),
+                |finished| Row::of(&planned.found.name, &folder, &finished),
+            ),
+        }
+    }
+}

@@ -1,0 +1,107 @@
+//! What was finished: `run.json` in the folder of a recording, written last. A folder without it is not finished, whatever else it holds.
+
+use std::path::Path;
+
+use serde::{Deserialize, Serialize};
+
+use super::find::Found;
+use super::layers;
+use crate::digest;
+use crate::error::{Error, Result};
+use crate::output::OutputFile;
+
+/// The file.
+pub const FILE: &str = "run.json";
+
+/// How a run ended.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Status {
+    /// Every stage.
+    Done,
+    /// A stage ended with an error.
+    Failed,
+    /// It was not run.
+    Skipped,
+}
+
+impl Status {
+    /// As it stands in tables.
+    pub fn id(self) -> &'static str {
+        match self {
+            Self::Done => "done",
+            Self::Failed => "failed",
+            Self::Skipped => "skipped",
+        }
+    }
+}
+
+/// What a result depends on.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Fingerprint {
+    /// Of the recording: SHA-256 of a file; of stills that of all in order.
+    pub recording_sha256: String,
+    /// Of the experiment file, or of several put together; empty where there is none.
+    pub config_sha256: String,
+    /// What the run was asked for besides.
+    pub words: Vec<String>,
+    /// The program's.
+    pub version: String,
+}
+
+/// A finished run.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Finished {
+    /// `freeswing.run/1`.
+    pub schema: String,
+    /// Of what.
+    pub fingerprint: Fingerprint,
+    /// How it ended.
+    pub status: Status,
+    /// The line with which it failed.
+    pub reason: String,
+}
+
+impl Fingerprint {
+    /// Of a recording as it stands now.
+    ///
+    /// # Errors
+    /// [`Error::Unreadable`], and what the experiment files report.
+    pub fn of(found: &Found, words: &[String]) -> Result<Self> {
+        let config = layers::together(&found.configs)?.contents()?;
+        Ok(Self {
+            recording_sha256: digest::of_recording(&found.path)?.0,
+            config_sha256: if config.is_empty() { String::new() } else { digest::of_bytes(&config) },
+            words: words.to_owned(),
+            version: env!("CARGO_PKG_VERSION").to_owned(),
+        })
+    }
+}
+
+/// What was finished in a folder; nothing where that cannot be read.
+pub fn read(folder: &Path) -> Option<Finished> {
+    let text = std::fs::read_to_string(folder.join(FILE)).ok()?;
+    serde_json::from_str(&text).ok()
+}
+
+/// Writes that a run is finished.
+///
+/// # Errors
+/// [`Error::Unwritable`].
+pub fn write(folder: &Path, finished: &Finished) -> Result<()> {
+    // strings serialise
+    let text = serde_json::to_string_pretty(finished).unwrap_or_default() + "\n";
+    OutputFile::create(&folder.join(FILE))?.commit(text.as_bytes())
+}
+
+/// From here on nothing in a folder is finished.
+///
+/// # Errors
+/// [`Error::Unwritable`].
+pub fn forget(folder: &Path) -> Result<()> {
+    let path = folder.join(FILE);
+    match std::fs::remove_file(&path) {
+        Err(error) if error.kind() != std::io::ErrorKind::NotFound => Err(Error::unwritable(&path, error)),
+        _ => Ok(()),
+    }
+}

@@ -1,0 +1,311 @@
+//! `freeswing run`: every stage for one recording, each as its own command would do it.
+
+use std::fs::{self, File, TryLockError};
+use std::path::{Path, PathBuf};
+
+use clap::{Parser, ValueEnum};
+
+use super::bar::Shown;
+use super::{Cli, Console};
+use crate::error::{Error, Result};
+use crate::experiment::Experiment;
+use crate::output;
+
+/// Track, identify, fit, diagnose and report one recording into a folder.
+#[derive(Debug, clap::Args)]
+#[command(after_help = "\
+Examples:
+  freeswing run videos/kapton.mp4 --config videos/kapton.base.toml --out kapton
+  freeswing run swing.mp4 --config experiment.toml --out swing --until identify
+  freeswing run angles.csv --config experiment.toml --out swing
+
+Leaves in the folder: angles.csv, angles.json, overlay.mp4, identify.json, fit.json, diagnosis.json, figures/, report.html, and
+log.txt with every command, as it could be typed alone, and what it printed. Where a stage fails, what was done before it is kept,
+the page shows it, and the exit code is 2. Without --config it ends with identify. What an earlier run left there is removed.")]
+pub struct RunArgs {
+    /// The recording, or a table of angles.
+    recording: PathBuf,
+    /// The experiment: marks, specimen, rig and base model.
+    #[arg(long, value_name = "TOML")]
+    config: Option<PathBuf>,
+    /// The folder for all of it.
+    #[arg(long, value_name = "DIR")]
+    out: PathBuf,
+    /// The last stage.
+    #[arg(long, value_name = "STAGE", default_value = "report")]
+    until: Stage,
+    /// No overlay.mp4, which takes about as long as the tracking.
+    #[arg(long)]
+    no_overlay: bool,
+    /// Cores to use; all by default.
+    #[arg(long, value_name = "N")]
+    threads: Option<usize>,
+    /// No progress, nothing on standard output.
+    #[arg(long)]
+    quiet: bool,
+    /// Progress as lines of JSON on standard output, for a program that watches.
+    #[arg(long, hide = true)]
+    watched: bool,
+}
+
+/// A stage of a run, in order.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, ValueEnum)]
+pub enum Stage {
+    /// Recording → angles.
+    Track,
+    /// Frequencies and damping.
+    Identify,
+    /// The forward model's parameters.
+    Fit,
+    /// What the model lacks.
+    Diagnose,
+    /// The page.
+    Report,
+}
+
+impl Stage {
+    const ALL: [Self; 5] = [Self::Track, Self::Identify, Self::Fit, Self::Diagnose, Self::Report];
+}
+
+/// What a run leaves in its folder.
+pub const OUTPUTS: [&str; 10] = [
+    "angles.csv",
+    "angles.json",
+    "overlay.mp4",
+    "identify.json",
+    "fit.json",
+    "diagnosis.json",
+    "experiment.toml",
+    "figures",
+    "report.html",
+    LOG,
+];
+/// Every command, and what it printed.
+const LOG: &str = "log.txt";
+
+impl RunArgs {
+    /// Runs the stages.
+    ///
+    /// # Errors
+    /// That of the stage that failed; what was done before is kept.
+    pub fn run(&self, _console: &Console) -> Result<()> {
+        if self.watched {
+            end_with_standard_input();
+        }
+        self.check()?;
+        let log = self.begin()?;
+        let console = Console::of_run(log, self.shown());
+        console.log(&format!("freeswing {}", env!("CARGO_PKG_VERSION")));
+        let outcome = self.stages(&console);
+        if let Err(error) = &outcome {
+            console.log(&format!("error: {error}"));
+        }
+        // the page shows how far it came, and why not further
+        let page = if self.until == Stage::Report { self.stage(Stage::Report, &console) } else { Ok(()) };
+        outcome.and(page)?;
+        if self.shown() == Shown::OnTerminal {
+            Console::default().print(&format!("{}\n", self.done()))?;
+        }
+        Ok(())
+    }
+
+    /// Every stage before the page.
+    fn stages(&self, console: &Console) -> Result<()> {
+        let wanted = Stage::ALL.into_iter().filter(|stage| *stage <= self.until && *stage != Stage::Report);
+        for stage in wanted {
+            if self.config.is_none() && stage > Stage::Identify {
+                console.warning("fit and diagnose need the specimen: give --config");
+                break;
+            }
+            self.stage(stage, console)?;
+        }
+        Ok(())
+    }
+
+    /// One stage, by its own command.
+    fn stage(&self, stage: Stage, console: &Console) -> Result<()> {
+        let Some(words) = self.words(stage)? else { return Ok(()) };
+        console.log(&format!("\n$ {}", as_typed(&words)));
+        // the words are the program's own: they are sound unless a path looks like an option
+        let cli = Cli::try_parse_from(&words).map_err(|error| Error::Option {
+            option: as_typed(&words),
+            message: error.to_string().lines().next().unwrap_or_default().to_owned(),
+        })?;
+        cli.command.run(console).map(drop)
+    }
+
+    /// The command of a stage; nothing where a table of angles needs no tracking.
+    fn words(&self, stage: Stage) -> Result<Option<Vec<String>>> {
+        let own = |name: &str| path_text(&self.out.join(name));
+        let config = self.config.as_deref().map(path_text).transpose()?;
+        let config = || config.iter().flat_map(|config| ["--config".to_owned(), config.clone()]);
+        // of a table that was given messages speak by its own name
+        let angles = if is_table(&self.recording) { path_text(&self.recording)? } else { own("angles.csv")? };
+        let words = |words: &[&str]| words.iter().map(|word| (*word).to_owned()).collect::<Vec<String>>();
+        let mut all = words(&["freeswing"]);
+        match stage {
+            Stage::Track => {
+                if is_table(&self.recording) {
+                    output::copy(&self.recording, &self.out.join("angles.csv"))?;
+                    return Ok(None);
+                }
+                all.extend(words(&["track", &path_text(&self.recording)?, "--out", &own("angles.csv")?]));
+                all.extend(config());
+                if !self.no_overlay {
+                    all.extend(words(&["--overlay", &own("overlay.mp4")?]));
+                }
+                if let Some(threads) = self.threads {
+                    all.extend(words(&["--threads", &threads.to_string()]));
+                }
+            }
+            Stage::Identify => {
+                all.extend(words(&["identify", &angles, "--json", &own("identify.json")?]));
+                all.extend(config());
+            }
+            Stage::Fit => {
+                all.extend(words(&["fit", &angles, "--json", &own("fit.json")?]));
+                all.extend(config());
+            }
+            Stage::Diagnose => {
+                all.extend(words(&["diagnose", &angles, "--json", &own("diagnosis.json")?]));
+                all.extend(words(&["--figure", &own("figures/diagnosis.svg")?]));
+                all.extend(config());
+            }
+            Stage::Report => all.extend(words(&["report", &own("")?])),
+        }
+        Ok(Some(all))
+    }
+
+    /// What can be refused before anything is touched.
+    fn check(&self) -> Result<()> {
+        File::open(&self.recording).map_err(|e| Error::unreadable(&self.recording, e))?;
+        self.config.as_deref().map(Experiment::read_rig).transpose()?;
+        let inputs = [Some(&self.recording), self.config.as_ref()];
+        let kept = self.own_config();
+        for output in OUTPUTS.map(|name| self.out.join(name)).into_iter().filter(|output| kept.as_ref() != Some(output))
+        {
+            let Ok(output) = output.canonicalize() else { continue };
+            if inputs.iter().flatten().any(|input| input.canonicalize().is_ok_and(|input| input == output)) {
+                let message = format!("{} is an input and would be overwritten; give another folder", output.display());
+                return Err(Error::Option { option: "--out".to_owned(), message });
+            }
+        }
+        Ok(())
+    }
+
+    /// The log of a folder without what an earlier run left, and with the configuration, which may stand there already.
+    fn begin(&self) -> Result<File> {
+        let figures = self.out.join("figures");
+        fs::create_dir_all(&self.out).map_err(|e| Error::unwritable(&self.out, e))?;
+        let log = self.log()?;
+        let kept = self.own_config();
+        for path in OUTPUTS.map(|name| self.out.join(name)) {
+            if kept.as_ref() == Some(&path) || path.ends_with(LOG) {
+                continue;
+            }
+            let gone = if path.is_dir() { fs::remove_dir_all(&path) } else { fs::remove_file(&path) };
+            match gone {
+                Err(error) if error.kind() != std::io::ErrorKind::NotFound => {
+                    return Err(Error::unwritable(&path, error));
+                }
+                _ => {}
+            }
+        }
+        fs::create_dir_all(&figures).map_err(|e| Error::unwritable(&figures, e))?;
+        match &self.config {
+            Some(config) if kept.is_none() => output::copy(config, &self.out.join("experiment.toml"))?,
+            _ => {}
+        }
+        Ok(log)
+    }
+
+    /// The log, emptied. Its lock keeps a second run out of the folder; the system frees it when this one ends, however that comes about.
+    fn log(&self) -> Result<File> {
+        let path = self.out.join(LOG);
+        let unwritable = |e| Error::unwritable(&path, e);
+        let log = File::options().write(true).create(true).truncate(false).open(&path).map_err(unwritable)?;
+        // one that another program has begun waits for one that is just being ended
+        let locked = if self.watched { log.lock().map_err(TryLockError::Error) } else { log.try_lock() };
+        match locked {
+            Err(TryLockError::WouldBlock) => {
+                return Err(Error::Busy { path: self.out.clone(), holder: "a run of another recording".to_owned() });
+            }
+            Err(TryLockError::Error(error)) => return Err(unwritable(error)),
+            Ok(()) => {}
+        }
+        log.set_len(0).map_err(unwritable)?;
+        output::remove_left_temporaries(&self.out);
+        Ok(log)
+    }
+
+    /// The configuration in the folder itself, if it is that.
+    fn own_config(&self) -> Option<PathBuf> {
+        let own = self.out.join("experiment.toml");
+        let is_own = self.config.as_ref()?.canonicalize().ok()? == own.canonicalize().ok()?;
+        is_own.then_some(own)
+    }
+
+    fn shown(&self) -> Shown {
+        match (self.watched, self.quiet) {
+            (true, _) => Shown::AsLines,
+            (false, true) => Shown::Nowhere,
+            (false, false) => Shown::OnTerminal,
+        }
+    }
+
+    fn done(&self) -> String {
+        let last = match self.until {
+            Stage::Report => "report.html",
+            _ => LOG,
+        };
+        format!("{}: done; see {}", self.recording.display(), self.out.join(last).display())
+    }
+}
+
+/// Ends the run when standard input does: the program that watches it holds the other end.
+fn end_with_standard_input() {
+    std::thread::spawn(|| {
+        let _ = std::io::copy(&mut std::io::stdin(), &mut std::io::sink());
+        let _no_more = output::remove_temporaries();
+        std::process::exit(2);
+    });
+}
+
+/// Whether it is a table by its name.
+fn is_table(path: &Path) -> bool {
+    path.extension().is_some_and(|e| e.eq_ignore_ascii_case("csv"))
+}
+
+/// A path as a word of a command.
+fn path_text(path: &Path) -> Result<String> {
+    let text = path.to_str().ok_or_else(|| Error::Option {
+        option: path.display().to_string(),
+        message: "its name is not UTF-8; rename it".to_owned(),
+    })?;
+    // a name that begins with a dash would be taken for an option
+    Ok(if text.starts_with('-') && text != "-" { format!("./{text}") } else { text.to_owned() })
+}
+
+/// Words as a shell takes them.
+fn as_typed(words: &[String]) -> String {
+    let plain = |c: char| c.is_alphanumeric() || "-_./=:,+@%".contains(c);
+    let quoted = |word: &String| {
+        if !word.is_empty() && word.chars().all(plain) {
+            word.clone()
+        } else {
+            format!("'{}'", word.replace('\'', r"'\''"))
+        }
+    };
+    words.iter().map(quoted).collect::<Vec<_>>().join(" ")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn words_are_quoted_as_a_shell_wants_them() {
+        let words = ["track", "my swing.mp4", "it's", "#ff0000"].map(str::to_owned);
+        assert_eq!(as_typed(&words), r"track 'my swing.mp4' 'it'\''s' '#ff0000'");
+    }
+}

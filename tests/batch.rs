@@ -1,0 +1,303 @@
+//! A folder of experiments, as a laboratory has it: good recordings, bad ones among them, kills, changes in between.
+
+#[allow(dead_code, reason = "only a whole film is wanted of it")]
+mod clips;
+
+use std::collections::BTreeMap;
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::process::{Command, Output, Stdio};
+use std::time::{Duration, SystemTime};
+
+use assert_cmd::cargo::CommandCargoExt;
+use clips::{Clip, Scene};
+use rand::rngs::StdRng;
+use rand::{RngExt, SeedableRng};
+use tempfile::TempDir;
+
+const SPECIMEN: &str = "[specimen]\nname = \"strip\"\nmass_kg = 0.0004\nlength_m = 0.2\nlink_lengths_m = [0.1, 0.1]\n";
+
+/// A folder of recordings, and one for results.
+struct Laboratory {
+    folder: TempDir,
+}
+
+impl Laboratory {
+    fn new() -> Self {
+        let own = Self { folder: tempfile::tempdir().unwrap() };
+        fs::create_dir(own.folder.path().join("in")).unwrap();
+        own
+    }
+
+    /// Tables of swings that differ in frequency.
+    fn with_tables(self, count: usize) -> Self {
+        (0..count).for_each(|k| self.write(&format!("in/day {}/swing{k:02}.csv", k % 3), &table(1.0 + 0.05 * k as f64)));
+        self.write("in/experiment.toml", SPECIMEN);
+        self
+    }
+
+    fn path(&self, name: &str) -> PathBuf {
+        self.folder.path().join(name)
+    }
+
+    fn write(&self, name: &str, contents: impl AsRef<[u8]>) {
+        let path = self.path(name);
+        fs::create_dir_all(path.parent().unwrap()).unwrap();
+        fs::write(path, contents).unwrap();
+    }
+
+    fn film(&self, name: &str) {
+        let path = self.path(name);
+        fs::create_dir_all(path.parent().unwrap()).unwrap();
+        Clip { scene: Scene::default(), frames: 90, ..Clip::default() }.write(&path);
+    }
+
+    fn command(&self, out: &str) -> Command {
+        let mut command = Command::cargo_bin("freeswing").unwrap();
+        command.current_dir(self.folder.path()).args(["batch", "in", "--out", out, "--until", "identify", "--no-overlay"]);
+        command.stdin(Stdio::null()).stdout(Stdio::piped()).stderr(Stdio::piped());
+        command
+    }
+
+    /// Exit code and standard error.
+    fn batch(&self, out: &str, more: &[&str]) -> (Option<i32>, String) {
+        let output = self.command(out).args(more).output().unwrap();
+        (output.status.code(), said(&output))
+    }
+
+    /// The summary's rows by recording.
+    fn rows(&self, out: &str) -> BTreeMap<String, BTreeMap<String, String>> {
+        let mut reader = csv::Reader::from_path(self.path(out).join("summary.csv")).unwrap();
+        let rows = reader.deserialize().map(|row| row.unwrap());
+        rows.map(|row: BTreeMap<String, String>| (row["recording"].clone(), row)).collect()
+    }
+
+    fn summary(&self, out: &str) -> Vec<Vec<u8>> {
+        ["summary.csv", "summary.parquet", "index.html"].map(|file| fs::read(self.path(out).join(file)).unwrap()).into()
+    }
+
+    /// When each finished recording was.
+    fn finished(&self, out: &str) -> BTreeMap<PathBuf, SystemTime> {
+        let mut found = BTreeMap::new();
+        let mut folders = vec![self.path(out)];
+        while let Some(folder) = folders.pop() {
+            for entry in fs::read_dir(folder).into_iter().flatten().flatten() {
+                let path = entry.path();
+                if path.is_dir() {
+                    folders.push(path);
+                } else if path.ends_with("run.json") {
+                    found.insert(path.clone(), fs::metadata(&path).unwrap().modified().unwrap());
+                }
+            }
+        }
+        found
+    }
+}
+
+fn said(output: &Output) -> String {
+    String::from_utf8_lossy(&output.stderr).into_owned()
+}
+
+/// A decaying swing at 30 Hz.
+fn table(frequency_hz: f64) -> String {
+    let mut text = String::from("t_s,theta1_rad,theta2_rad\n");
+    for row in 0..450 {
+        let t_s = f64::from(row) / 30.0;
+        let swing = (std::f64::consts::TAU * frequency_hz * t_s).cos() * (-0.06 * t_s).exp();
+        // what two sines that never repeat leave looks like noise
+        let noise = 1e-4 * ((1.7 * f64::from(row * row)).sin() + (0.3 * f64::from(row * row + row)).sin());
+        text += &format!("{t_s:.6},{:.8},{:.8}\n", 0.2 * swing + noise, 0.25 * swing - noise);
+    }
+    text
+}
+
+#[test]
+fn every_recording_has_a_row_and_a_bad_one_says_why_as_its_command_alone_does() {
+    let lab = Laboratory::new().with_tables(3);
+    lab.film("in/films/good.mp4");
+    let film = fs::read(lab.path("in/films/good.mp4")).unwrap();
+    lab.write("in/films/cut.mp4", &film[..film.len() / 3]);
+    lab.write("in/films/empty.mov", "");
+    lab.write("in/films/text.avi", "not a film");
+    lab.write("in/films/wrong.mp4", &film);
+    lab.write("in/films/wrong.toml", "[rig]\npivot = [1.0, 2.0]\n");
+    lab.write("in/day 0/short.csv", "t_s,theta1_rad\n0,0.1\n");
+    lab.write("in/day 0/volts.csv", "time,volts\n0,1\n");
+    Clip { scene: Scene { marks: Vec::new(), ..Scene::default() }, frames: 30, ..Clip::default() }
+        .write(&lab.path("in/films/no marks.mp4"));
+    let (code, told) = lab.batch("out", &[]);
+    assert_eq!(code, Some(1), "{told}");
+    let rows = lab.rows("out");
+    let failed: Vec<&str> = rows.values().filter(|row| row["status"] == "failed").map(|row| row["recording"].as_str()).collect();
+    let bad =
+        ["day 0/short.csv", "films/cut.mp4", "films/empty.mov", "films/no marks.mp4", "films/text.avi", "films/wrong.mp4"];
+    assert_eq!(failed, bad, "{told}");
+    assert_eq!(rows.len(), bad.len() + 4, "{told}");
+    assert!(told.contains("/10] films/good.mp4: done"), "{told}");
+    for name in bad {
+        let mut alone = Command::cargo_bin("freeswing").unwrap();
+        alone.current_dir(lab.folder.path()).args(["run", &format!("in/{name}"), "--out", "alone", "--until", "identify"]);
+        let config = if name == "films/wrong.mp4" { "out/films/wrong.mp4/experiment.toml" } else { "in/experiment.toml" };
+        let output = alone.args(["--config", config]).output().unwrap();
+        assert_eq!(output.status.code(), Some(2), "{name}");
+        let told = said(&output);
+        assert_eq!(Some(rows[name]["reason"].as_str()), told.lines().rev().find(|line| line.starts_with("error: ")), "{name}");
+    }
+    let good = &rows["films/good.mp4"];
+    assert!((good["f1_hz"].parse::<f64>().unwrap() - 1.2).abs() < 0.01, "{good:?}");
+    assert_eq!((good["frames"].as_str(), good["specimen"].as_str(), good["sha256"].len()), ("90", "strip", 64));
+    let f1 = |name: &str| rows[name]["f1_hz"].parse::<f64>().unwrap();
+    assert!((f1("day 1/swing01.csv") - 1.05).abs() < 1e-3 && (f1("day 2/swing02.csv") - 1.1).abs() < 1e-3);
+    for file in ["angles.csv", "angles.json", "identify.json", "log.txt"] {
+        assert!(lab.path("out/films/good.mp4").join(file).is_file(), "{file}");
+    }
+}
+
+#[test]
+fn started_again_after_any_kill_it_ends_as_if_undisturbed_and_does_nothing_twice() {
+    kills(4, 12);
+}
+
+#[test]
+#[ignore = "a minute or more"]
+fn started_again_after_fifty_kills_it_ends_as_if_undisturbed() {
+    kills(50, 60);
+}
+
+fn kills(count: usize, tables: usize) {
+    let lab = Laboratory::new().with_tables(tables);
+    lab.film("in/film.mp4");
+    let (code, told) = lab.batch("undisturbed", &[]);
+    assert_eq!(code, Some(0), "{told}");
+    let mut random = StdRng::seed_from_u64(19);
+    for _ in 0..count {
+        let before = lab.finished("out");
+        let mut child = lab.command("out").stderr(Stdio::null()).stdout(Stdio::null()).spawn().unwrap();
+        std::thread::sleep(Duration::from_millis(random.random_range(5..700)));
+        child.kill().unwrap();
+        child.wait().unwrap();
+        let after = lab.finished("out");
+        for (path, when) in before {
+            assert_eq!(after.get(&path), Some(&when), "{} was done again", path.display());
+        }
+    }
+    let before = lab.finished("out");
+    let (code, told) = lab.batch("out", &[]);
+    assert_eq!(code, Some(0), "{told}");
+    let after = lab.finished("out");
+    assert!(before.iter().all(|(path, when)| after[path] == *when));
+    assert_eq!(lab.summary("out"), lab.summary("undisturbed"));
+    let left = walk(&lab.path("out")).into_iter().filter(|path| path.to_string_lossy().contains(".freeswing-"));
+    assert_eq!(left.collect::<Vec<_>>(), Vec::<PathBuf>::new());
+}
+
+fn walk(folder: &Path) -> Vec<PathBuf> {
+    let entries = fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().path());
+    entries.flat_map(|path| if path.is_dir() { walk(&path) } else { vec![path] }).collect()
+}
+
+#[test]
+fn parts_on_several_machines_come_to_the_same_summary() {
+    let lab = Laboratory::new().with_tables(7);
+    assert_eq!(lab.batch("whole", &[]).0, Some(0));
+    for part in ["1/3", "2/3", "3/3"] {
+        let (code, told) = lab.batch("parts", &["--shard", part]);
+        assert_eq!(code, Some(0), "{told}");
+        assert!(!lab.path("parts/summary.csv").exists());
+    }
+    let (code, told) = lab.batch("parts", &[]);
+    assert!(code == Some(0) && told.contains("0 to run"), "{told}");
+    assert_eq!(lab.summary("parts"), lab.summary("whole"));
+    for wrong in ["0/3", "4/3", "x", "1/2/3"] {
+        assert_eq!(lab.batch("parts", &["--shard", wrong]).0, Some(2), "{wrong}");
+    }
+}
+
+#[test]
+fn what_has_changed_is_done_again_and_nothing_else() {
+    let lab = Laboratory::new().with_tables(4);
+    lab.write("in/day 0/bad.csv", "t_s,theta1_rad\n0,0.1\n");
+    assert_eq!(lab.batch("out", &[]).0, Some(1));
+    let first = lab.finished("out");
+    let again = |lab: &Laboratory, more: &[&str]| -> Vec<String> {
+        let before = lab.finished("out");
+        lab.batch("out", more);
+        let changed = lab.finished("out").into_iter().filter(|(path, when)| before.get(path) != Some(when));
+        changed.map(|(path, _)| path.parent().unwrap().file_name().unwrap().to_string_lossy().into_owned()).collect()
+    };
+    assert_eq!(again(&lab, &[]), Vec::<String>::new());
+    assert_eq!(first, lab.finished("out"));
+    assert_eq!(again(&lab, &["--retry-failed"]), ["bad.csv"]);
+    lab.write("in/day 1/swing01.csv", table(1.7));
+    assert_eq!(again(&lab, &[]), ["swing01.csv"]);
+    assert!((lab.rows("out")["day 1/swing01.csv"]["f1_hz"].parse::<f64>().unwrap() - 1.7).abs() < 1e-3);
+    lab.write("in/day 2/experiment.toml", "[rig]\ngravity_m_s2 = 9.81\n");
+    assert_eq!(again(&lab, &[]), ["swing02.csv"]);
+    lab.write("in/day 0/swing03.csv", table(1.3));
+    lab.write("in/day 1/swing01.csv", table(1.8));
+    assert_eq!(again(&lab, &["--only", "day 0/*"]), ["swing03.csv"]);
+    let rows = lab.rows("out");
+    assert!((rows["day 1/swing01.csv"]["f1_hz"].parse::<f64>().unwrap() - 1.7).abs() < 1e-3, "what it was stands");
+    // a recording that is gone has no row
+    fs::remove_file(lab.path("in/day 0/bad.csv")).unwrap();
+    let (code, told) = lab.batch("out", &[]);
+    assert_eq!((code, lab.rows("out").len()), (Some(0), 4), "{told}");
+}
+
+#[test]
+fn a_second_batch_on_the_same_results_is_refused_by_the_name_of_the_first() {
+    let lab = Laboratory::new().with_tables(30);
+    let mut first = lab.command("out").stderr(Stdio::null()).spawn().unwrap();
+    let began = std::time::Instant::now();
+    while lab.finished("out").is_empty() && began.elapsed() < Duration::from_secs(60) {
+        std::thread::sleep(Duration::from_millis(5));
+    }
+    let (code, told) = lab.batch("out", &[]);
+    let holder = format!("another batch (process {}", first.id());
+    first.kill().unwrap();
+    first.wait().unwrap();
+    assert!(code == Some(2) && told.contains(&holder) && told.lines().count() == 1, "{told}");
+}
+
+#[test]
+fn what_would_be_done_is_said_and_not_done() {
+    let lab = Laboratory::new().with_tables(2);
+    lab.write("in/day 0/swing00.toml", "[rig]\ngravity_m_s2 = 9.81\n");
+    let output = lab.command("out").arg("--dry-run").output().unwrap();
+    let told = String::from_utf8(output.stdout).unwrap();
+    assert!(output.status.success() && !lab.path("out").exists(), "{told}");
+    let line = told.lines().find(|line| line.contains("swing00")).unwrap();
+    assert!(line.contains("run") && line.contains("experiment.toml, day 0/swing00.toml"), "{line}");
+}
+
+#[test]
+fn nothing_that_can_be_run_is_one_clear_line() {
+    let lab = Laboratory::new();
+    let (code, told) = lab.batch("out", &[]);
+    assert_eq!((code, told.as_str()), (Some(2), "error: in: holds no recording and no table of angles; give the folder above them\n"));
+    let (code, told) = lab.batch("in", &[]);
+    assert!(code == Some(2) && told.contains("--out: must be another folder"), "{told}");
+    fs::remove_dir(lab.path("in")).unwrap();
+    let (code, told) = lab.batch("out", &[]);
+    assert!(code == Some(2) && told.starts_with("error: in: cannot be read"), "{told}");
+}
+
+#[test]
+fn results_that_cannot_be_written_end_the_batch_with_one_line_and_lose_nothing() {
+    let lab = Laboratory::new().with_tables(6);
+    lab.film("in/day 0/film.mp4");
+    // files may grow to 8 blocks of 512 bytes: results do not fit, as on a full disk
+    let mut limited = Command::new("sh");
+    let program = lab.command("out").get_program().to_owned();
+    limited.current_dir(lab.folder.path()).stdin(Stdio::null());
+    limited.args(["-c", "trap '' XFSZ; ulimit -f 8; exec \"$@\"", "sh"]).arg(program);
+    limited.args(["batch", "in", "--out", "out", "--until", "identify", "--no-overlay"]);
+    let output = limited.output().unwrap();
+    let told = said(&output);
+    let errors: Vec<&str> = told.lines().filter(|line| line.starts_with("error: ")).collect();
+    assert!(output.status.code() == Some(2) && errors.len() == 1, "{told}");
+    assert!(errors[0].contains("cannot be written") && errors[0].contains("what was finished is kept"), "{told}");
+    let (code, told) = lab.batch("out", &[]);
+    assert_eq!(code, Some(0), "{told}");
+    assert_eq!(lab.rows("out").len(), 7);
+}
