@@ -147,8 +147,8 @@ fn judge(name: &str, score: &Score, limits: Limits) -> Vec<String> {
 fn marks_in_a_strangers_picture_are_measured_to_the_limit_of_the_codec() {
     let folder = tempfile::tempdir().unwrap();
     render(folder.path(), 1.2, &["base", "crf0"]);
-    // one mark's bias over so few frames is not known to a hundredth
-    let base = Limits { bias_px: 0.05, ..CRF_23 };
+    // over so few frames one mark's bias is not known to a hundredth, nor the share of intervals that hold: two standard deviations of it are 0.04
+    let base = Limits { bias_px: 0.05, cover: CRF_23.cover - 0.04, ..CRF_23 };
     let mut beyond = judge("base", &score(folder.path(), "base"), base);
     beyond.extend(judge("crf0", &score(folder.path(), "crf0"), LOSSLESS));
     assert!(beyond.is_empty(), "{beyond:#?}");
