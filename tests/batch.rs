@@ -31,7 +31,8 @@ impl Laboratory {
 
     /// Tables of swings that differ in frequency.
     fn with_tables(self, count: usize) -> Self {
-        (0..count).for_each(|k| self.write(&format!("in/day {}/swing{k:02}.csv", k % 3), &table(1.0 + 0.05 * k as f64)));
+        (0..count)
+            .for_each(|k| self.write(&format!("in/day {}/swing{k:02}.csv", k % 3), &table(1.0 + 0.05 * k as f64)));
         self.write("in/experiment.toml", SPECIMEN);
         self
     }
@@ -54,7 +55,15 @@ impl Laboratory {
 
     fn command(&self, out: &str) -> Command {
         let mut command = Command::cargo_bin("freeswing").unwrap();
-        command.current_dir(self.folder.path()).args(["batch", "in", "--out", out, "--until", "identify", "--no-overlay"]);
+        command.current_dir(self.folder.path()).args([
+            "batch",
+            "in",
+            "--out",
+            out,
+            "--until",
+            "identify",
+            "--no-overlay",
+        ]);
         command.stdin(Stdio::null()).stdout(Stdio::piped()).stderr(Stdio::piped());
         command
     }
@@ -128,20 +137,39 @@ fn every_recording_has_a_row_and_a_bad_one_says_why_as_its_command_alone_does() 
     let (code, told) = lab.batch("out", &[]);
     assert_eq!(code, Some(1), "{told}");
     let rows = lab.rows("out");
-    let failed: Vec<&str> = rows.values().filter(|row| row["status"] == "failed").map(|row| row["recording"].as_str()).collect();
-    let bad =
-        ["day 0/short.csv", "films/cut.mp4", "films/empty.mov", "films/no marks.mp4", "films/text.avi", "films/wrong.mp4"];
+    let failed: Vec<&str> =
+        rows.values().filter(|row| row["status"] == "failed").map(|row| row["recording"].as_str()).collect();
+    let bad = [
+        "day 0/short.csv",
+        "films/cut.mp4",
+        "films/empty.mov",
+        "films/no marks.mp4",
+        "films/text.avi",
+        "films/wrong.mp4",
+    ];
     assert_eq!(failed, bad, "{told}");
     assert_eq!(rows.len(), bad.len() + 4, "{told}");
     assert!(told.contains("/10] films/good.mp4: done"), "{told}");
     for name in bad {
         let mut alone = Command::cargo_bin("freeswing").unwrap();
-        alone.current_dir(lab.folder.path()).args(["run", &format!("in/{name}"), "--out", "alone", "--until", "identify"]);
-        let config = if name == "films/wrong.mp4" { "out/films/wrong.mp4/experiment.toml" } else { "in/experiment.toml" };
+        alone.current_dir(lab.folder.path()).args([
+            "run",
+            &format!("in/{name}"),
+            "--out",
+            "alone",
+            "--until",
+            "identify",
+        ]);
+        let config =
+            if name == "films/wrong.mp4" { "out/films/wrong.mp4/experiment.toml" } else { "in/experiment.toml" };
         let output = alone.args(["--config", config]).output().unwrap();
         assert_eq!(output.status.code(), Some(2), "{name}");
         let told = said(&output);
-        assert_eq!(Some(rows[name]["reason"].as_str()), told.lines().rev().find(|line| line.starts_with("error: ")), "{name}");
+        assert_eq!(
+            Some(rows[name]["reason"].as_str()),
+            told.lines().rev().find(|line| line.starts_with("error: ")),
+            "{name}"
+        );
     }
     let good = &rows["films/good.mp4"];
     assert!((good["f1_hz"].parse::<f64>().unwrap() - 1.2).abs() < 0.01, "{good:?}");
@@ -274,7 +302,10 @@ fn what_would_be_done_is_said_and_not_done() {
 fn nothing_that_can_be_run_is_one_clear_line() {
     let lab = Laboratory::new();
     let (code, told) = lab.batch("out", &[]);
-    assert_eq!((code, told.as_str()), (Some(2), "error: in: holds no recording and no table of angles; give the folder above them\n"));
+    assert_eq!(
+        (code, told.as_str()),
+        (Some(2), "error: in: holds no recording and no table of angles; give the folder above them\n")
+    );
     let (code, told) = lab.batch("in", &[]);
     assert!(code == Some(2) && told.contains("--out: must be another folder"), "{told}");
     fs::remove_dir(lab.path("in")).unwrap();

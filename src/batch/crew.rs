@@ -92,14 +92,13 @@ impl Crew<'_> {
         let began = Instant::now();
         fs::create_dir_all(&job.folder).map_err(|e| Error::unwritable(&job.folder, e))?;
         state::forget(&job.folder)?;
-        let before = seen(&job.found.path);
+        let before = seen(&job.found.paths);
         let fingerprint = Fingerprint::of(job.found, &self.options.words);
         let mut ended = self.process(lane, job, threads)?;
-        if ended.is_none() && seen(&job.found.path) != before {
-            ended = Some(format!(
-                "error: {}: changed while it was processed; run the batch again",
-                job.found.path.display()
-            ));
+        let unchanged = seen(&job.found.paths) == before;
+        if ended.is_none() && !unchanged {
+            let path = job.found.path().display();
+            ended = Some(format!("error: {path}: changed while it was processed; run the batch again"));
         }
         // what has no fingerprint is done again the next time
         let unknown = Fingerprint {
@@ -108,7 +107,6 @@ impl Crew<'_> {
             words: Vec::new(),
             version: String::new(),
         };
-        let unchanged = seen(&job.found.path) == before;
         let finished = Finished {
             schema: "freeswing.run/1".to_owned(),
             fingerprint: fingerprint.ok().filter(|_| unchanged).unwrap_or(unknown),
@@ -133,7 +131,8 @@ impl Crew<'_> {
             Err(error) => return Ok(Some(format!("error: {error}"))),
         };
         let mut command = Command::new(&self.options.program);
-        command.arg("run").arg(as_argument(&job.found.path)).arg("--out").arg(as_argument(&job.folder));
+        command.arg("run").args(job.found.paths.iter().map(|path| as_argument(path)));
+        command.arg("--out").arg(as_argument(&job.folder));
         command.args(config.iter().flat_map(|config| ["--config".into(), as_argument(config)]));
         command.args(["--threads", &threads.to_string(), "--watched"]).args(&self.options.words);
         // its standard input ends when this process does, however that comes about, and with it the run
@@ -155,7 +154,7 @@ impl Crew<'_> {
             return Ok(None);
         }
         let line = said.lines().rev().find(|line| line.starts_with("error: "));
-        let line = line.map_or_else(|| ended_without_a_word(&job.found.path, &status), str::to_owned);
+        let line = line.map_or_else(|| ended_without_a_word(job.found.path(), &status), str::to_owned);
         self.unless_of_all(&line, &job.folder)?;
         Ok(Some(line))
     }
@@ -175,9 +174,12 @@ impl Crew<'_> {
 }
 
 /// Size and time of the last change, by which a file that changes meanwhile is known.
-fn seen(path: &Path) -> Option<(u64, SystemTime)> {
-    let own = fs::metadata(path).ok()?;
-    Some((own.len(), own.modified().ok()?))
+fn seen(paths: &[PathBuf]) -> Vec<Option<(u64, SystemTime)>> {
+    let of = |path: &PathBuf| {
+        let own = fs::metadata(path).ok()?;
+        Some((own.len(), own.modified().ok()?))
+    };
+    paths.iter().map(of).collect()
 }
 
 /// A path that cannot be taken for an option.

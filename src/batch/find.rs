@@ -33,8 +33,8 @@ pub enum Kind {
 pub struct Found {
     /// Its path below the input folder, with `/`.
     pub name: String,
-    /// Its path.
-    pub path: PathBuf,
+    /// Its path; of recordings that are taken together those of their tables.
+    pub paths: Vec<PathBuf>,
     /// What it is.
     pub kind: Kind,
     /// The experiment files that hold for it, the farthest first.
@@ -85,7 +85,7 @@ impl Search {
             let beside = path.with_extension("toml");
             let beside = (kind != Kind::Unreadable && fs::symlink_metadata(&beside).is_ok()).then_some(beside);
             let configs = configs.iter().cloned().chain(beside).collect();
-            self.found.push(Found { name, path, kind, configs });
+            self.found.push(Found { name, paths: vec![path], kind, configs });
         }
         self.above.pop();
         Ok(())
@@ -129,10 +129,16 @@ impl Found {
     /// Its size; of what cannot be asked, 0.
     pub fn bytes(&self) -> u64 {
         let of = |path: &Path| fs::metadata(path).map_or(0, |own| own.len());
-        match fs::read_dir(&self.path) {
+        let whole = |path: &PathBuf| match fs::read_dir(path) {
             Ok(entries) => entries.filter_map(|entry| Some(of(&entry.ok()?.path()))).sum(),
-            Err(_) => of(&self.path),
-        }
+            Err(_) => of(path),
+        };
+        self.paths.iter().map(whole).sum()
+    }
+
+    /// The file or folder; of several the first.
+    pub fn path(&self) -> &Path {
+        self.paths.first().map_or(Path::new(""), PathBuf::as_path)
     }
 
     /// The recording from which a table was measured, if that is among all: what stands beside the table says so.
@@ -149,10 +155,10 @@ impl Found {
         if self.kind != Kind::Table {
             return None;
         }
-        let text = fs::read_to_string(self.path.with_extension("json")).ok()?;
+        let text = fs::read_to_string(self.path().with_extension("json")).ok()?;
         let beside: Beside = serde_json::from_str(&text).ok()?;
         let source = Path::new(&beside.source.file).file_name()?.to_owned();
-        let is_it = |other: &&PathBuf| other.file_name() == Some(&source) && other.parent() == self.path.parent();
+        let is_it = |other: &&PathBuf| other.file_name() == Some(&source) && other.parent() == self.path().parent();
         all.iter().find(is_it).filter(|_| beside.schema.starts_with("freeswing.angles/")).cloned()
     }
 }
@@ -198,7 +204,7 @@ mod tests {
         file(top, "angles.csv", "t_s,theta1_rad\n");
         file(top, "angles.json", r#"{"schema": "freeswing.angles/1", "source": {"file": "somewhere/swing.mp4"}}"#);
         let found = recordings(top, &top.join("out")).unwrap();
-        let all: Vec<PathBuf> = found.iter().map(|found| found.path.clone()).collect();
+        let all: Vec<PathBuf> = found.iter().map(|found| found.path().to_owned()).collect();
         assert_eq!(found[0].made_from(&all), Some(top.join("swing.mp4")));
         fs::remove_file(top.join("swing.mp4")).unwrap();
         assert_eq!(found[0].made_from(&all[..1]), None);

@@ -24,8 +24,8 @@ const SCRIPT: &str = include_str!("index.js");
 ///
 /// # Errors
 /// [`crate::Error::Unwritable`].
-pub fn write(folder: &Path, rows: &[Row]) -> Result<()> {
-    OutputFile::create(&folder.join("index.html"))?.commit(page(folder, rows).as_bytes())
+pub fn write(folder: &Path, rows: &[Row], specimens: &[Row]) -> Result<()> {
+    OutputFile::create(&folder.join("index.html"))?.commit(page(folder, rows, specimens).as_bytes())
 }
 
 /// A column: its heading, what is shown of a row, and what it is sorted by.
@@ -107,7 +107,7 @@ fn with_sd(value: Option<f64>, sd: Option<f64>) -> String {
     }
 }
 
-fn page(folder: &Path, rows: &[Row]) -> String {
+fn page(folder: &Path, rows: &[Row], specimens: &[Row]) -> String {
     let count = |status: Status| rows.iter().filter(|row| row.status == status).count();
     let (done, failed, skipped) = (count(Status::Done), count(Status::Failed), count(Status::Skipped));
     let mut text = String::from("<!DOCTYPE html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n");
@@ -119,22 +119,33 @@ fn page(folder: &Path, rows: &[Row]) -> String {
     let _ = write!(
         text,
         "<h1>{} recordings</h1>\n<p>{done} done, {failed} failed, {skipped} left out. All of it as <a href=\"summary.csv\">CSV</a> and \
-         <a href=\"summary.parquet\">Parquet</a>. A click on a heading sorts.</p>\n<table>\n<thead><tr>",
+         <a href=\"summary.parquet\">Parquet</a>. A click on a heading sorts.</p>\n",
         rows.len()
     );
+    table(&mut text, folder, rows, rows.len() <= MOST_PICTURES);
+    if !specimens.is_empty() {
+        text.push_str("<h2>Recordings of one specimen, fitted and diagnosed together</h2>\n");
+        table(&mut text, folder, specimens, false);
+    }
+    let _ = write!(text, "<script>\n{SCRIPT}</script>\n</body>\n</html>\n");
+    text
+}
+
+/// A sortable table.
+fn table(text: &mut String, folder: &Path, rows: &[Row], with_pictures: bool) {
+    text.push_str("<table>\n<thead><tr>");
     let heading = |text: &mut String, heading: &str, explained: &str| {
         let _ = write!(text, "<th aria-sort=\"none\"><button title=\"{explained}\">{heading}</button></th>");
     };
-    heading(&mut text, "recording", "path below the input folder");
-    heading(&mut text, "status", "done, failed or left out");
+    heading(text, "recording", "path below the input folder");
+    heading(text, "status", "done, failed or left out");
     text.push_str("<th>θ₁</th>");
-    COLUMNS.iter().for_each(|column| heading(&mut text, column.heading, column.explained));
+    COLUMNS.iter().for_each(|column| heading(text, column.heading, column.explained));
     text.push_str("</tr></thead>\n<tbody>\n");
     for row in rows {
-        self::row(&mut text, folder, row, rows.len() <= MOST_PICTURES);
+        self::row(text, folder, row, with_pictures);
     }
-    let _ = write!(text, "</tbody>\n</table>\n<script>\n{SCRIPT}</script>\n</body>\n</html>\n");
-    text
+    text.push_str("</tbody>\n</table>\n");
 }
 
 fn row(text: &mut String, folder: &Path, row: &Row, with_picture: bool) {
@@ -212,7 +223,7 @@ mod tests {
     fn names_are_text_and_addresses_are_quoted() {
         assert_eq!(escaped("<b>\"&"), "&lt;b&gt;&quot;&amp;");
         assert_eq!(address("a b/ü#1.mp4"), "./a%20b/%C3%BC%231.mp4");
-        let text = page(Path::new("."), &[Row::skipped("<script>", "not asked for")]);
+        let text = page(Path::new("."), &[Row::skipped("<script>", "not asked for")], &[]);
         assert!(!text.contains("<script>\" ") && text.contains("&lt;script&gt;"), "{text}");
         assert!(!text.contains("http://") && !text.contains("https://"));
     }

@@ -7,6 +7,7 @@
 //! | [`state`] | what was finished, of which contents, and by which version |
 //! | [`lock`] | one batch at a time in an output folder |
 //! | [`crew`] | the runs: each a process of its own, as many at once as there are cores |
+//! | [`together`] | the recordings of one specimen |
 //! | [`summary`] | a row a recording, as CSV and Parquet |
 //! | [`index`] | the same as a page |
 //!
@@ -20,6 +21,7 @@ pub mod layers;
 pub mod lock;
 pub mod state;
 pub mod summary;
+pub mod together;
 
 use std::path::PathBuf;
 
@@ -56,6 +58,8 @@ pub struct Options {
     pub cores: usize,
     /// What every run is asked for besides, as words of its command.
     pub words: Vec<String>,
+    /// Whether the runs go as far as a fit.
+    pub fits: bool,
     /// The program that runs a recording.
     pub program: PathBuf,
 }
@@ -100,7 +104,7 @@ pub fn plan(options: &Options) -> Result<Vec<Planned>> {
     if found.is_empty() {
         return Err(Error::NothingToDo { path: options.input.clone() });
     }
-    let names: Vec<PathBuf> = found.iter().map(|found| found.path.clone()).collect();
+    let names: Vec<PathBuf> = found.iter().map(|found| found.path().to_owned()).collect();
     let planned = |(index, found): (usize, Found)| {
         let plan = options.plan_of(index, &found, &names);
         Planned { found, plan }
@@ -157,8 +161,9 @@ pub fn run(options: &Options, watch: &dyn Watch) -> Result<Tally> {
     Crew { options, watch }.run(jobs)?;
     let rows = planned.iter().map(|planned| options.row(planned)).collect::<Vec<Row>>();
     if options.shard.is_none() {
+        let specimens = options.together(planned, watch)?;
         summary::write(&options.output, &rows)?;
-        index::write(&options.output, &rows)?;
+        index::write(&options.output, &rows, &specimens)?;
     }
     let count = |status: Status| rows.iter().filter(|row| row.status == status).count();
     Ok(Tally { done: count(Status::Done), failed: count(Status::Failed), skipped: count(Status::Skipped) })
@@ -167,6 +172,23 @@ pub fn run(options: &Options, watch: &dyn Watch) -> Result<Tally> {
 impl Options {
     fn job<'p>(&self, planned: &'p Planned) -> Job<'p> {
         Job { found: &planned.found, folder: self.folder_of(&planned.found), bytes: planned.found.bytes() }
+    }
+
+    /// Fits and diagnoses the recordings of each specimen together, where the runs go that far; a row each.
+    fn together(&self, planned: Vec<Planned>, watch: &dyn Watch) -> Result<Vec<Row>> {
+        if !self.fits {
+            return Ok(Vec::new());
+        }
+        let found: Vec<Found> = planned.into_iter().map(|planned| planned.found).collect();
+        let specimens = together::specimens(&found, |found| self.folder_of(found));
+        let plan = |found: Found| {
+            let finished = state::read(&self.folder_of(&found)).filter(|own| self.still_holds(own, &found));
+            Planned { found, plan: finished.map_or(Plan::Run, Plan::Finished) }
+        };
+        let planned: Vec<Planned> = specimens.into_iter().map(plan).collect();
+        let to_run = planned.iter().filter(|planned| matches!(planned.plan, Plan::Run));
+        Crew { options: self, watch }.run(to_run.map(|planned| self.job(planned)).collect())?;
+        Ok(planned.iter().map(|planned| self.row(planned)).collect())
     }
 
     /// The row of a recording, from what stands in its folder.

@@ -39,7 +39,7 @@ impl Status {
 /// What a result depends on.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Fingerprint {
-    /// Of the recording: SHA-256 of a file; of stills that of all in order.
+    /// Of the recording: SHA-256 of a file; of stills that of all in order; of several tables that of their digests.
     pub recording_sha256: String,
     /// Of the experiment file, or of several put together; empty where there is none.
     pub config_sha256: String,
@@ -68,9 +68,14 @@ impl Fingerprint {
     /// # Errors
     /// [`Error::Unreadable`], and what the experiment files report.
     pub fn of(found: &Found, words: &[String]) -> Result<Self> {
+        let digest = |path: &std::path::PathBuf| Ok(digest::of_recording(path)?.0);
+        let digests = found.paths.iter().map(digest).collect::<Result<Vec<String>>>()?;
         let config = layers::together(&found.configs)?.contents()?;
         Ok(Self {
-            recording_sha256: digest::of_recording(&found.path)?.0,
+            recording_sha256: match &digests[..] {
+                [one] => one.clone(),
+                several => digest::of_bytes(several.concat().as_bytes()),
+            },
             config_sha256: if config.is_empty() { String::new() } else { digest::of_bytes(&config) },
             words: words.to_owned(),
             version: env!("CARGO_PKG_VERSION").to_owned(),

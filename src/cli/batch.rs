@@ -116,6 +116,7 @@ impl BatchArgs {
             shard: self.shard,
             cores: self.jobs.map_or(all, usize::from),
             words,
+            fits: self.until >= Stage::Fit,
             program: std::env::current_exe().map_err(|e| Error::unreadable("freeswing".as_ref(), e))?,
         })
     }

@@ -18,13 +18,15 @@ Examples:
   freeswing run videos/kapton.mp4 --config videos/kapton.base.toml --out kapton
   freeswing run swing.mp4 --config experiment.toml --out swing --until identify
   freeswing run angles.csv --config experiment.toml --out swing
+  freeswing run small/angles.csv large/angles.csv --config experiment.toml --out both
 
 Leaves in the folder: angles.csv, angles.json, overlay.mp4, identify.json, fit.json, diagnosis.json, figures/, report.html, and
 log.txt with every command, as it could be typed alone, and what it printed. Where a stage fails, what was done before it is kept,
 the page shows it, and the exit code is 2. Without --config it ends with identify. What an earlier run left there is removed.")]
 pub struct RunArgs {
-    /// The recording, or a table of angles.
-    recording: PathBuf,
+    /// The recording, or a table of angles; several tables of one specimen are fitted and diagnosed together.
+    #[arg(required = true, value_name = "RECORDING")]
+    recordings: Vec<PathBuf>,
     /// The experiment: marks, specimen, rig and base model.
     #[arg(long, value_name = "TOML")]
     config: Option<PathBuf>,
@@ -140,16 +142,25 @@ impl RunArgs {
         let config = self.config.as_deref().map(path_text).transpose()?;
         let config = || config.iter().flat_map(|config| ["--config".to_owned(), config.clone()]);
         // of a table that was given messages speak by its own name
-        let angles = if is_table(&self.recording) { path_text(&self.recording)? } else { own("angles.csv")? };
+        let angles = match self.recordings.as_slice() {
+            [one] if !is_table(one) => vec![own("angles.csv")?],
+            tables => tables.iter().map(|table| path_text(table)).collect::<Result<Vec<_>>>()?,
+        };
+        let analysed = |command: &str, json: &str| -> Result<Vec<String>> {
+            let of = std::iter::once(command.to_owned()).chain(angles.clone());
+            Ok(of.chain(["--json".to_owned(), own(json)?]).chain(config()).collect())
+        };
         let words = |words: &[&str]| words.iter().map(|word| (*word).to_owned()).collect::<Vec<String>>();
         let mut all = words(&["freeswing"]);
         match stage {
             Stage::Track => {
-                if is_table(&self.recording) {
-                    output::copy(&self.recording, &self.out.join("angles.csv"))?;
-                    return Ok(None);
+                match self.recordings.as_slice() {
+                    [one] if !is_table(one) => {}
+                    // the page shows the one recording
+                    [one] => return output::copy(one, &self.out.join("angles.csv")).map(|()| None),
+                    _ => return Ok(None),
                 }
-                all.extend(words(&["track", &path_text(&self.recording)?, "--out", &own("angles.csv")?]));
+                all.extend(words(&["track", &path_text(&self.recordings[0])?, "--out", &own("angles.csv")?]));
                 all.extend(config());
                 if !self.no_overlay {
                     all.extend(words(&["--overlay", &own("overlay.mp4")?]));
@@ -159,17 +170,17 @@ impl RunArgs {
                 }
             }
             Stage::Identify => {
-                all.extend(words(&["identify", &angles, "--json", &own("identify.json")?]));
-                all.extend(config());
+                if angles.len() > 1 {
+                    return Ok(None);
+                }
+                all.extend(analysed("identify", "identify.json")?);
             }
             Stage::Fit => {
-                all.extend(words(&["fit", &angles, "--json", &own("fit.json")?]));
-                all.extend(config());
+                all.extend(analysed("fit", "fit.json")?);
             }
             Stage::Diagnose => {
-                all.extend(words(&["diagnose", &angles, "--json", &own("diagnosis.json")?]));
+                all.extend(analysed("diagnose", "diagnosis.json")?);
                 all.extend(words(&["--figure", &own("figures/diagnosis.svg")?]));
-                all.extend(config());
             }
             Stage::Report => all.extend(words(&["report", &own("")?])),
         }
@@ -178,14 +189,20 @@ impl RunArgs {
 
     /// What can be refused before anything is touched.
     fn check(&self) -> Result<()> {
-        File::open(&self.recording).map_err(|e| Error::unreadable(&self.recording, e))?;
+        for recording in &self.recordings {
+            File::open(recording).map_err(|e| Error::unreadable(recording, e))?;
+            if self.recordings.len() > 1 && !is_table(recording) {
+                let message = "several recordings can be run together only as tables of angles; run each alone first";
+                return Err(Error::Option { option: recording.display().to_string(), message: message.to_owned() });
+            }
+        }
         self.config.as_deref().map(Experiment::read_rig).transpose()?;
-        let inputs = [Some(&self.recording), self.config.as_ref()];
+        let inputs: Vec<&PathBuf> = self.recordings.iter().chain(&self.config).collect();
         let kept = self.own_config();
         for output in OUTPUTS.map(|name| self.out.join(name)).into_iter().filter(|output| kept.as_ref() != Some(output))
         {
             let Ok(output) = output.canonicalize() else { continue };
-            if inputs.iter().flatten().any(|input| input.canonicalize().is_ok_and(|input| input == output)) {
+            if inputs.iter().any(|input| input.canonicalize().is_ok_and(|input| input == output)) {
                 let message = format!("{} is an input and would be overwritten; give another folder", output.display());
                 return Err(Error::Option { option: "--out".to_owned(), message });
             }
@@ -258,7 +275,7 @@ impl RunArgs {
             Stage::Report => "report.html",
             _ => LOG,
         };
-        format!("{}: done; see {}", self.recording.display(), self.out.join(last).display())
+        format!("{}: done; see {}", self.recordings[0].display(), self.out.join(last).display())
     }
 }
 
