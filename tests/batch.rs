@@ -332,3 +332,34 @@ fn results_that_cannot_be_written_end_the_batch_with_one_line_and_lose_nothing()
     assert_eq!(code, Some(0), "{told}");
     assert_eq!(lab.rows("out").len(), 7);
 }
+
+#[test]
+fn recordings_of_one_specimen_are_fitted_together() {
+    let lab = Laboratory::new();
+    let config =
+        format!("{SPECIMEN}[rig]\ngravity_m_s2 = 9.81\n[model]\nk_eq_n_m_per_rad = 2e-4\nc_eq_n_m_s_per_rad = 2e-6\n");
+    for (name, release) in [("small", "[0.1, 0.12]"), ("large", "[0.4, 0.45]")] {
+        lab.write("simulated.toml", format!("{config}release_rad = {release}\n"));
+        let mut simulate = Command::cargo_bin("freeswing").unwrap();
+        simulate.current_dir(lab.folder.path()).args(["simulate", "--config", "simulated.toml", "--duration", "10"]);
+        let output = simulate.args(["--noise-rad", "1e-4", "--out", &format!("in/{name}.csv")]).output().unwrap();
+        assert!(output.status.success(), "{}", said(&output));
+    }
+    lab.write("in/experiment.toml", config.replace("2e-4", "1e-4"));
+    // how a recording was filmed does not make another specimen of it
+    lab.write("in/small.toml", "[rig]\npivot_px = [1.0, 2.0]\n");
+    let mut command = Command::cargo_bin("freeswing").unwrap();
+    let output = command
+        .current_dir(lab.folder.path())
+        .args(["batch", "in", "--out", "out", "--until", "fit"])
+        .output()
+        .unwrap();
+    assert_eq!(output.status.code(), Some(0), "{}", said(&output));
+    let fit: serde_json::Value =
+        serde_json::from_slice(&fs::read(lab.path("out/together/strip/fit.json")).unwrap()).unwrap();
+    assert_eq!(fit["recordings"].as_array().unwrap().len(), 2);
+    let k = fit["parameters"]["k_eq_n_m_per_rad"]["value"].as_f64().unwrap();
+    assert!((k - 2e-4).abs() < 2e-6, "{k}");
+    let page = fs::read_to_string(lab.path("out/index.html")).unwrap();
+    assert!(page.contains("fitted and diagnosed together") && page.contains("together/strip"), "no table of specimens");
+}
