@@ -100,6 +100,10 @@ pub enum Error {
     #[error("{line}; what was finished is kept, and the batch goes on from there when it is started again")]
     Results { line: String },
 
+    /// A self-test that measured something else than the truth.
+    #[error("the self-test measured angles that are {:.2} mrad off, where {:.2} are allowed; FFmpeg or OpenCV of this machine is broken, install them anew", 1e3 * error_rad, 1e3 * most_rad)]
+    SelfTest { error_rad: f64, most_rad: f64 },
+
     /// Stopped by the user.
     #[error("interrupted; nothing was written")]
     Interrupted,

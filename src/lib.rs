@@ -18,6 +18,7 @@
 //! | fit | [`fit`] | angles and model → parameters, residuals, verdict |
 //! | diagnose | [`diagnose`] | angles and model → what the model lacks, how probable, and the proof |
 //! | paper | [`paper`] | the published tables, recomputed |
+//! | export | [`export`] | angles.csv → the file of another program |
 //! | batch | [`batch`] | a folder of recordings → a folder of results, and their summary |
 //! | synth | [`synth`] | exact swings, rendered recordings with known truth |
 
@@ -50,6 +51,7 @@ pub mod diagnose;
 pub mod paper;
 pub mod synth;
 pub mod batch;
+pub mod export;
 #[doc(hidden)]
 pub mod cli;
 

@@ -4,6 +4,8 @@ mod bar;
 mod batch;
 mod console;
 mod diagnose;
+mod doctor;
+mod export;
 mod fit;
 mod identify;
 mod init;
@@ -11,6 +13,7 @@ mod modes;
 mod paper;
 mod render;
 mod run;
+mod shell;
 mod simulate;
 mod svg;
 mod table;
@@ -50,6 +53,10 @@ enum Command {
     Paper(paper::PaperArgs),
     Run(run::RunArgs),
     Batch(batch::BatchArgs),
+    Export(export::ExportArgs),
+    Doctor(doctor::DoctorArgs),
+    Completions(shell::CompletionsArgs),
+    Man(shell::ManArgs),
 }
 
 /// `track` alone, so that `track VIDEO --out angles.csv` works as typed.
@@ -83,6 +90,10 @@ impl Command {
             Self::Modes(args) => args.run(console),
             Self::Paper(args) => args.run(console),
             Self::Run(args) => args.run(console),
+            Self::Export(args) => args.run(console),
+            Self::Doctor(args) => args.run(console),
+            Self::Completions(args) => args.run(console),
+            Self::Man(args) => args.run(console),
         }?;
         Ok(ExitCode::SUCCESS)
     }
