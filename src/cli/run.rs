@@ -163,7 +163,8 @@ impl RunArgs {
                 all.extend(words(&["track", &path_text(&self.recordings[0])?, "--out", &own("angles.csv")?]));
                 all.extend(config());
                 if !self.no_overlay {
-                    all.extend(words(&["--overlay", &own("overlay.mp4")?]));
+                    // so much fits into a page
+                    all.extend(words(&["--overlay", &own("overlay.mp4")?, "--overlay-mb", "5"]));
                 }
                 if let Some(threads) = self.threads {
                     all.extend(words(&["--threads", &threads.to_string()]));
