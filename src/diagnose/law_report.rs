@@ -97,16 +97,11 @@ impl WrittenTerm {
 /// A term as an experiment file states it.
 fn toml_of(term: &Term) -> String {
     let law = &term.law;
-    let key = match law.place.unit() {
-        "N/m" => "force_n_per_m",
-        "N" => "force_n",
-        "m/s2" => "acceleration_m_s2",
-        _ => "torque_n_m",
-    };
     let mut text = format!(
-        "[[model.law]]\nname = \"{}\"\nplace = \"{}\"\n{key} = \"{}\"\n",
+        "[[model.law]]\nname = \"{}\"\nplace = \"{}\"\n{} = \"{}\"\n",
         law.name,
         law.place.id(),
+        law.place.key(),
         law.formula
     );
     for (name, own) in &law.parameters {

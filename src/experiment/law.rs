@@ -35,6 +35,16 @@ impl LawPlace {
         }
     }
 
+    /// The key of a formula there, in files.
+    pub fn key(self) -> &'static str {
+        match self {
+            Self::Hinge | Self::Joint => "torque_n_m",
+            Self::Strip => "force_n_per_m",
+            Self::Tip => "force_n",
+            Self::Support => "acceleration_m_s2",
+        }
+    }
+
     /// The variables of a formula there; the time `t` (s) is the last.
     pub fn variables(self) -> &'static [&'static str] {
         match self {
