@@ -79,9 +79,9 @@ impl LearntLaw {
 impl WrittenTerm {
     fn of(term: &Term, learnt: &Learnt<'_>) -> Self {
         let law = &term.law;
-        let parameters = law.parameters.iter().zip(law.coefficients()).map(|((name, own), (coefficient, _))| {
-            let unit = crate::model::Parameter::Law(coefficient).unit();
-            (name.clone(), Quantity { value: Some(own.start), sd: learnt.sd(coefficient), unit })
+        let parameters = law.parameters.keys().zip(law.coefficients()).map(|(name, (parameter, own))| {
+            let quantity = Quantity { value: Some(own.start), sd: learnt.sd(parameter), unit: parameter.unit() };
+            (name.clone(), quantity)
         });
         Self {
             place: law.place.id(),

@@ -29,7 +29,7 @@ use super::screen::Projection;
 use crate::experiment::{Law, LawPlace};
 use crate::model::effects::Effect as _;
 use crate::model::effects::formula::Formula;
-use crate::model::{LawCoefficient, Motion, Parameter};
+use crate::model::{Motion, Parameter};
 
 /// Terms of which pairs are tried.
 const PAIRED: usize = 12;
@@ -187,9 +187,9 @@ impl Learnt<'_> {
     }
 
     /// A coefficient's standard deviation.
-    pub fn sd(&self, coefficient: LawCoefficient) -> f64 {
+    pub fn sd(&self, coefficient: Parameter) -> f64 {
         let scale = (self.fit.chi2 / self.fit.values().max(1) as f64).max(1.0).sqrt();
-        let covariance = self.fit.covariance(&[Parameter::Law(coefficient)]);
+        let covariance = self.fit.covariance(&[coefficient]);
         scale * covariance.get((0, 0)).map_or(f64::INFINITY, |variance| variance.max(0.0).sqrt())
     }
 }
@@ -366,7 +366,7 @@ fn begun(term: &Term, amplitude: f64, place: usize) -> Term {
 /// The context of fits with some laws more.
 fn with_laws<'a>(context: &FitContext<'a>, terms: &[Term]) -> FitContext<'a> {
     let laws: Vec<Law> = terms.iter().map(|term| term.law.clone()).collect();
-    let coefficients = laws.iter().flat_map(|law| law.coefficients().map(|(own, _)| Parameter::Law(own)));
+    let coefficients = laws.iter().flat_map(|law| law.coefficients().map(|(parameter, _)| parameter));
     let base = context.base.iter().copied().chain(coefficients).collect();
     FitContext { laws, base, ..context.clone() }
 }
@@ -393,8 +393,7 @@ fn ended<'a>(context: &FitContext<'a>, candidate: Candidate, begun: Refit<'a>) -
     let with = with_laws(context, &terms);
     let fit = if begun.converged { begun } else { with.go_on(&begun, steps).unwrap_or(begun) };
     for term in &mut terms {
-        let fitted: Vec<Option<f64>> =
-            term.law.coefficients().map(|(coefficient, _)| fit.value(Parameter::Law(coefficient))).collect();
+        let fitted: Vec<Option<f64>> = term.law.coefficients().map(|(parameter, _)| fit.value(parameter)).collect();
         for (own, value) in term.law.parameters.values_mut().zip(fitted) {
             own.start = value.unwrap_or(own.start);
         }
