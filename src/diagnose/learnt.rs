@@ -15,7 +15,7 @@
 use nalgebra::DMatrix;
 use rayon::prelude::*;
 
-use super::basis_law::Swing;
+use super::basis_law::{Swing, swings};
 use super::context::FitContext;
 use super::effect::{Acts, Effect};
 use super::evidence::{Scatter, normalised};
@@ -264,13 +264,8 @@ fn told_apart(columns: &DMatrix<f64>) -> Vec<usize> {
 
 /// Every term of the grammar, and what a unit of its amplitude adds to the values seen, whitened, a column each.
 fn effects_of_terms(fit: &Refit<'_>) -> Option<(Vec<Term>, DMatrix<f64>)> {
-    let records = fit.problem.records.len();
-    let around: Vec<Linearisation> =
-        (0..records).map(|record| Linearisation::of(fit, record)).collect::<Option<_>>()?;
-    let models = (0..records).map(|record| fit.problem.model(record, &fit.x[..fit.problem.free.len()]).ok());
-    let models = models.collect::<Option<Vec<_>>>()?;
-    let swings: Vec<Swing<'_>> =
-        around.iter().zip(&models).map(|(around, (model, _))| Swing::of(around, model)).collect();
+    let around = Linearisation::of_all(fit)?;
+    let swings = swings(fit, &around)?;
     let places = [LawPlace::Hinge, LawPlace::Joint, LawPlace::Strip, LawPlace::Tip];
     let places = places.into_iter().filter(|place| *place != LawPlace::Joint || fit.problem.marks() > 1);
     let all: Vec<Term> =
