@@ -196,25 +196,7 @@ impl Learnt<'_> {
 
 /// The terms' formulas with the numbers of their coefficients, one after the other.
 fn formula_of(terms: &[Term]) -> String {
-    let of = |term: &Term| {
-        let is_word = |c: char| c.is_alphanumeric() || c == '_';
-        let mut text = String::new();
-        let mut word = String::new();
-        for c in term.law.formula.chars().chain([' ']) {
-            if is_word(c) {
-                word.push(c);
-                continue;
-            }
-            match term.law.parameters.get(&word) {
-                Some(own) => text.push_str(&format!("{:.3e}", own.start)),
-                None => text.push_str(&word),
-            }
-            word.clear();
-            text.push(c);
-        }
-        text.trim_end().replace("--", "")
-    };
-    terms.iter().map(of).collect::<Vec<_>>().join(" + ").replace("+ -", "- ")
+    terms.iter().map(Term::with_numbers).collect::<Vec<_>>().join(" + ").replace("+ -", "- ")
 }
 
 /// What promises most, beside the names of a fit, without each of them, and in the place of them all.
