@@ -30,11 +30,11 @@ pub struct Described<'a> {
 /// Names with and without laws of the grammar, fitted in full simulation, the shortest description first.
 pub fn descriptions<'a>(context: &FitContext<'a>, best: &Refit<'a>) -> Option<Vec<Described<'a>>> {
     let before = context.work.done();
-    best.linearised()?;
+    let linearised = best.linearised()?;
     let each = (context.work.done() - before).max(1) as f64;
     let allowed = context.settings.search.shares.law * context.settings.search.budget as f64 / each;
     let count = ((allowed / EVALUATIONS) as usize).clamp(FEWEST, MOST);
-    let begun: Vec<(Candidate, Refit<'a>)> = candidates(best, count)?
+    let begun: Vec<(Candidate, Refit<'a>)> = candidates(best, &linearised, count)?
         .into_par_iter()
         .with_max_len(1)
         .filter_map(|candidate| Some((candidate.clone(), begun_fit(context, best, &candidate, count > FEWEST)?)))

@@ -1,6 +1,6 @@
 //! What is sought: the terms, and pairs of them, that would lower most of what is left beside the names of a fit, without each of them, and in their place.
 
-use nalgebra::DMatrix;
+use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
 use super::super::basis_law::{Swing, swings};
@@ -33,10 +33,13 @@ pub struct Candidate {
     pub gain: f64,
 }
 
-/// What promises most, beside the names of a fit, without each of them, and in the place of them all.
-pub fn candidates(best: &Refit<'_>, count: usize) -> Option<Vec<Candidate>> {
-    let (all, columns) = effects_of_terms(best)?;
-    let (residual, slopes) = best.linearised()?;
+/// What promises most, beside the names of a fit, without each of them, and in the place of them all; with the fit's residuals and their derivatives.
+pub fn candidates(
+    best: &Refit<'_>,
+    (residual, slopes): &(DVector<f64>, DMatrix<f64>),
+    count: usize,
+) -> Option<Vec<Candidate>> {
+    let (all, columns) = effects_of_terms(best, residual.len())?;
     let names = &best.hypothesis.effects;
     let mut left_out: Vec<Vec<Effect>> = vec![Vec::new()];
     left_out.extend(names.iter().map(|effect| vec![*effect]));
@@ -78,8 +81,8 @@ fn told_apart(columns: &DMatrix<f64>) -> Vec<usize> {
     kept
 }
 
-/// Every term of the grammar, and what a unit of its amplitude adds to the values seen, whitened, a column each.
-fn effects_of_terms(fit: &Refit<'_>) -> Option<(Vec<Term>, DMatrix<f64>)> {
+/// Every term of the grammar, and what a unit of its amplitude adds to the residuals, of which there are so many, a column each.
+fn effects_of_terms(fit: &Refit<'_>, rows: usize) -> Option<(Vec<Term>, DMatrix<f64>)> {
     let around = Linearisation::of_all(fit)?;
     let swings = swings(fit, &around)?;
     let places = [LawPlace::Hinge, LawPlace::Joint, LawPlace::Strip, LawPlace::Tip];
@@ -96,7 +99,7 @@ fn effects_of_terms(fit: &Refit<'_>) -> Option<(Vec<Term>, DMatrix<f64>)> {
         Some(swings.iter().flat_map(|swing| of_swing(swing).as_slice().to_vec()).collect::<Vec<f64>>())
     };
     let columns: Vec<Vec<f64>> = all.par_iter().map(column).collect::<Option<_>>()?;
-    let (seen, rows) = (columns.first()?.len(), fit.linearised()?.0.len());
+    let seen = columns.first()?.len();
     // beliefs stand after what is seen, and no torque changes them
     let matrix = DMatrix::from_fn(rows, all.len(), |i, k| if i < seen { columns[k][i] } else { 0.0 });
     Some((all, matrix))
