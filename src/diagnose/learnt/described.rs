@@ -11,12 +11,6 @@ use super::super::refit::Refit;
 use super::sought::{Candidate, candidates};
 use crate::experiment::Law;
 
-/// Terms, and pairs, begun beside each set of names, and as many of all that was begun fitted to the end, at least and at most (cost)…
-const FEWEST: usize = 2;
-const MOST: usize = 6;
-/// … for each of which so many motions are made.
-const EVALUATIONS: f64 = 80.0;
-
 /// Terms that were fitted beside some effects, with the length of the description.
 pub struct Described<'a> {
     /// The terms, with their coefficients.
@@ -32,12 +26,13 @@ pub fn descriptions<'a>(context: &FitContext<'a>, best: &Refit<'a>) -> Option<Ve
     let before = context.work.done();
     let linearised = best.linearised()?;
     let each = (context.work.done() - before).max(1) as f64;
-    let allowed = context.settings.search.shares.law * context.settings.search.budget as f64 / each;
-    let count = ((allowed / EVALUATIONS) as usize).clamp(FEWEST, MOST);
-    let begun: Vec<(Candidate, Refit<'a>)> = candidates(best, &linearised, count)?
+    let (search, law) = (&context.settings.search, &context.settings.law);
+    let allowed = search.shares.law * search.budget as f64 / each;
+    let count = ((allowed / law.evaluations) as usize).clamp(law.fewest, law.most);
+    let begun: Vec<(Candidate, Refit<'a>)> = candidates(best, &linearised, count, law)?
         .into_par_iter()
         .with_max_len(1)
-        .filter_map(|candidate| Some((candidate.clone(), begun_fit(context, best, &candidate, count > FEWEST)?)))
+        .filter_map(|candidate| Some((candidate.clone(), begun_fit(context, best, &candidate, count > law.fewest)?)))
         .collect();
     let ended = |(candidate, fit): (Candidate, Refit<'a>)| ended(context, candidate, fit);
     let fitted: Vec<(Vec<Term>, Refit<'a>)> =

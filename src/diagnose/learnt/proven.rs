@@ -9,13 +9,6 @@ use super::super::refit::Refit;
 use super::described::{Described, with_laws};
 use crate::model::Parameter;
 
-/// Predictions that leave at most this many times what the best one does are alike.
-const ALIKE: f64 = 1.1;
-/// The shortest descriptions of which it is asked what they predict.
-const PROVEN: usize = 4;
-/// Terms and pairs told as alternatives are within so many nats of the best.
-const ALTERNATIVES: f64 = 5.0;
-
 /// A law that was learnt.
 #[derive(Debug, Clone)]
 pub struct Learnt<'a> {
@@ -55,7 +48,8 @@ pub fn best_proven<'a>(
     proof: &HeldOut,
     from_s: Option<f64>,
 ) -> Option<Learnt<'a>> {
-    let shorter = order.iter().take_while(|own| !own.terms.is_empty()).take(PROVEN).collect::<Vec<_>>();
+    let settings = context.settings;
+    let shorter = order.iter().take_while(|own| !own.terms.is_empty()).take(settings.law.proven).collect::<Vec<_>>();
     let leaves = |prediction: &Prediction| {
         let told = Prediction { rmse_rad: prediction.rmse_rad.clone(), left: None };
         HeldOut { baseline: proof.augmented.clone(), augmented: told, ..proof.clone() }.leaves()
@@ -65,11 +59,12 @@ pub fn best_proven<'a>(
     let proven = shorter.into_iter().zip(predicted).filter_map(|(own, prediction)| Some((own, prediction?)));
     let proven: Vec<(&Described<'a>, Prediction)> = proven.collect();
     let least = proven.iter().map(|(_, prediction)| leaves(prediction)).fold(f64::INFINITY, f64::min);
-    (least < context.settings.verdict.borne_out).then_some(())?;
+    (least < settings.verdict.borne_out).then_some(())?;
     // of those that predict alike the shortest
-    let (own, prediction) = proven.into_iter().find(|(_, prediction)| leaves(prediction) <= ALIKE * least)?;
+    let (own, prediction) =
+        proven.into_iter().find(|(_, prediction)| leaves(prediction) <= settings.law.alike * least)?;
     let near = order.iter().filter(|other| !std::ptr::eq(*other, own) && !other.terms.is_empty());
-    let near = near.filter(|other| other.length < own.length + ALTERNATIVES);
+    let near = near.filter(|other| other.length < own.length + settings.law.alternatives);
     Some(Learnt {
         terms: own.terms.clone(),
         fit: own.fit.clone(),

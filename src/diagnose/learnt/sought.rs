@@ -10,17 +10,11 @@ use super::super::hypothesis::Hypothesis;
 use super::super::linearisation::Linearisation;
 use super::super::refit::Refit;
 use super::super::screen::Projection;
+use super::super::settings::LawSettings;
 use crate::experiment::LawPlace;
 use crate::model::effects::Effect as _;
 use crate::model::effects::formula::Formula;
 use crate::model::{Motion, Parameter};
-
-/// Terms of which pairs are tried.
-const PAIRED: usize = 12;
-/// Of a term less than this is left by the projection: it does what is free already.
-const NOTHING_LEFT: f64 = 1e-3;
-/// A term whose effect on the angles has this cosine with that of a name is that name under another one.
-const THE_SAME: f64 = 0.999;
 
 /// Terms to be fitted beside some effects.
 #[derive(Clone)]
@@ -38,6 +32,7 @@ pub fn candidates(
     best: &Refit<'_>,
     (residual, slopes): &(DVector<f64>, DMatrix<f64>),
     count: usize,
+    settings: &LawSettings,
 ) -> Option<Vec<Candidate>> {
     let (all, columns) = effects_of_terms(best, residual.len())?;
     let names = &best.hypothesis.effects;
@@ -45,7 +40,7 @@ pub fn candidates(
     left_out.extend(names.iter().map(|effect| vec![*effect]));
     left_out.extend((names.len() > 1).then(|| names.clone()));
     let lower = best.problem.lower();
-    let (apart, alone) = (told_apart(&columns), best.problem.records.len() == 1);
+    let (apart, alone) = (told_apart(&columns, settings.the_same), best.problem.records.len() == 1);
     let promise = |out: &Vec<Effect>| {
         let parameters: Vec<Parameter> = out.iter().flat_map(|effect| effect.parameters()).copied().collect();
         let gone: Vec<usize> = parameters.iter().filter_map(|parameter| best.place(*parameter)).collect();
@@ -55,7 +50,7 @@ pub fn candidates(
         let is_a_name = |k: usize| {
             let own = columns.column(k);
             let cosine = |i: &usize| own.dot(&slopes.column(*i)) / (own.norm() * slopes.column(*i).norm()).max(1e-300);
-            gone.iter().any(|i| cosine(i).abs() > THE_SAME)
+            gone.iter().any(|i| cosine(i).abs() > settings.the_same)
         };
         // in a single release the amplitude falls with time, and a loss that drifts stands for any loss
         let of_loss = alone && out.iter().any(|effect| effect.entry().acts == Acts::Loss);
@@ -63,18 +58,18 @@ pub fn candidates(
         let new: Vec<usize> = apart.iter().copied().filter(|k| !is_a_name(*k) && !drifts(&all[*k])).collect();
         let hypothesis = out.iter().fold(best.hypothesis.clone(), |hypothesis, effect| hypothesis.without(*effect));
         let projection = Projection::off(left, slopes.select_columns(&kept));
-        promising(&projection, &all, (&columns, &new), &hypothesis, count)
+        promising(&projection, &all, (&columns, &new), &hypothesis, count, settings)
     };
     Some(left_out.iter().flat_map(promise).collect())
 }
 
 /// The terms that do something else to the angles than any before them: on a single link hinge, strip and tip are one place.
-fn told_apart(columns: &DMatrix<f64>) -> Vec<usize> {
+fn told_apart(columns: &DMatrix<f64>, the_same: f64) -> Vec<usize> {
     let sizes: Vec<f64> = columns.column_iter().map(|column| column.norm().max(1e-300)).collect();
     let mut kept: Vec<usize> = Vec::new();
     for k in 0..columns.ncols() {
         let cosine = |other: &usize| columns.column(k).dot(&columns.column(*other)) / (sizes[k] * sizes[*other]);
-        if !kept.iter().any(|other| cosine(other).abs() > THE_SAME) {
+        if !kept.iter().any(|other| cosine(other).abs() > the_same) {
             kept.push(k);
         }
     }
@@ -132,9 +127,10 @@ fn promising(
     (columns, new): (&DMatrix<f64>, &[usize]),
     hypothesis: &Hypothesis,
     count: usize,
+    settings: &LawSettings,
 ) -> Vec<Candidate> {
     let projected = left.out(columns);
-    let is_new = |k: usize| projected.column(k).norm() > NOTHING_LEFT * columns.column(k).norm();
+    let is_new = |k: usize| projected.column(k).norm() > settings.nothing_left * columns.column(k).norm();
     let mut alone: Vec<(f64, usize)> = new
         .iter()
         .copied()
@@ -148,7 +144,7 @@ fn promising(
         let value = pair.tr_mul(&pair).try_inverse()? * &pull;
         Some((pull.dot(&value), vec![(*a, -value[0]), (*b, -value[1])]))
     };
-    let foremost = &alone[..alone.len().min(PAIRED)];
+    let foremost = &alone[..alone.len().min(settings.paired)];
     let mut pairs: Vec<(f64, Vec<(usize, f64)>)> = foremost
         .iter()
         .enumerate()
