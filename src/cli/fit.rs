@@ -94,7 +94,7 @@ impl FitArgs {
 
 /// The parameters a fit leaves free: those of the base model, with the user's changes.
 fn free_parameters(experiment: &Experiment, marks: usize, more: &[String], fix: &[String]) -> Result<Vec<Parameter>> {
-    let stated = experiment.model.law.iter().flat_map(|law| law.coefficients().map(|(own, _)| Parameter::Law(own)));
+    let stated = experiment.model.law.iter().flat_map(|law| law.coefficients().map(|(parameter, _)| parameter));
     let known: Vec<Parameter> = Parameter::ALL.into_iter().chain(stated).collect();
     let parse = |id: &String| {
         let nearest = || {
