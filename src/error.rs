@@ -72,6 +72,10 @@ pub enum Error {
     #[error("{}{}: {message}", path.display(), line.map(|l| format!(":{l}")).unwrap_or_default())]
     Table { path: PathBuf, line: Option<u64>, message: String },
 
+    /// A folder of a run, or a file in it, that cannot be read back.
+    #[error("{}{}: {message}", path.display(), line.map(|l| format!(":{l}")).unwrap_or_default())]
+    Left { path: PathBuf, line: Option<usize>, message: String },
+
     /// An output that cannot be written.
     #[error("{}: cannot be written: {source}; check that the folder exists, is writable and has room", path.display())]
     Unwritable { path: PathBuf, source: std::io::Error },
@@ -87,6 +91,10 @@ pub enum Error {
     /// A motion that cannot be simulated.
     #[error("the motion cannot be simulated: {detail}")]
     Simulation { detail: String },
+
+    /// A figure that cannot be made a picture.
+    #[error("a figure cannot be drawn: {detail}; report it with the folder, and leave the figures out meanwhile")]
+    Drawing { detail: String },
 
     /// Stopped by the user.
     #[error("interrupted; nothing was written")]

@@ -18,6 +18,7 @@
 //! | fit | [`fit`] | angles and model → parameters, residuals, verdict |
 //! | diagnose | [`diagnose`] | angles and model → what the model lacks, how probable, and the proof |
 //! | paper | [`paper`] | the published tables, recomputed |
+//! | report | [`report`] | what a run left in a folder → one page, figures |
 //! | synth | [`synth`] | exact swings, rendered recordings with known truth |
 
 pub mod error;
@@ -46,6 +47,7 @@ pub mod identify;
 pub mod fit;
 pub mod diagnose;
 pub mod paper;
+pub mod report;
 pub mod synth;
 #[doc(hidden)]
 pub mod cli;

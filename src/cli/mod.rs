@@ -8,8 +8,8 @@ mod init;
 mod modes;
 mod paper;
 mod render;
+mod report;
 mod simulate;
-mod svg;
 mod table;
 mod track;
 
@@ -43,6 +43,7 @@ enum Command {
     Simulate(simulate::SimulateArgs),
     Modes(modes::ModesArgs),
     Render(render::RenderArgs),
+    Report(report::ReportArgs),
     Paper(paper::PaperArgs),
 }
 
@@ -67,6 +68,7 @@ impl Cli {
             Command::Identify(args) => args.run(),
             Command::Render(args) => args.run(),
             Command::Modes(args) => args.run(),
+            Command::Report(args) => args.run(),
             Command::Paper(args) => args.run(),
         })
     }

@@ -7,7 +7,7 @@
 use std::fmt::Write;
 use std::ops::Range;
 
-use crate::cli::svg::{Panel, line, text};
+use crate::report::svg::{Panel, line, text};
 use crate::cli::table::number;
 use crate::diagnose::{Diagnosis, Drawn, MissingTorque, Place};
 use crate::error::{Error, Result};
