@@ -38,14 +38,14 @@ pub struct Drawn {
 pub fn page<'d>(left: &Left, chapters: &[Chapter], drawn: impl Iterator<Item = &'d Drawn>) -> Result<String> {
     let mut drawn = drawn;
     let mut columns = Columns::default();
-    let (mut plots, mut body, mut contents) = (Vec::new(), String::new(), String::new());
+    let (mut plots, mut body, mut contents, mut film_at) = (Vec::new(), String::new(), String::new(), None);
     for chapter in chapters {
         let _ = writeln!(contents, "<li><a href=\"#{}\">{}</a></li>", chapter.id, chapter.title);
         let _ = writeln!(body, "<section id=\"{id}\" aria-labelledby=\"{id}-title\">\n<h2 id=\"{id}-title\">{}</h2>", chapter.title, id = chapter.id);
         for part in &chapter.parts {
             match part {
                 Part::Words(html) => body.push_str(html),
-                Part::Film => body.push_str("{{film}}"),
+                Part::Film => film_at = Some(body.len()),
                 Part::MovingModes => body.push_str(MOVING_MODES),
                 Part::Plot(plot) => {
                     let described = columns.plot(plot);
@@ -82,10 +82,9 @@ pub fn page<'d>(left: &Left, chapters: &[Chapter], drawn: impl Iterator<Item = &
         ("version", env!("CARGO_PKG_VERSION").to_owned()),
     ];
     let body_size = body.len() + fields.iter().map(|f| f.1.len()).sum::<usize>() + TEMPLATE.len();
-    let body = match body.split_once("{{film}}") {
-        Some((before, after)) => before.to_owned() + &film(left, MOST_BYTES.saturating_sub(body_size))? + after,
-        None => body,
-    };
+    if let Some(at) = film_at {
+        body.insert_str(at, &film(left, MOST_BYTES.saturating_sub(body_size))?);
+    }
     Ok(filled(&fields, &body))
 }
 

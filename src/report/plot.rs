@@ -10,6 +10,9 @@ use serde_json::{Value, json};
 /// Rows of a plot on the page; of a longer one every second, third, … is drawn there, and all stand in its CSV.
 const MOST_ROWS: usize = 12_000;
 
+/// Up to so many rows a plot's table stands on the page as it is; longer ones the page makes of the columns.
+const FEW_ROWS: usize = 400;
+
 /// A plot.
 #[derive(Debug, Clone, Default)]
 pub struct Plot {
@@ -192,19 +195,8 @@ impl Plot {
         if let Some(map) = &self.map {
             return self.csv_of(map);
         }
-        let mut csv = column_name(&self.x.label, self.x.unit);
         let named = !self.y.rows.is_empty();
-        if named {
-            csv = format!("{},{csv}", self.y.label);
-        }
-        for series in self.series.iter().filter(|_| !named) {
-            let _ = write!(csv, ",{}", column_name(&series.name, self.y.unit));
-        }
-        for series in self.series.iter().filter(|s| !s.ends.is_empty()) {
-            let unit = if named { self.x.unit } else { self.y.unit };
-            let _ = write!(csv, ",{},{}", column_name(&format!("{} low", series.name), unit), column_name(&format!("{} high", series.name), unit));
-        }
-        csv.push('\n');
+        let mut csv = self.header() + "\n";
         for (row, at) in self.at.iter().enumerate() {
             if named {
                 let name = self.series.iter().find_map(|s| s.values[row]).map_or(0, |y| y.round() as usize);
@@ -222,6 +214,25 @@ impl Plot {
             csv.push('\n');
         }
         csv
+    }
+
+    /// Names of the columns.
+    fn header(&self) -> String {
+        let named = !self.y.rows.is_empty();
+        let mut header = column_name(&self.x.label, self.x.unit);
+        if named {
+            header = format!("{},{header}", column_name(&self.y.label, ""));
+        }
+        for series in self.series.iter().filter(|_| !named) {
+            let _ = write!(header, ",{}", column_name(&series.name, self.y.unit));
+        }
+        let unit = if named { self.x.unit } else { self.y.unit };
+        for series in self.series.iter().filter(|s| !s.ends.is_empty()) {
+            for end in ["low", "high"] {
+                let _ = write!(header, ",{}", column_name(&format!("{} {end}", series.name), unit));
+            }
+        }
+        header
     }
 
     fn csv_of(&self, map: &Map) -> String {
@@ -290,6 +301,7 @@ impl Columns {
             .collect();
         json!({
             "id": plot.id, "title": plot.title, "time": plot.is_time, "x": axis(&plot.x), "y": axis(&plot.y), "at": at,
+            "csv": (plot.at.len() <= FEW_ROWS || plot.map.is_some()).then(|| plot.csv()), "header": plot.header(),
             "series": series, "bands": plot.bands, "lines": plot.lines, "map": plot.map, "every": every,
         })
     }

@@ -30,13 +30,14 @@ fn lowered(words: &str) -> String {
 /// What a reader must know first: warnings, parts that are missing, notes.
 pub fn warnings(left: &Left) -> Chapter {
     let mut chapter = Chapter::new("warnings", "Warnings");
-    let mut warnings = left.track.as_ref().map(|t| t.warnings.clone()).unwrap_or_default();
-    for warning in left.log.iter().flat_map(|log| &log.warnings) {
+    let tracked = left.track.iter().flat_map(|t| &t.warnings);
+    let read = left.angles.iter().flat_map(|a| &a.warnings);
+    let mut warnings: Vec<String> = Vec::new();
+    for warning in tracked.chain(left.log.iter().flat_map(|log| &log.warnings)).chain(read) {
         if !warnings.contains(warning) {
             warnings.push(warning.clone());
         }
     }
-    warnings.extend(left.angles.iter().flat_map(|a| a.warnings.iter().filter(|w| !warnings.contains(w)).cloned().collect::<Vec<_>>()));
     if let Some(fit) = &left.fit {
         if fit.converged == Some(false) {
             warnings.push("the fit has not converged: its values mean little".to_owned());
