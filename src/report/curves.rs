@@ -130,8 +130,7 @@ impl Curves {
     /// From its text; rows that are too short end in absent values.
     pub fn parse(text: &str) -> Self {
         let mut reader = csv::ReaderBuilder::new().flexible(true).trim(csv::Trim::All).from_reader(text.as_bytes());
-        let names: Vec<String> =
-            reader.headers().map(|h| h.iter().map(str::to_owned).collect()).unwrap_or_default();
+        let names: Vec<String> = reader.headers().map(|h| h.iter().map(str::to_owned).collect()).unwrap_or_default();
         let mut columns = vec![Vec::new(); names.len()];
         for record in reader.records().map_while(std::result::Result::ok) {
             for (k, column) in columns.iter_mut().enumerate() {

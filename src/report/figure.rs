@@ -55,7 +55,10 @@ fn head(height: f64) -> String {
     );
     for (ink, value) in INKS {
         let id = ink.id();
-        let _ = writeln!(svg, ".{id} {{ stroke: {value} }} .fill-{id} {{ fill: {value}; fill-opacity: 0.16 }} .bar-{id} {{ fill: {value} }}");
+        let _ = writeln!(
+            svg,
+            ".{id} {{ stroke: {value} }} .fill-{id} {{ fill: {value}; fill-opacity: 0.16 }} .bar-{id} {{ fill: {value} }}"
+        );
     }
     let _ = writeln!(svg, "</style>\n<rect width=\"{}\" height=\"{height}\" fill=\"#fff\"/>", SIZE_PX[0]);
     svg
@@ -83,15 +86,29 @@ fn legend(svg: &mut String, plot: &Plot) {
     }
     for band in plot.bands.iter().filter(|b| !b.name.is_empty()) {
         let sample = |svg: &mut String, x_px: f64| {
-            let _ = writeln!(svg, r#"<rect class="fill-{}" x="{x_px:.1}" y="{:.1}" width="24" height="12"/>"#, band.ink.id(), y_px - 11.0);
+            let _ = writeln!(
+                svg,
+                r#"<rect class="fill-{}" x="{x_px:.1}" y="{:.1}" width="24" height="12"/>"#,
+                band.ink.id(),
+                y_px - 11.0
+            );
         };
         entry(svg, &sample, &band.name);
     }
     if let Some(map) = &plot.map {
         let reach = map.reach();
-        for (share, words) in [(-1.0, format!("−{reach:.2e} {}", map.unit)), (0.0, "0".to_owned()), (1.0, format!("{reach:.2e} {}", map.unit))] {
+        for (share, words) in [
+            (-1.0, format!("−{reach:.2e} {}", map.unit)),
+            (0.0, "0".to_owned()),
+            (1.0, format!("{reach:.2e} {}", map.unit)),
+        ] {
             let sample = |svg: &mut String, x_px: f64| {
-                let _ = writeln!(svg, r##"<rect fill="{}" stroke="#888" x="{x_px:.1}" y="{:.1}" width="24" height="12"/>"##, colour(share), y_px - 11.0);
+                let _ = writeln!(
+                    svg,
+                    r##"<rect fill="{}" stroke="#888" x="{x_px:.1}" y="{:.1}" width="24" height="12"/>"##,
+                    colour(share),
+                    y_px - 11.0
+                );
             };
             entry(svg, &sample, &words);
         }
@@ -116,10 +133,11 @@ fn panel(plot: &Plot, height: f64) -> Panel {
         if let Some([from, to]) = axis.range {
             return scaled(axis, from)..scaled(axis, to);
         }
-        let (low, high) = values.filter(|v| v.is_finite()).map(|v| scaled(axis, v)).filter(|v| v.is_finite()).fold(
-            (f64::INFINITY, f64::NEG_INFINITY),
-            |(low, high), v| (low.min(v), high.max(v)),
-        );
+        let (low, high) = values
+            .filter(|v| v.is_finite())
+            .map(|v| scaled(axis, v))
+            .filter(|v| v.is_finite())
+            .fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), v| (low.min(v), high.max(v)));
         if low > high {
             return 0.0..1.0;
         }
@@ -135,10 +153,17 @@ fn panel(plot: &Plot, height: f64) -> Panel {
         // rows count from the top
         (along(&plot.x, &mut plot.at.iter().copied().chain(ends()).chain(zero), 0.04), -(named as f64) - 0.5..-0.5)
     } else {
-        let margin = if plot.is_time || plot.series.iter().all(|s| matches!(s.style, Style::Line | Style::Dashed)) { 0.0 } else { 0.04 };
+        let margin = if plot.is_time || plot.series.iter().all(|s| matches!(s.style, Style::Line | Style::Dashed)) {
+            0.0
+        } else {
+            0.04
+        };
         let across = plot.bands.iter().filter(|b| b.is_across).flat_map(|b| b.ends);
         let values = plot.series.iter().flat_map(|s| s.values.iter().flatten().copied());
-        (along(&plot.x, &mut plot.at.iter().copied(), margin), along(&plot.y, &mut values.chain(ends()).chain(across), 0.06))
+        (
+            along(&plot.x, &mut plot.at.iter().copied(), margin),
+            along(&plot.y, &mut values.chain(ends()).chain(across), 0.06),
+        )
     };
     Panel { x_px: left_px..SIZE_PX[0] - MARGIN_PX[0], y_px: MARGIN_PX[1]..height - MARGIN_PX[2], x, y }
 }
@@ -191,7 +216,11 @@ impl Canvas<'_> {
 
     fn axes(&self, svg: &mut String) {
         let (panel, plot) = (self.panel, self.plot);
-        if plot.x.is_logarithmic { panel.powers_along(svg) } else { panel.numbers_along(svg) }
+        if plot.x.is_logarithmic {
+            panel.powers_along(svg)
+        } else {
+            panel.numbers_along(svg)
+        }
         if plot.y.is_logarithmic {
             panel.powers_up(svg);
         } else if plot.y.rows.is_empty() {
@@ -228,7 +257,9 @@ impl Canvas<'_> {
         }
         match series.style {
             Style::Line | Style::Dashed => panel.polyline(svg, &class, &thinned(&points, panel)),
-            Style::Dots | Style::Interval => panel.dots(svg, &class, &points.iter().flatten().copied().collect::<Vec<_>>()),
+            Style::Dots | Style::Interval => {
+                panel.dots(svg, &class, &points.iter().flatten().copied().collect::<Vec<_>>())
+            }
             Style::Bars => {
                 for (x, y) in points.iter().flatten() {
                     panel.rectangle(svg, &format!("bar-{}", series.ink.id()), &(0.0..*x), &(y - 0.3..y + 0.3));
@@ -247,7 +278,9 @@ fn thinned(points: &[Option<(f64, f64)>], panel: &Panel) -> Vec<Option<(f64, f64
     let column = |p: &Option<(f64, f64)>| p.map(|(x, _)| ((x - panel.x.start) / width) as i64);
     let mut kept = Vec::new();
     for run in points.chunk_by(|a, b| column(a) == column(b)) {
-        let order = |a: &&Option<(f64, f64)>, b: &&Option<(f64, f64)>| a.map(|p| p.1).partial_cmp(&b.map(|p| p.1)).unwrap_or(std::cmp::Ordering::Equal);
+        let order = |a: &&Option<(f64, f64)>, b: &&Option<(f64, f64)>| {
+            a.map(|p| p.1).partial_cmp(&b.map(|p| p.1)).unwrap_or(std::cmp::Ordering::Equal)
+        };
         let extremes = [run.first(), run.iter().min_by(order), run.iter().max_by(order), run.last()];
         kept.extend(extremes.into_iter().flatten().copied());
     }

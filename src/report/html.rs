@@ -36,9 +36,32 @@ pub fn list(class: &str, items: impl IntoIterator<Item = String>) -> String {
 
 /// A number that a click copies, with its unit.
 pub fn copyable(words: &str, unit: &str) -> String {
-    let both = if unit.is_empty() { words.to_owned() } else { format!("{words} {unit}") };
-    let shown = escaped(&powers(&both));
-    format!("<button type=\"button\" class=\"n\" data-copy=\"{}\" title=\"copy\">{shown}</button>", escaped(&both))
+    // degrees and exponents as people write them; a program reads what is copied
+    let unit = if unit == "1" { "" } else { unit };
+    let gap = if unit.is_empty() || unit == "°" { "" } else { " " };
+    let raised_unit = unit.replace('2', "²").replace('3', "³");
+    let shown = format!("{}{gap}{raised_unit}", minus(&powers(words)));
+    let copied = format!("{words}{gap}{unit}");
+    format!(
+        "<button type=\"button\" class=\"n\" data-copy=\"{}\" title=\"copy\">{}</button>",
+        escaped(&copied),
+        escaped(&shown)
+    )
+}
+
+/// A sign in front as a sign, not a hyphen.
+fn minus(words: &str) -> String {
+    match words.strip_prefix("(-").map(|rest| ("(−", rest)).or_else(|| words.strip_prefix('-').map(|rest| ("−", rest)))
+    {
+        Some((sign, rest)) => format!("{sign}{rest}"),
+        None => words.to_owned(),
+    }
+}
+
+/// With a capital in front, as a sentence begins.
+pub fn capitalised(words: &str) -> String {
+    let mut letters = words.chars();
+    letters.next().map_or_else(String::new, |first| first.to_uppercase().chain(letters).collect())
 }
 
 /// A value alone.
@@ -152,7 +175,11 @@ mod tests {
     #[test]
     fn a_number_is_shown_with_a_power_of_ten_and_copied_as_programs_read_it() {
         let html = copyable("(2.00 ± 0.03)e-7", "N m");
-        assert!(html.contains("data-copy=\"(2.00 ± 0.03)e-7 N m\"") && html.contains(">(2.00 ± 0.03)·10⁻⁷ N m<"), "{html}");
+        assert!(
+            html.contains("data-copy=\"(2.00 ± 0.03)e-7 N m\"") && html.contains(">(2.00 ± 0.03)·10⁻⁷ N m<"),
+            "{html}"
+        );
+        assert!(copyable("-1.5", "kg/m2").contains("data-copy=\"-1.5 kg/m2\" title=\"copy\">−1.5 kg/m²<"));
         assert_eq!(powers("1.5e-12 made"), "1.5·10⁻¹² made");
     }
 
@@ -165,6 +192,9 @@ mod tests {
 
     #[test]
     fn base64_agrees_with_its_definition() {
-        assert_eq!(["", "f", "fo", "foo", "foob"].map(|t| base64(t.as_bytes())), ["", "Zg==", "Zm8=", "Zm9v", "Zm9vYg=="]);
+        assert_eq!(
+            ["", "f", "fo", "foo", "foob"].map(|t| base64(t.as_bytes())),
+            ["", "Zg==", "Zm8=", "Zm9v", "Zm9vYg=="]
+        );
     }
 }

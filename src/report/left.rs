@@ -637,7 +637,9 @@ mod tests {
 
     #[test]
     fn a_log_tells_commands_warnings_and_the_last_error() {
-        let log = Log::of("$ track a.mp4\nwarning: dark\nfit: warning: dark\n$ freeswing fit\nerror: no\nerror: yes\n".into());
+        let log = Log::of(
+            "$ track a.mp4\nwarning: dark\nfit: warning: dark\n$ freeswing fit\nerror: no\nerror: yes\n".into(),
+        );
         assert_eq!(log.commands, ["track a.mp4", "freeswing fit"]);
         assert_eq!(log.warnings, ["dark"]);
         assert_eq!(log.error.as_deref(), Some("yes"));

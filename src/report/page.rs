@@ -41,7 +41,12 @@ pub fn page<'d>(left: &Left, chapters: &[Chapter], drawn: impl Iterator<Item = &
     let (mut plots, mut body, mut contents, mut film_at) = (Vec::new(), String::new(), String::new(), None);
     for chapter in chapters {
         let _ = writeln!(contents, "<li><a href=\"#{}\">{}</a></li>", chapter.id, chapter.title);
-        let _ = writeln!(body, "<section id=\"{id}\" aria-labelledby=\"{id}-title\">\n<h2 id=\"{id}-title\">{}</h2>", chapter.title, id = chapter.id);
+        let _ = writeln!(
+            body,
+            "<section id=\"{id}\" aria-labelledby=\"{id}-title\">\n<h2 id=\"{id}-title\">{}</h2>",
+            chapter.title,
+            id = chapter.id
+        );
         for part in &chapter.parts {
             match part {
                 Part::Words(html) => body.push_str(html),
@@ -104,7 +109,15 @@ fn filled(fields: &[(&str, String)], body: &str) -> String {
 
 fn about(left: &Left) -> String {
     let source = left.track.as_ref().map(|t| t.source.file.clone()).filter(|f| !f.is_empty());
-    let length = left.angles.as_ref().map(|a| format!("{:.2} s, {} rows, {} angle{}", a.duration_s(), a.len(), a.links(), if a.links() == 1 { "" } else { "s" }));
+    let length = left.angles.as_ref().map(|a| {
+        format!(
+            "{:.2} s, {} rows, {} angle{}",
+            a.duration_s(),
+            a.len(),
+            a.links(),
+            if a.links() == 1 { "" } else { "s" }
+        )
+    });
     let parts: Vec<String> = [source, length].into_iter().flatten().collect();
     escaped(&parts.join(" · "))
 }
@@ -115,8 +128,16 @@ const MOVING_MODES: &str = "<div class=\"modes screen\" id=\"moving-modes\"><p c
 fn figure(plot: &Plot, every: u64, drawn: Option<&Drawn>) -> String {
     let (id, title, words) = (escaped(&plot.id), escaped(&plot.title), escaped(&plot.alternative));
     let still = drawn.map(|d| base64(d.svg.as_bytes())).unwrap_or_default();
-    let thinned = if every > 1 { format!(" Every {every}th row is drawn and saved here; all stand in <code>figures/{id}.csv</code>.") } else { String::new() };
-    let keys = if plot.is_time { "Arrow keys move frame by frame, space plays, + and − enlarge, Escape shows all." } else { "Arrow keys move along the values, + and − enlarge, Escape shows all." };
+    let thinned = if every > 1 {
+        format!(" Every {every}th row is drawn and saved here; all stand in <code>figures/{id}.csv</code>.")
+    } else {
+        String::new()
+    };
+    let keys = if plot.is_time {
+        "Arrow keys move frame by frame, space plays, + and − enlarge, Escape shows all."
+    } else {
+        "Arrow keys move along the values, + and − enlarge, Escape shows all."
+    };
     format!(
         "<figure class=\"plot\" id=\"plot-{id}\" data-plot=\"{id}\">\n<h3>{title}</h3>\n\
          <div class=\"live screen\" tabindex=\"0\" role=\"application\" aria-roledescription=\"plot\" aria-label=\"{title}. {words}. {keys}\"></div>\n\

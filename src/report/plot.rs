@@ -200,7 +200,11 @@ impl Plot {
         for (row, at) in self.at.iter().enumerate() {
             if named {
                 let name = self.series.iter().find_map(|s| s.values[row]).map_or(0, |y| y.round() as usize);
-                let _ = write!(csv, "\"{}\",", self.y.rows.get(name.wrapping_sub(1)).map_or("", String::as_str).replace('"', "'"));
+                let _ = write!(
+                    csv,
+                    "\"{}\",",
+                    self.y.rows.get(name.wrapping_sub(1)).map_or("", String::as_str).replace('"', "'")
+                );
             }
             let _ = write!(csv, "{at}");
             for series in self.series.iter().filter(|_| !named) {
@@ -252,7 +256,8 @@ impl Plot {
 /// `measured θ1`, `rad` → `measured_theta1_rad`.
 fn column_name(words: &str, unit: &str) -> String {
     let latin = words.replace('θ', "theta").replace('ξ', "xi").replace('Δ', "delta ");
-    let unit = unit.replace('·', " ").replace('/', " per ").replace('²', "2").replace('°', "deg").replace('%', "percent");
+    let unit =
+        unit.replace('·', " ").replace('/', " per ").replace('²', "2").replace('°', "deg").replace('%', "percent");
     let both = format!("{latin} {unit}");
     let plain: String = both.chars().map(|c| if c.is_ascii_alphanumeric() { c } else { ' ' }).collect();
     plain.split_whitespace().collect::<Vec<_>>().join("_").to_lowercase()
@@ -284,18 +289,15 @@ impl Columns {
     pub fn plot(&mut self, plot: &Plot) -> Value {
         let every = plot.at.len().div_ceil(MOST_ROWS).max(1);
         let thinned = |values: &mut dyn Iterator<Item = Option<f64>>| values.step_by(every).collect::<Vec<_>>();
-        let axis = |axis: &Axis| {
-            json!({"label": axis.label, "unit": axis.unit, "log": axis.is_logarithmic, "rows": axis.rows, "range": axis.range})
-        };
+        let axis = |axis: &Axis| json!({"label": axis.label, "unit": axis.unit, "log": axis.is_logarithmic, "rows": axis.rows, "range": axis.range});
         let at = self.keep(&thinned(&mut plot.at.iter().copied().map(Some)));
         let series: Vec<Value> = plot
             .series
             .iter()
             .map(|s| {
                 let values = self.keep(&thinned(&mut s.values.iter().copied()));
-                let ends = (!s.ends.is_empty()).then(|| {
-                    [0, 1].map(|side| self.keep(&thinned(&mut s.ends.iter().map(|e| e.map(|e| e[side])))))
-                });
+                let ends = (!s.ends.is_empty())
+                    .then(|| [0, 1].map(|side| self.keep(&thinned(&mut s.ends.iter().map(|e| e.map(|e| e[side]))))));
                 json!({"name": s.name, "ink": s.ink, "style": s.style, "values": values, "ends": ends})
             })
             .collect();

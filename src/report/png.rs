@@ -29,7 +29,8 @@ pub fn png(svg: &str) -> Result<Vec<u8>> {
     let tree = Tree::from_str(svg, &options).map_err(|e: usvg::Error| failed(e.to_string()))?;
     let size = tree.size().to_int_size();
     let side = |px: u32| (SCALE * px as f32) as u32;
-    let mut picture = Pixmap::new(side(size.width()), side(size.height())).ok_or_else(|| failed("it is empty".to_owned()))?;
+    let mut picture =
+        Pixmap::new(side(size.width()), side(size.height())).ok_or_else(|| failed("it is empty".to_owned()))?;
     resvg::render(&tree, Transform::from_scale(SCALE, SCALE), &mut picture.as_mut());
     picture.encode_png().map_err(|e| failed(e.to_string()))
 }
@@ -41,7 +42,9 @@ mod tests {
     #[test]
     fn letters_are_drawn_without_any_font_of_the_system() {
         let svg = |words: &str| {
-            format!(r#"<svg xmlns="http://www.w3.org/2000/svg" width="200" height="40"><text x="4" y="30" font-size="24" font-family="Helvetica, sans-serif">{words}</text></svg>"#)
+            format!(
+                r#"<svg xmlns="http://www.w3.org/2000/svg" width="200" height="40"><text x="4" y="30" font-size="24" font-family="Helvetica, sans-serif">{words}</text></svg>"#
+            )
         };
         let dark = |words: &str| {
             let picture = image::load_from_memory(&png(&svg(words)).unwrap()).unwrap().to_rgba8();

@@ -109,14 +109,15 @@
       axes: [
         { ...axis, label: words(plot.x), labelSize: 22, size: 34, values: labels },
         named ? { ...axis, size: narrow ? 150 : 190, splits: () => plot.y.rows.map((_, k) => k + 1), values: () => plot.y.rows, ticks: { show: false } }
-          : { ...axis, label: words(plot.y), labelSize: 20, size: 58, values: plot.y.log ? powers : labels },
+          : { ...axis, label: words(plot.y), labelSize: 20, size: (u, values) => 18 + 7 * Math.max(3, ...(values ?? []).map((v) => String(v).length)), values: plot.y.log ? powers : labels },
       ],
-      series: [{ label: plot.x.label, value: (u, v) => (v == null ? "–" : `${digits(v, 6)} ${plot.x.unit}`) }, ...plot.series.map((s) => series(s, plot))],
+      series: [{ label: plot.x.label, value: (u, v) => (v == null ? "" : `${digits(v, 6)} ${plot.x.unit}`) }, ...plot.series.map((s) => series(s, plot))],
       cursor: { drag: { x: true, y: false, dist: 5 }, points: { show: !named && !map }, y: false, bind: { dblclick: () => (event) => { reset(drawn.get(plot.id).u); } } },
-      legend: { show: !map, live: !named },
+      legend: { show: !map, live: !named, markers: { width: 0, fill: (u, k) => (k ? ink(plot.series[k - 1].ink) : "transparent") } },
       hooks: {
         drawClear: [(u) => under(u, plot)],
         draw: [(u) => over(u, plot, at)],
+        setCursor: [(u) => u.root.classList.toggle("idle", u.cursor.idx == null)],
         setScale: [(u) => { const one = drawn.get(plot.id); if (one) place(one); }],
       },
     };
@@ -124,6 +125,7 @@
     live.replaceChildren();
     const u = new uPlot(options, [map ? edges[0] : at, ...plot.series.map((s) => column(s.values))], live);
     reset(u);
+    u.root.classList.add("idle");
     if (named && plot.series.length < 2) u.root.querySelector(".u-legend")?.remove();
     if (map) live.append(scale(map));
     const one = { plot, u, head: null };
@@ -170,7 +172,7 @@
       label: s.name, stroke, width: 1.6, dash: s.style === "dashed" ? [7, 5] : undefined, spanGaps: false,
       paths: dots || s.style === "bars" ? () => null : undefined,
       points: { show: dots, size: s.style === "interval" ? 8 : 4, fill: stroke, stroke },
-      value: (u, v) => (v == null ? "–" : `${digits(v)} ${unit}`),
+      value: (u, v) => (v == null ? "" : `${digits(v)} ${unit}`),
     };
   }
 
@@ -204,7 +206,7 @@
       }
       const named = plot.y.rows.length;
       for (const s of plot.series) {
-        const values = column(s.values); c.strokeStyle = c.fillStyle = ink(s.ink); c.lineWidth = 2 * ratio;
+        const values = column(s.values); c.strokeStyle = c.fillStyle = ink(s.ink); c.lineWidth = 2 * ratio; c.setLineDash([]);
         if (s.style === "bars") values.forEach((y, k) => {
           if (y == null) return;
           const [x0, x1, top, bottom] = [u.valToPos(0, "x", true), u.valToPos(at[k], "x", true), u.valToPos(y - 0.3, "y", true), u.valToPos(y + 0.3, "y", true)];

@@ -17,13 +17,20 @@ pub fn chapter(left: &Left) -> Chapter {
         chapter.words(format!("<h3>Configuration: <code>experiment.toml</code></h3>\n{}", verbatim(configuration)));
     }
     if let Some(log) = left.log.as_ref().filter(|log| !log.text.trim().is_empty()) {
-        chapter.words(format!("<details><summary>Everything that was said: <code>log.txt</code></summary>\n{}</details>\n", verbatim(&log.text)));
+        chapter.words(format!(
+            "<details><summary>Everything that was said: <code>log.txt</code></summary>\n{}</details>\n",
+            verbatim(&log.text)
+        ));
     }
     chapter
 }
 
 fn versions(left: &Left) -> String {
-    let tracked = left.track.as_ref().filter(|t| !t.version.is_empty()).map(|t| ("tracked by", format!("freeswing {}", t.version)));
+    let tracked = left
+        .track
+        .as_ref()
+        .filter(|t| !t.version.is_empty())
+        .map(|t| ("tracked by", format!("freeswing {}", t.version)));
     let rows = tracked.into_iter().chain([("this page", format!("freeswing {}", env!("CARGO_PKG_VERSION")))]);
     let rows = rows.map(|(what, version)| vec![what.to_owned(), copyable(&version, "")]);
     format!("<h3>Versions</h3>\n{}", table(&["what", "program"], rows))

@@ -34,7 +34,7 @@ pub fn chapter(left: &Left) -> Chapter {
     }
     chapter.plot(decay(found, signal.as_ref()));
     for mode in found.modes.iter().take(MOST_MODES) {
-        chapter.plot(frequency_against_amplitude(mode));
+        chapter.plot(frequency_against_amplitude(mode, found.modes.len() == 1));
         chapter.plot(damping_against_amplitude(mode));
     }
     for mode in found.modes.iter().take(MOST_MODES) {
@@ -54,14 +54,35 @@ fn modes(found: &Identified) -> String {
             (None, None) => "–".to_owned(),
         };
         let shape: Vec<String> = mode.shape.iter().skip(1).map(|link| interval(&link.ratio_to_first, "")).collect();
-        let phase: Vec<String> = mode.shape.iter().skip(1).map(|link| {
-            let degrees = |v: Option<f64>| v.map(f64::to_degrees);
-            let p = &link.phase_to_first_rad;
-            interval(&Interval { value: degrees(p.value), sd: degrees(p.sd), low: degrees(p.low), high: degrees(p.high) }, "°")
-        }).collect();
-        vec![mode.number.to_string(), interval(&mode.frequency_hz, "Hz"), damping, shape.join(", "), phase.join(", "), escaped(&mode.basis)]
+        let phase: Vec<String> = mode
+            .shape
+            .iter()
+            .skip(1)
+            .map(|link| {
+                let degrees = |v: Option<f64>| v.map(f64::to_degrees);
+                let p = &link.phase_to_first_rad;
+                interval(
+                    &Interval {
+                        value: degrees(p.value),
+                        sd: degrees(p.sd),
+                        low: degrees(p.low),
+                        high: degrees(p.high),
+                    },
+                    "°",
+                )
+            })
+            .collect();
+        vec![
+            mode.number.to_string(),
+            interval(&mode.frequency_hz, "Hz"),
+            damping,
+            shape.join(", "),
+            phase.join(", "),
+            escaped(&mode.basis),
+        ]
     });
-    let headings = ["mode", "frequency at small amplitude", "damping ratio ξ", "amplitude over θ1's", "phase to θ1", "from"];
+    let headings =
+        ["mode", "frequency at small amplitude", "damping ratio ξ", "amplitude over θ1's", "phase to θ1", "from"];
     let note = "<p class=\"note\">Behind ± stands half of the 95 % interval. A click on a number copies it with its unit.</p>\n";
     table(&headings, rows) + note
 }
@@ -107,7 +128,8 @@ fn spectrum(found: &Identified, signal: &Signal) -> Plot {
     let until_hz = if highest_hz > 0.0 { (SHOWN * highest_hz).min(last_hz) } else { last_hz };
     // the mean was taken away: below the first line there is nothing to see
     let first = (spectrum.resolution_hz / spectrum.step_hz) as usize;
-    let shown: Vec<usize> = (first.max(1)..spectrum.amplitude_rad.len()).take_while(|k| *k as f64 * spectrum.step_hz <= until_hz).collect();
+    let shown: Vec<usize> =
+        (first.max(1)..spectrum.amplitude_rad.len()).take_while(|k| *k as f64 * spectrum.step_hz <= until_hz).collect();
     let resolution = found.spectrum.resolution_hz.unwrap_or(spectrum.resolution_hz);
     let strongest = found.modes.first().and_then(|m| m.frequency_hz.value);
     let bands = strongest.map(|f| Band {
@@ -116,8 +138,10 @@ fn spectrum(found: &Identified, signal: &Signal) -> Plot {
         is_across: false,
         ends: [f - 0.5 * resolution, f + 0.5 * resolution],
     });
-    let lines = found.modes.iter().filter_map(|m| Some(Line { name: format!("f{}", m.number), at: m.frequency_hz.value? }));
-    let peaks: Vec<String> = found.spectrum.peaks.iter().take(4).filter_map(|p| Some(format!("{:.4} Hz", p.frequency_hz.value?))).collect();
+    let lines =
+        found.modes.iter().filter_map(|m| Some(Line { name: format!("f{}", m.number), at: m.frequency_hz.value? }));
+    let peaks: Vec<String> =
+        found.spectrum.peaks.iter().take(4).filter_map(|p| Some(format!("{:.4} Hz", p.frequency_hz.value?))).collect();
     Plot {
         id: "spectrum".into(),
         title: "Amplitude spectrum".into(),
@@ -144,7 +168,8 @@ fn half_power(mode: &Mode, signal: &Signal) -> Plot {
     let xi = own.and_then(|e| e.damping_ratio?.value).or_else(|| mode.damping.identified.and_then(|xi| xi.value));
     let resolution_hz = 1.0 / signal.duration_s();
     let reach_hz = (4.0 * xi.unwrap_or(0.0).abs() * f_hz).max(4.0 * resolution_hz).min(0.8 * f_hz);
-    let at: Vec<f64> = (0..=CURVE_POINTS).map(|k| f_hz + reach_hz * (2.0 * k as f64 / CURVE_POINTS as f64 - 1.0)).collect();
+    let at: Vec<f64> =
+        (0..=CURVE_POINTS).map(|k| f_hz + reach_hz * (2.0 * k as f64 / CURVE_POINTS as f64 - 1.0)).collect();
     let power = resonance_curve(&signal.levelled(), &at);
     let top = (0..power.len()).max_by(|a, b| power[*a].total_cmp(&power[*b])).unwrap_or(0);
     let low = (0..top).rev().find(|k| power[*k] < 0.5);
@@ -157,9 +182,17 @@ fn half_power(mode: &Mode, signal: &Signal) -> Plot {
     });
     let said = match own.and_then(|e| e.damping_ratio?.value) {
         Some(xi) => format!("With the end of the record allowed for, the width gives ξ = {xi:.5}."),
-        None => own.and_then(|e| e.note.clone()).map_or_else(String::new, |note| format!("No damping is read from it: {note}.")),
+        None => own
+            .and_then(|e| e.note.clone())
+            .map_or_else(String::new, |note| format!("No damping is read from it: {note}.")),
     };
-    let half = Series { name: "half power".into(), ink: Ink::Grey, style: Style::Dashed, values: vec![Some(0.5); at.len()], ..Series::default() };
+    let half = Series {
+        name: "half power".into(),
+        ink: Ink::Grey,
+        style: Style::Dashed,
+        values: vec![Some(0.5); at.len()],
+        ..Series::default()
+    };
     Plot {
         id: format!("half-power-{}", mode.number),
         title: format!("Half-power bandwidth, mode {}", mode.number),
@@ -168,7 +201,12 @@ fn half_power(mode: &Mode, signal: &Signal) -> Plot {
         x: Axis::of("frequency", "Hz"),
         y: Axis { range: Some([0.0, 1.05]), ..Axis::of("power over its peak", "") },
         series: vec![
-            Series { name: "power".into(), ink: Ink::Blue, values: power.into_iter().map(Some).collect(), ..Series::default() },
+            Series {
+                name: "power".into(),
+                ink: Ink::Blue,
+                values: power.into_iter().map(Some).collect(),
+                ..Series::default()
+            },
             half,
         ],
         at,
@@ -180,26 +218,36 @@ fn half_power(mode: &Mode, signal: &Signal) -> Plot {
 
 /// Turning points of the angle that moves most, amplitudes of the modes, and the decrement through those of the strongest.
 fn decay(found: &Identified, signal: Option<&Signal>) -> Plot {
-    let largest = signal.and_then(|s| s.links.iter().enumerate().max_by(|a, b| a.1.range_rad().total_cmp(&b.1.range_rad())));
+    let largest =
+        signal.and_then(|s| s.links.iter().enumerate().max_by(|a, b| a.1.range_rad().total_cmp(&b.1.range_rad())));
     let mut at: Vec<(f64, usize, f64)> = Vec::new();
-    let mut series = Vec::new();
+    let (mut series, mut lines): (Vec<Series>, Vec<(usize, f64, (f64, f64))>) = (Vec::new(), Vec::new());
     if let Some((link, samples)) = largest {
-        at.extend(turning_points(&samples.t_s, &samples.theta_rad, samples.mean_rad()).into_iter().map(|(t, a)| (t, 0, a)));
-        series.push(Series { name: format!("turning points of θ{}", link + 1), ink: Ink::Grey, style: Style::Dots, ..Series::default() });
+        at.extend(
+            turning_points(&samples.t_s, &samples.theta_rad, samples.mean_rad()).into_iter().map(|(t, a)| (t, 0, a)),
+        );
+        series.push(Series {
+            name: format!("turning points of θ{}", link + 1),
+            ink: Ink::Grey,
+            style: Style::Dots,
+            ..Series::default()
+        });
     }
     for mode in found.modes.iter().take(MOST_MODES) {
         let Some(envelope) = mode.envelope.as_ref().filter(|e| !e.steps.is_empty()) else { continue };
         let number = series.len();
         at.extend(envelope.steps.iter().filter_map(|s| Some((s.t_s?, number, s.amplitude_rad?))));
-        series.push(Series { name: format!("amplitude of mode {}", mode.number), ink: Ink::number(mode.number - 1), style: Style::Dots, ..Series::default() });
+        series.push(Series {
+            name: format!("amplitude of mode {}", mode.number),
+            ink: Ink::number(mode.number - 1),
+            style: Style::Dots,
+            ..Series::default()
+        });
         let decrement = mode.estimators.iter().find(|e| e.method == "decrement");
-        let rate = decrement.and_then(|e| Some(std::f64::consts::TAU * e.frequency_hz?.value? * e.damping_ratio?.value?));
+        let rate =
+            decrement.and_then(|e| Some(std::f64::consts::TAU * e.frequency_hz?.value? * e.damping_ratio?.value?));
         let middle = envelope.steps.get(envelope.steps.len() / 2).and_then(|s| Some((s.t_s?, s.amplitude_rad?)));
-        if let (Some(rate), Some((t0_s, a0))) = (rate, middle) {
-            let number = series.len();
-            at.extend(envelope.steps.iter().filter_map(|s| s.t_s).map(|t| (t, number, a0 * (-rate * (t - t0_s)).exp())));
-            series.push(Series { name: format!("decrement, mode {}", mode.number), ink: Ink::number(mode.number - 1), style: Style::Dashed, ..Series::default() });
-        }
+        lines.extend(rate.zip(middle).map(|(rate, middle)| (mode.number, rate, middle)));
     }
     at.sort_by(|a, b| a.0.total_cmp(&b.0));
     let mut stamps: Vec<f64> = Vec::new();
@@ -211,6 +259,16 @@ fn decay(found: &Identified, signal: Option<&Signal>) -> Plot {
         if let Some(last) = series[number].values.last_mut() {
             *last = Some(1e3 * a).filter(|a| *a > 0.0);
         }
+    }
+    for (mode, rate, (t0_s, a0)) in lines {
+        let values = stamps.iter().map(|t| Some(1e3 * a0 * (-rate * (t - t0_s)).exp())).collect();
+        series.push(Series {
+            name: format!("decrement, mode {mode}"),
+            ink: Ink::number(mode - 1),
+            style: Style::Dashed,
+            values,
+            ..Series::default()
+        });
     }
     Plot {
         id: "decay".into(),
@@ -231,24 +289,34 @@ fn decay(found: &Identified, signal: Option<&Signal>) -> Plot {
 fn turning_points(t_s: &[f64], theta_rad: &[f64], mean_rad: f64) -> Vec<(f64, f64)> {
     let away: Vec<(f64, f64)> = t_s.iter().zip(theta_rad).map(|(t, a)| (*t, a - mean_rad)).collect();
     let halves = away.chunk_by(|a, b| (a.1 > 0.0) == (b.1 > 0.0));
-    halves.filter(|half| half.len() > 1).filter_map(|half| {
-        half.iter().map(|(t, a)| (*t, a.abs())).max_by(|a, b| a.1.total_cmp(&b.1))
-    }).collect()
+    halves
+        .filter(|half| half.len() > 1)
+        .filter_map(|half| half.iter().map(|(t, a)| (*t, a.abs())).max_by(|a, b| a.1.total_cmp(&b.1)))
+        .collect()
 }
 
-fn frequency_against_amplitude(mode: &Mode) -> Plot {
+fn frequency_against_amplitude(mode: &Mode, alone: bool) -> Plot {
     let Some(envelope) = &mode.envelope else { return Plot::default() };
     let law = envelope.frequency.as_ref().and_then(|law| Some((law.f0_hz.value?, law.kappa_per_rad2.value?)));
     let mut plot = against_amplitude(mode, |step| step.frequency_hz);
     if let Some((f0_hz, kappa)) = law {
         let values = plot.at.iter().map(|a| Some(f0_hz * (1.0 - kappa * a * a))).collect();
-        plot.series.push(Series { name: format!("f₀(1 − κA²), κ = {kappa:.4} /rad²"), ink: Ink::Ink, style: Style::Dashed, values, ..Series::default() });
+        plot.series.push(Series {
+            name: format!("f₀(1 − κA²), κ = {kappa:.4} /rad²{}", if alone { "" } else { ", the other mode at rest" }),
+            ink: Ink::Ink,
+            style: Style::Dashed,
+            values,
+            ..Series::default()
+        });
     }
     Plot {
         id: format!("frequency-amplitude-{}", mode.number),
         title: format!("Frequency against amplitude, mode {}", mode.number),
         alternative: "Frequency from window to window, with 95 % intervals, against the amplitude of the swing".into(),
-        caption: "Each point is the step between two windows of a few cycles. A pendulum is slower at large amplitude: κ is 1/16 for one rigid link.".into(),
+        caption: format!(
+            "Each point is the step between two windows of a few cycles. A pendulum is slower at large amplitude: κ is 1/16 for one rigid link.{}",
+            if alone { "" } else { " The amplitude of the other mode moves the points off the line." }
+        ),
         y: Axis::of("frequency", "Hz"),
         ..plot
     }
@@ -276,7 +344,12 @@ fn against_amplitude(mode: &Mode, of: fn(&crate::report::left::Step) -> Interval
         values: points.iter().map(|p| p.1.value).collect(),
         ends: points.iter().map(|p| Some([p.1.low?, p.1.high?])).collect(),
     };
-    Plot { x: Axis::of("amplitude", "rad"), at: points.iter().map(|p| p.0).collect(), series: vec![series], ..Plot::default() }
+    Plot {
+        x: Axis::of("amplitude", "rad"),
+        at: points.iter().map(|p| p.0).collect(),
+        series: vec![series],
+        ..Plot::default()
+    }
 }
 
 #[derive(Clone, Copy, PartialEq)]
@@ -292,22 +365,43 @@ fn estimators(mode: &Mode, quantity: Quantity) -> Plot {
     let taken = if is_frequency { Some(mode.frequency_hz) } else { mode.damping.identified };
     let taken = taken.filter(|t| t.value.is_some());
     let rows: Vec<String> = mode.estimators.iter().map(method).chain(taken.map(|_| "taken".to_owned())).collect();
-    let mut points: Vec<(f64, usize, Option<[f64; 2]>)> = mode.estimators.iter().map(of).chain([taken]).enumerate().filter_map(|(row, e)| {
-        let e = e?;
-        Some((e.value?, row + 1, e.low.zip(e.high).map(|(low, high)| [low, high])))
-    }).collect();
+    let mut points: Vec<(f64, usize, Option<[f64; 2]>)> = mode
+        .estimators
+        .iter()
+        .map(of)
+        .chain([taken])
+        .enumerate()
+        .filter_map(|(row, e)| {
+            let e = e?;
+            Some((e.value?, row + 1, e.low.zip(e.high).map(|(low, high)| [low, high])))
+        })
+        .collect();
     points.sort_by(|a, b| a.0.total_cmp(&b.0));
     let agree = if is_frequency { &mode.frequency_consistency } else { &mode.damping_consistency };
     let agree = match agree.as_ref().map(|c| c.agree) {
         Some(true) => "The methods agree.",
-        Some(false) => "The methods disagree: no one number describes the record, as each of them weighs amplitudes in its own way.",
+        Some(false) => {
+            "The methods disagree: no one number describes the record, as each of them weighs amplitudes in its own way."
+        }
         None => "",
     };
-    let (name, axis) = if is_frequency { ("frequency", Axis::of("frequency", "Hz")) } else { ("damping", Axis::of("damping ratio ξ", "")) };
-    let said = points.iter().map(|(v, row, _)| format!("{} {}", rows[row - 1], crate::digits::number(*v, 5))).collect::<Vec<_>>().join("; ");
+    let (name, axis) = if is_frequency {
+        ("frequency", Axis::of("frequency", "Hz"))
+    } else {
+        ("damping", Axis::of("damping ratio ξ", ""))
+    };
+    let said = points
+        .iter()
+        .map(|(v, row, _)| format!("{} {}", rows[row - 1], crate::digits::number(*v, 5)))
+        .collect::<Vec<_>>()
+        .join("; ");
     Plot {
         id: format!("estimators-{name}-{}", mode.number),
-        title: format!("Every estimate of the {}, mode {}", if is_frequency { "frequency" } else { "damping ratio" }, mode.number),
+        title: format!(
+            "Every estimate of the {}, mode {}",
+            if is_frequency { "frequency" } else { "damping ratio" },
+            mode.number
+        ),
         alternative: format!("Estimates with 95 % intervals: {said}"),
         caption: format!("{agree} A row without a point gives no number."),
         x: axis,
@@ -340,7 +434,11 @@ fn shapes(left: &Left, found: &Identified) -> Plot {
         }
         let most = place.iter().fold(f64::MIN_POSITIVE, |most, p: &f64| most.max(p.abs()));
         Series {
-            name: format!("mode {}, {} Hz", mode.number, mode.frequency_hz.value.map_or_else(String::new, |f| format!("{f:.3}"))),
+            name: format!(
+                "mode {}, {} Hz",
+                mode.number,
+                mode.frequency_hz.value.map_or_else(String::new, |f| format!("{f:.3}"))
+            ),
             ink: Ink::number(mode.number - 1),
             style: if mode.number == 2 { Style::Dashed } else { Style::Line },
             values: place.iter().map(|p| Some(p / most)).collect(),
@@ -352,7 +450,10 @@ fn shapes(left: &Left, found: &Identified) -> Plot {
         title: "Mode shapes".into(),
         alternative: "Displacement from hinge to tip in each mode, as a share of the largest".into(),
         caption: "Small displacements; parts that lag behind are drawn by their part in phase.".into(),
-        x: Axis::of(if is_stated { "distance from the hinge" } else { "links from the hinge" }, if is_stated { "m" } else { "" }),
+        x: Axis::of(
+            if is_stated { "distance from the hinge" } else { "links from the hinge" },
+            if is_stated { "m" } else { "" },
+        ),
         y: Axis { range: Some([-1.1, 1.1]), ..Axis::of("displacement over the largest", "") },
         at,
         series: series.collect(),
@@ -386,15 +487,23 @@ mod tests {
     fn turning_points_are_the_farthest_of_each_half_swing() {
         let t: Vec<f64> = (0..8).map(f64::from).collect();
         let angle = [1.1, 1.3, 1.2, 0.9, 0.5, 0.8, 1.4, 1.2];
-        let found: Vec<(f64, f64)> = turning_points(&t, &angle, 1.0).into_iter().map(|(t, a)| (t, (10.0 * a).round())).collect();
+        let found: Vec<(f64, f64)> =
+            turning_points(&t, &angle, 1.0).into_iter().map(|(t, a)| (t, (10.0 * a).round())).collect();
         assert_eq!(found, [(1.0, 3.0), (4.0, 5.0), (6.0, 4.0)]);
     }
 
     #[test]
     fn the_estimates_stand_on_one_axis_in_the_order_of_the_methods() {
-        let one = |value: f64| Some(Interval { value: Some(value), sd: None, low: Some(value - 0.1), high: Some(value + 0.1) });
+        let one = |value: f64| {
+            Some(Interval { value: Some(value), sd: None, low: Some(value - 0.1), high: Some(value + 0.1) })
+        };
         let estimator = |method: &str, f| Estimator { method: method.into(), frequency_hz: f, ..Estimator::default() };
-        let mode = Mode { number: 1, frequency_hz: one(1.5).unwrap(), estimators: vec![estimator("spectrum", one(2.0)), estimator("half_power", None)], ..Mode::default() };
+        let mode = Mode {
+            number: 1,
+            frequency_hz: one(1.5).unwrap(),
+            estimators: vec![estimator("spectrum", one(2.0)), estimator("half_power", None)],
+            ..Mode::default()
+        };
         let plot = estimators(&mode, Quantity::Frequency);
         assert_eq!(plot.y.rows, ["peak of the spectrum", "half-power bandwidth", "taken"]);
         assert_eq!((plot.at, plot.series[0].values.clone()), (vec![1.5, 2.0], vec![Some(3.0), Some(1.0)]));

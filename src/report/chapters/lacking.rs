@@ -12,7 +12,10 @@ use crate::report::plot::{Axis, Band, Ink, Line, Map, Plot, Series, Style};
 /// Explanations in the table.
 const LISTED: usize = 6;
 /// Effects in the figure.
-const MOST_NAMES: usize = 10;
+const FEWEST_NAMES: usize = 3;
+const MOST_NAMES: usize = 12;
+/// Less probable ones are not worth a row.
+const LIKELY: f64 = 1e-3;
 /// Windows of time, of amplitude, and of phase in the maps.
 const MAP_CELLS: [usize; 3] = [28, 14, 24];
 
@@ -24,7 +27,11 @@ pub fn chapter(left: &Left) -> Chapter {
     chapter.words(format!("<p class=\"verdict\">{}</p>\n", escaped(&verdict.statement)));
     if let Some(advice) = verdict.to_decide.as_ref().filter(|advice| !advice.is_empty()) {
         let class: Vec<String> = verdict.class.iter().map(|id| words(id)).collect();
-        let class = if class.len() > 1 { format!("The recording does not tell these apart: {}.", class.join("; ")) } else { String::new() };
+        let class = if class.len() > 1 {
+            format!("The recording does not tell these apart: {}.", class.join("; "))
+        } else {
+            String::new()
+        };
         chapter.words(format!(
             "<h3>What cannot be told, and the measurement that would tell</h3>\n{}<p class=\"decide\">{}</p>\n",
             if class.is_empty() { class } else { paragraph(&class) },
@@ -59,9 +66,11 @@ fn words(id: &str) -> String {
 }
 
 fn inclusion(found: &Diagnosed) -> Plot {
-    let mut names: Vec<(&String, f64)> = found.verdict.inclusion.iter().filter_map(|(id, p)| Some((id, (*p)?))).collect();
+    let mut names: Vec<(&String, f64)> =
+        found.verdict.inclusion.iter().filter_map(|(id, p)| Some((id, (*p)?))).collect();
     names.sort_by(|a, b| b.1.total_cmp(&a.1).then(a.0.cmp(b.0)));
-    names.truncate(MOST_NAMES);
+    let likely = names.iter().filter(|(_, p)| *p >= LIKELY).count();
+    names.truncate(likely.clamp(FEWEST_NAMES, MOST_NAMES));
     let said = names.iter().take(4).map(|(id, p)| format!("{id} {p:.3}")).collect::<Vec<_>>().join(", ");
     let rows: Vec<String> = names.iter().map(|(id, _)| (*id).clone()).collect();
     // bars are drawn in the order of their length
@@ -70,7 +79,7 @@ fn inclusion(found: &Diagnosed) -> Plot {
         id: "inclusion".into(),
         title: "How probable each effect is".into(),
         alternative: format!("Probability that each effect is at work, the largest: {said}"),
-        caption: "Over all sets of names that hold the effect, whatever remains beside them. The largest are shown.".into(),
+        caption: "Over all sets of names that hold the effect, whatever remains beside them. What is not shown is less probable.".into(),
         x: Axis { range: Some([0.0, 1.0]), ..Axis::of("probability", "") },
         y: Axis { label: "effect".into(), rows, ..Axis::default() },
         at: ordered.iter().map(|p| p.0).collect(),
@@ -89,18 +98,27 @@ fn candidates(found: &Diagnosed) -> String {
     let rows = found.candidates.iter().take(LISTED).map(|candidate| {
         let names = candidate.effects.iter().map(|id| escaped(&words(id))).collect::<Vec<_>>().join("<br>");
         let names = if names.is_empty() { "the base model alone".to_owned() } else { names };
-        let coefficients = candidate.parameters.values().map(|q| with_half(q.value, q.sd, &q.unit)).collect::<Vec<_>>().join("<br>");
-        let left = (0..candidate.rmse_rad.len()).map(|link| milli(&candidate.rmse_rad, link, "mrad")).collect::<Vec<_>>().join(", ");
+        let coefficients = candidate
+            .parameters
+            .iter()
+            .map(|(id, q)| format!("<code>{}</code> {}", escaped(id), with_half(q.value, q.sd, &q.unit)));
+        let coefficients = coefficients.collect::<Vec<_>>().join("<br>");
+        let left = (0..candidate.rmse_rad.len())
+            .map(|link| milli(&candidate.rmse_rad, link, "mrad"))
+            .collect::<Vec<_>>()
+            .join(", ");
         vec![names, value(candidate.probability, 3, ""), coefficients, left]
     });
     let unknown = vec!["something not in the table".to_owned(), value(found.verdict.unknown_probability, 3, "")];
     let rows: Vec<Vec<String>> = rows.chain([unknown]).collect();
-    "<h3>Explanations that were fitted</h3>\n".to_owned() + &table(&["the base model and", "probability", "coefficient ± 1 sd", "left of the angles (rms)"], rows)
+    "<h3>Explanations that were fitted</h3>\n".to_owned()
+        + &table(&["the base model and", "probability", "coefficient ± 1 sd", "left of the angles (rms)"], rows)
 }
 
 fn proof(found: &Diagnosed) -> String {
     let Some(heldout) = &found.heldout else { return String::new() };
-    let from = heldout.from_s.map_or_else(String::new, |s| format!("Fitted before {s:.2} s, predicted from there on. "));
+    let from =
+        heldout.from_s.map_or_else(String::new, |s| format!("Fitted before {s:.2} s, predicted from there on. "));
     let rows = (0..heldout.baseline_rmse_rad.len()).map(|link| {
         let mut row = vec![
             format!("θ{}", link + 1),
@@ -113,9 +131,14 @@ fn proof(found: &Diagnosed) -> String {
         }
         row
     });
-    let headings = ["angle", "noise (1 sd)", "base model leaves", "with the effects named", "with the law that was learnt"];
+    let headings =
+        ["angle", "noise (1 sd)", "base model leaves", "with the effects named", "with the law that was learnt"];
     let headings = if found.verdict.law.is_some() { &headings[..] } else { &headings[..4] };
-    format!("<h3>Proof: the prediction of what was not fitted</h3>\n{}{}", paragraph(&format!("{from}Any fit improves with more parameters; a prediction does not.")), table(headings, rows))
+    format!(
+        "<h3>Proof: the prediction of what was not fitted</h3>\n{}{}",
+        paragraph(&format!("{from}Any fit improves with more parameters; a prediction does not.")),
+        table(headings, rows)
+    )
 }
 
 /// The models in the diagnosis, as columns call them, for people, with their colours.
@@ -124,7 +147,11 @@ fn sides(found: &Diagnosed) -> [(&'static str, String, Ink); 3] {
     let names: Vec<&str> = verdict.effects.iter().chain(&verdict.further_effects).map(String::as_str).collect();
     [
         ("base", "base model".to_owned(), Ink::Vermillion),
-        ("named", format!("with {}", names.join(", ")), Ink::Blue),
+        (
+            "named",
+            if names.is_empty() { "with what comes nearest".to_owned() } else { format!("with {}", names.join(", ")) },
+            Ink::Blue,
+        ),
         ("learnt", "with the law that was learnt".to_owned(), Ink::Green),
     ]
 }
@@ -142,7 +169,15 @@ fn in_time(curves: &Curves) -> Plot {
     Plot {
         x: Axis::of("t", "s"),
         is_time: true,
-        bands: border_s.iter().map(|t| Band { name: "predicted, not fitted".into(), ink: Ink::Orange, is_across: false, ends: [*t, last_s] }).collect(),
+        bands: border_s
+            .iter()
+            .map(|t| Band {
+                name: "predicted, not fitted".into(),
+                ink: Ink::Orange,
+                is_across: false,
+                ends: [*t, last_s],
+            })
+            .collect(),
         lines: border_s.iter().map(|t| Line { name: "predicted from here".into(), at: *t }).collect(),
         at,
         ..Plot::default()
@@ -151,9 +186,21 @@ fn in_time(curves: &Curves) -> Plot {
 
 fn swing(found: &Diagnosed, curves: &Curves, link: usize) -> Plot {
     let column = |name: &str| curves.column(&format!("theta{link}_{name}")).map(<[_]>::to_vec);
-    let mut series = vec![Series { name: format!("measured θ{link}"), ink: Ink::Ink, style: Style::Dots, values: column("measured_rad").unwrap_or_default(), ..Series::default() }];
+    let mut series = vec![Series {
+        name: format!("measured θ{link}"),
+        ink: Ink::Ink,
+        style: Style::Dots,
+        values: column("measured_rad").unwrap_or_default(),
+        ..Series::default()
+    }];
     series.extend(sides(found).into_iter().filter_map(|(side, name, ink)| {
-        Some(Series { name, ink, style: if side == "base" { Style::Dashed } else { Style::Line }, values: column(&format!("{side}_rad"))?, ..Series::default() })
+        Some(Series {
+            name,
+            ink,
+            style: if side == "base" { Style::Dashed } else { Style::Line },
+            values: column(&format!("{side}_rad"))?,
+            ..Series::default()
+        })
     }));
     Plot {
         id: format!("before-after-{link}"),
@@ -173,11 +220,18 @@ fn before_and_after(found: &Diagnosed, curves: &Curves, link: usize) -> Plot {
     });
     let mut plot = in_time(curves);
     let noise = found.baseline.noise_rad.get(link - 1).copied().flatten().unwrap_or(0.0);
-    plot.bands.push(Band { name: "±2 sd of the noise".into(), ink: Ink::Grey, is_across: true, ends: [-2e3 * noise, 2e3 * noise] });
+    plot.bands.push(Band {
+        name: "±2 sd of the noise".into(),
+        ink: Ink::Grey,
+        is_across: true,
+        ends: [-2e3 * noise, 2e3 * noise],
+    });
     Plot {
         id: format!("left-{link}"),
         title: format!("What is left of θ{link}, before and after"),
-        alternative: format!("Measured less predicted θ{link} against time, by the base model and with what was missing, beside the noise"),
+        alternative: format!(
+            "Measured less predicted θ{link} against time, by the base model and with what was missing, beside the noise"
+        ),
         caption: "Measured less predicted. Right of the line nothing was fitted.".into(),
         y: Axis::of("residual", "mrad"),
         series: series.collect(),
@@ -186,11 +240,16 @@ fn before_and_after(found: &Diagnosed, curves: &Curves, link: usize) -> Plot {
 }
 
 fn remains(remainder: &Remainder) -> String {
-    let place = [remainder.place.as_ref().map(|p| at(p)), remainder.phase.as_ref().map(|p| format!("in phase with the {p}"))];
+    let place =
+        [remainder.place.as_ref().map(|p| at(p)), remainder.phase.as_ref().map(|p| format!("in phase with the {p}"))];
     let place: Vec<String> = place.into_iter().flatten().collect();
     let mut html = "<h3>What remains beside the names</h3>\n".to_owned();
     let rows = (0..remainder.rms_rad.len()).map(|link| {
-        vec![format!("θ{}", link + 1), milli(&remainder.rms_rad, link, "mrad"), value(remainder.over_noise.get(link).copied().flatten(), 3, "")]
+        vec![
+            format!("θ{}", link + 1),
+            milli(&remainder.rms_rad, link, "mrad"),
+            value(remainder.over_noise.get(link).copied().flatten(), 3, ""),
+        ]
     });
     let _ = write!(html, "<p>The probability that it is more than noise is {}", value(remainder.present, 3, ""));
     if !place.is_empty() {
@@ -215,7 +274,11 @@ fn at(place: &str) -> String {
 
 fn learnt(law: &Law) -> String {
     let others = law.alternatives.iter().map(|a| format!("<code>{}</code>", escaped(&a.formula))).collect::<Vec<_>>();
-    let others = if others.is_empty() { String::new() } else { format!("<p class=\"note\">Nearly as well do: {}</p>\n", others.join("; ")) };
+    let others = if others.is_empty() {
+        String::new()
+    } else {
+        format!("<p class=\"note\">Nearly as well do: {}</p>\n", others.join("; "))
+    };
     format!(
         "<h3>The law that was learnt</h3>\n<p>It acts {}: {}</p>\n{others}<p>For the experiment file:</p>\n{}",
         escaped(&at(&law.place)),
@@ -230,7 +293,12 @@ fn limits(found: &Diagnosed) -> String {
     }
     let never = |v: Option<f64>, unit: &str| v.map_or_else(|| "never".to_owned(), |v| value(Some(v), 2, unit));
     let rows = found.detectable.iter().map(|(id, d)| {
-        vec![escaped(&words(id)), never(d.smallest, &d.unit), never(d.named_from, &d.unit), escaped(&d.confused_with.join(", "))]
+        vec![
+            escaped(&words(id)),
+            never(d.smallest, &d.unit),
+            never(d.named_from, &d.unit),
+            escaped(&d.confused_with.join(", ")),
+        ]
     });
     let rows = table(&["effect", "would have been seen from", "named from", "not told from"], rows);
     format!("<details><summary>What this recording could have shown</summary>\n{rows}</details>\n")
@@ -248,8 +316,22 @@ pub fn places(left: &Left) -> Chapter {
     chapter.plot(gains(found));
     if let Some(curves) = &left.where_curves {
         let place = location.missing_torque.as_ref().map_or("hinge", |t| t.place.as_str());
-        chapter.plot(map(curves, place, &Side { column: "t_s", axis: Axis::of("t", "s"), id: "where-time", along: "time", cells: MAP_CELLS[0] }));
-        chapter.plot(map(curves, place, &Side { column: "amplitude_rad", axis: Axis::of("amplitude", "rad"), id: "where-amplitude", along: "amplitude", cells: MAP_CELLS[1] }));
+        chapter.plot(map(
+            curves,
+            place,
+            &Side { column: "t_s", axis: Axis::of("t", "s"), id: "where-time", along: "time", cells: MAP_CELLS[0] },
+        ));
+        chapter.plot(map(
+            curves,
+            place,
+            &Side {
+                column: "amplitude_rad",
+                axis: Axis::of("amplitude", "rad"),
+                id: "where-amplitude",
+                along: "amplitude",
+                cells: MAP_CELLS[1],
+            },
+        ));
     }
     chapter
 }
@@ -260,13 +342,24 @@ fn bars(plot: Plot, mut values: Vec<(String, f64)>) -> Plot {
     Plot {
         y: Axis { label: "place".into(), rows: values.into_iter().map(|v| v.0).collect(), ..Axis::default() },
         at: ordered.iter().map(|p| p.0).collect(),
-        series: vec![Series { name: plot.x.label.clone(), ink: Ink::Blue, style: Style::Bars, values: ordered.iter().map(|p| Some(p.1 as f64)).collect(), ..Series::default() }],
+        series: vec![Series {
+            name: plot.x.label.clone(),
+            ink: Ink::Blue,
+            style: Style::Bars,
+            values: ordered.iter().map(|p| Some(p.1 as f64)).collect(),
+            ..Series::default()
+        }],
         ..plot
     }
 }
 
 fn energy(found: &Diagnosed) -> Plot {
-    let shares: Vec<(String, f64)> = found.location.energy_share.iter().filter_map(|(place, share)| Some((place.clone(), 1e2 * (*share)?))).collect();
+    let shares: Vec<(String, f64)> = found
+        .location
+        .energy_share
+        .iter()
+        .filter_map(|(place, share)| Some((place.clone(), 1e2 * (*share)?)))
+        .collect();
     let said = shares.iter().map(|(place, share)| format!("{place} {share:.0} %")).collect::<Vec<_>>().join(", ");
     let plot = Plot {
         id: "where-energy".into(),
@@ -280,7 +373,11 @@ fn energy(found: &Diagnosed) -> Plot {
 }
 
 fn gains(found: &Diagnosed) -> Plot {
-    let gains = found.location.unknown.iter().filter_map(|u| Some((format!("{}, any {}", u.place, u.form), u.log_likelihood_gain?.max(0.0))));
+    let gains = found
+        .location
+        .unknown
+        .iter()
+        .filter_map(|u| Some((format!("{}, any {}", u.place, u.form), u.log_likelihood_gain?.max(0.0))));
     let plot = Plot {
         id: "where-place".into(),
         title: "What still gains by an unknown torque, place by place".into(),
@@ -303,11 +400,15 @@ struct Side {
 
 /// The mean torque in each cell of time (or amplitude) and phase of the swing.
 fn map(curves: &Curves, place: &str, side: &Side) -> Plot {
-    let (Some(along), Some(phase), Some(torque)) = (curves.column(side.column), curves.column("phase_deg"), curves.column("torque_n_m")) else {
+    let (Some(along), Some(phase), Some(torque)) =
+        (curves.column(side.column), curves.column("phase_deg"), curves.column("torque_n_m"))
+    else {
         return Plot::default();
     };
-    let rows: Vec<(f64, f64, f64)> = along.iter().zip(phase).zip(torque).filter_map(|((x, p), t)| Some(((*x)?, (*p)?, (*t)?))).collect();
-    let (low, high) = rows.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), r| (low.min(r.0), high.max(r.0)));
+    let rows: Vec<(f64, f64, f64)> =
+        along.iter().zip(phase).zip(torque).filter_map(|((x, p), t)| Some(((*x)?, (*p)?, (*t)?))).collect();
+    let (low, high) =
+        rows.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), r| (low.min(r.0), high.max(r.0)));
     if !(high > low) {
         return Plot::default();
     }
@@ -325,7 +426,8 @@ fn map(curves: &Curves, place: &str, side: &Side) -> Plot {
         let cell = &mut sums[column.min(side.cells - 1)][row.min(phases - 1)];
         *cell = (cell.0 + scale * torque, cell.1 + 1);
     }
-    let edges = |from: f64, to: f64, count: usize| (0..=count).map(|k| from + (to - from) * k as f64 / count as f64).collect();
+    let edges =
+        |from: f64, to: f64, count: usize| (0..=count).map(|k| from + (to - from) * k as f64 / count as f64).collect();
     Plot {
         id: side.id.into(),
         title: format!("The torque that the base model lacks, {}: {} and phase of the swing", at(place), side.along),
@@ -352,7 +454,8 @@ mod tests {
 
     #[test]
     fn a_map_gathers_the_torque_by_time_and_phase() {
-        let curves = Curves::parse("t_s,torque_n_m,amplitude_rad,phase_deg\n0,1e-7,0.5,10\n1,3e-7,0.4,10\n28,-2e-7,0.3,270\n");
+        let curves =
+            Curves::parse("t_s,torque_n_m,amplitude_rad,phase_deg\n0,1e-7,0.5,10\n1,3e-7,0.4,10\n28,-2e-7,0.3,270\n");
         let side = Side { column: "t_s", axis: Axis::of("t", "s"), id: "where-time", along: "time", cells: 28 };
         let map = map(&curves, "hinge", &side).map.unwrap();
         assert_eq!(map.unit, "nN m");

@@ -1,10 +1,13 @@
 //! The recording with its overlay, the angles, and the audit of the time stamps.
 
 use super::{Chapter, Part, stamps, times};
-use crate::report::html::{escaped, paragraph, table, value};
+use crate::report::html::{copyable, escaped, paragraph, table, value};
 use crate::report::left::{Left, Track};
 use crate::report::plot::{Axis, Ink, Plot, Series, Style};
 use crate::series::AngleSeries;
+
+/// Time stamps are no more exact than that: what is less is rounding.
+const ROUNDING_S: f64 = 1e-9;
 
 /// The chapter.
 pub fn chapter(left: &Left) -> Chapter {
@@ -78,28 +81,41 @@ fn audit(track: &Track) -> String {
     let repeated = stamps.repeated_or_backward_frames.len();
     let rates = stamps.real_rate_hz.zip(stamps.nominal_rate_hz);
     let rate = match rates {
-        Some((real, stated)) if ((real - stated) / stated).abs() > 2e-3 => "The file states another rate than its time stamps have.",
+        Some((real, stated)) if ((real - stated) / stated).abs() > 2e-3 => {
+            "The file states another rate than its time stamps have."
+        }
         _ => "",
     };
     let found = if stamps.missing_frames == 0 && repeated == 0 {
         "No frame is missing and none repeats.".to_owned()
     } else {
-        format!("{} frames are missing in {} gaps; {repeated} repeat a time stamp or run backwards.", stamps.missing_frames, stamps.gap_count)
+        format!(
+            "{} frames are missing in {} gaps; {repeated} repeat a time stamp or run backwards.",
+            stamps.missing_frames, stamps.gap_count
+        )
     };
     let milli = |s: f64| value(Some(1e3 * s), 4, "ms");
     let rows = [
-        ("frames", value(Some(stamps.frames as f64), 9, "")),
+        ("frames", copyable(&stamps.frames.to_string(), "")),
         ("from, to", format!("{} … {}", value(Some(stamps.first_s), 5, "s"), value(Some(stamps.last_s), 5, "s"))),
         ("frame rate by the time stamps", value(stamps.real_rate_hz, 6, "Hz")),
         ("frame rate that the file states", value(stamps.nominal_rate_hz, 6, "Hz")),
         ("step: median", milli(stamps.median_step_s)),
         ("step: shortest, longest", format!("{}, {}", milli(stamps.shortest_step_s), milli(stamps.longest_step_s))),
-        ("scatter of the steps (1 sd)", milli(stamps.jitter_sd_s)),
-        ("picture", escaped(&format!("{} × {} px, {}, {}", track.video.width_px, track.video.height_px, track.video.codec, track.video.container))),
+        ("scatter of the steps (1 sd)", milli(if stamps.jitter_sd_s < ROUNDING_S { 0.0 } else { stamps.jitter_sd_s })),
+        (
+            "picture",
+            escaped(&format!(
+                "{} × {} px, {}, {}",
+                track.video.width_px, track.video.height_px, track.video.codec, track.video.container
+            )),
+        ),
     ];
-    let noise = track.angles.iter().enumerate().map(|(k, a)| {
-        vec![format!("noise of θ{} (1 sd)", k + 1), value(a.noise_rad.map(|n| 1e3 * n), 3, "mrad")]
-    });
+    let noise = track
+        .angles
+        .iter()
+        .enumerate()
+        .map(|(k, a)| vec![format!("noise of θ{} (1 sd)", k + 1), value(a.noise_rad.map(|n| 1e3 * n), 3, "mrad")]);
     let rows = rows.into_iter().map(|(what, number)| vec![what.to_owned(), number]).chain(noise);
     format!("<h3>Time stamps</h3>\n{}{}", paragraph(&format!("{found} {rate}")), table(&["quantity", "value"], rows))
 }

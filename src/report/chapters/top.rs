@@ -10,9 +10,15 @@ pub fn sentence(left: &Left) -> String {
     let verdict = left.diagnosis.as_ref().map(|d| first_sentence(&d.verdict.statement)).filter(|s| !s.is_empty());
     let reproduced = left.fit.as_ref().and_then(|f| f.recordings.first()).and_then(|r| r.fitted.reproduced);
     let fitted = reproduced.map(|yes| {
-        if yes { "the fitted model reproduces the recording" } else { "the fitted model does not reproduce the recording" }.to_owned()
+        if yes {
+            "the fitted model reproduces the recording"
+        } else {
+            "the fitted model does not reproduce the recording"
+        }
+        .to_owned()
     });
-    let parts: Vec<String> = [identified, fitted, verdict.map(|v| lowered(&v))].into_iter().flatten().filter(|p| !p.is_empty()).collect();
+    let parts: Vec<String> =
+        [identified, fitted, verdict.map(|v| lowered(&v))].into_iter().flatten().filter(|p| !p.is_empty()).collect();
     if parts.is_empty() { "This run came to no result".to_owned() + "." } else { parts.join("; ") + "." }
 }
 
@@ -45,7 +51,10 @@ pub fn warnings(left: &Left) -> Chapter {
         warnings.extend(fit.recordings.first().and_then(|r| r.pace.as_ref()?.statement.clone()));
     }
     if let Some(undecided) = left.diagnosis.as_ref().map(|d| &d.undecided).filter(|u| !u.is_empty()) {
-        warnings.push(format!("the budget of the diagnosis did not allow these rounds of its search: {}", undecided.join(", ")));
+        warnings.push(format!(
+            "the budget of the diagnosis did not allow these rounds of its search: {}",
+            undecided.join(", ")
+        ));
     }
     let none = warnings.is_empty();
     chapter.words(list("warnings", warnings));
@@ -57,7 +66,8 @@ pub fn warnings(left: &Left) -> Chapter {
         chapter.words(format!("<h3>Notes on frequencies and damping</h3>\n{}", list("notes", notes)));
     }
     if !left.missing.is_empty() {
-        let rows = left.missing.iter().map(|m| vec![escaped(m.holds), format!("<code>{}</code>", m.file), escaped(&m.why)]);
+        let rows =
+            left.missing.iter().map(|m| vec![escaped(m.holds), format!("<code>{}</code>", m.file), escaped(&m.why)]);
         chapter.words(format!("<h3>What is not on this page</h3>\n{}", table(&["part", "file", "because"], rows)));
     }
     chapter
