@@ -605,7 +605,7 @@ impl Left {
     fn curves(&mut self, file: &'static str, holds: &'static str) -> Result<Option<Curves>> {
         let curves = self.text(file)?.map(|text| Curves::parse(&text));
         if curves.is_none() {
-            self.miss(file, holds, Some("the folder does not hold it; `freeswing run` writes it".to_owned()));
+            self.miss(file, holds, Some("the folder does not hold it; freeswing run writes it".to_owned()));
         }
         Ok(curves)
     }

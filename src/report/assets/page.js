@@ -79,7 +79,13 @@
   let inSight = true, wanted = false;
   const film = document.getElementById("film");
   function dock() { wanted = true; settle(); }
-  function settle() { film?.classList.toggle("docked", wanted && !inSight); }
+  function settle() {
+    if (!film) return;
+    const docked = wanted && !inSight;
+    // what is read must not jump when the recording leaves its place
+    film.style.minHeight = docked ? (film.style.minHeight || `${film.offsetHeight}px`) : "";
+    film.classList.toggle("docked", docked);
+  }
   if (film) {
     new IntersectionObserver((seen) => { inSight = seen[0].isIntersecting; if (inSight) wanted = !video.paused; settle(); }).observe(film);
     const close = Object.assign(document.createElement("button"), { type: "button", className: "close", textContent: "✕", title: "close" });
@@ -100,7 +106,7 @@
     const labels = (u, values) => values.map((v) => (v == null ? "" : digits(v, 6)));
     const options = {
       width: Math.max(240, live.clientWidth),
-      height: named ? 64 + 32 * named : narrow ? 250 : 320,
+      height: height(plot, !narrow),
       scales: {
         x: { time: false, range: (u, min, max) => (min === max ? [min - 1, max + 1] : [min, max]) },
         y: named ? { dir: -1, range: [0.5, named + 0.5] } : map ? { range: [edges[1][0], edges[1].at(-1)] }
@@ -361,10 +367,27 @@
 
   let printing = false;
   root.classList.add("live-page");
-  const draw = () => { for (const one of drawn.values()) one.u.destroy(); drawn.clear(); data.plots.forEach(build); };
+  const height = (plot, wide) => (plot.y.rows.length ? 64 + 32 * plot.y.rows.length : wide ? 320 : 250);
+  function draw() {
+    for (const one of drawn.values()) one.u.destroy();
+    drawn.clear();
+    const lives = data.plots.map((plot) => document.querySelector(`#plot-${CSS.escape(plot.id)} .live`));
+    // room first, so that nothing moves while they are drawn
+    lives.forEach((live, k) => { live.style.minHeight = `${height(data.plots[k], live.clientWidth >= 560) + (data.plots[k].y.rows.length ? 0 : 24)}px`; });
+    const round = ++rounds, rest = [...data.plots];
+    (function some() {
+      if (round !== rounds) return;
+      const until = performance.now() + 30;
+      while (rest.length && performance.now() < until) build(rest.shift());
+      if (rest.length) return setTimeout(some);
+      root.dataset.ready = String(drawn.size);
+      root.dataset.readyMs = performance.now().toFixed(0);
+    })();
+  }
+  let rounds = 0;
   draw();
   if (now != null) show(now);
-  matchMedia("(prefers-color-scheme: dark)").addEventListener("change", draw);
+  matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => { delete root.dataset.ready; draw(); });
   let width = innerWidth;
   addEventListener("resize", () => {
     if (innerWidth === width) return;
@@ -372,5 +395,4 @@
     for (const { u } of drawn.values()) { const w = u.root.parentElement.clientWidth; if (w > 0) u.setSize({ width: Math.max(240, w), height: u.height }); }
     for (const one of drawn.values()) place(one);
   });
-  root.dataset.ready = String(drawn.size);
 })();
