@@ -130,7 +130,7 @@ fn panel(plot: &Plot, height: f64) -> Panel {
     let named = plot.y.rows.len();
     let left_px = if named > 0 { LEFT_OF_NAMES_PX } else { LEFT_PX };
     let along = |axis: &Axis, values: &mut dyn Iterator<Item = f64>, margin: f64| -> Range<f64> {
-        if let Some([from, to]) = axis.range {
+        if let Some([from, to]) = axis.first.or(axis.range) {
             return scaled(axis, from)..scaled(axis, to);
         }
         let (low, high) = values
@@ -159,7 +159,11 @@ fn panel(plot: &Plot, height: f64) -> Panel {
             0.04
         };
         let across = plot.bands.iter().filter(|b| b.is_across).flat_map(|b| b.ends);
-        let values = plot.series.iter().flat_map(|s| s.values.iter().flatten().copied());
+        let in_sight = |x: f64| plot.x.first.is_none_or(|[from, to]| from <= x && x <= to);
+        let values = plot
+            .series
+            .iter()
+            .flat_map(|s| plot.at.iter().zip(&s.values).filter(|(x, _)| in_sight(**x)).filter_map(|(_, y)| *y));
         (
             along(&plot.x, &mut plot.at.iter().copied(), margin),
             along(&plot.y, &mut values.chain(ends()).chain(across), 0.06),
@@ -223,6 +227,8 @@ impl Canvas<'_> {
         }
         if plot.y.is_logarithmic {
             panel.powers_up(svg);
+        } else if let Some(step) = plot.y.step {
+            panel.numbers_up_by(svg, step);
         } else if plot.y.rows.is_empty() {
             panel.numbers_up(svg);
         }

@@ -73,7 +73,7 @@ pub fn page<'d>(left: &Left, chapters: &[Chapter], drawn: impl Iterator<Item = &
     let data = data.to_string().replace('<', "\\u003c");
     let title = left.title();
     let sentence = chapters::sentence(left);
-    let fields = [
+    let mut fields = vec![
         ("title", escaped(&title)),
         ("sentence", escaped(&sentence)),
         ("about", about(left)),
@@ -87,9 +87,13 @@ pub fn page<'d>(left: &Left, chapters: &[Chapter], drawn: impl Iterator<Item = &
         ("version", env!("CARGO_PKG_VERSION").to_owned()),
     ];
     let body_size = body.len() + fields.iter().map(|f| f.1.len()).sum::<usize>() + TEMPLATE.len();
+    let mut film_data = String::new();
     if let Some(at) = film_at {
-        body.insert_str(at, &film(left, MOST_BYTES.saturating_sub(body_size))?);
+        let [place, data] = film(left, MOST_BYTES.saturating_sub(body_size))?;
+        body.insert_str(at, &place);
+        film_data = data;
     }
+    fields.push(("film", film_data));
     Ok(filled(&fields, &body))
 }
 
@@ -141,7 +145,7 @@ fn figure(plot: &Plot, every: u64, drawn: Option<&Drawn>) -> String {
     format!(
         "<figure class=\"plot\" id=\"plot-{id}\" data-plot=\"{id}\">\n<h3>{title}</h3>\n\
          <div class=\"live screen\" tabindex=\"0\" role=\"application\" aria-roledescription=\"plot\" aria-label=\"{title}. {words}. {keys}\"></div>\n\
-         <img class=\"still\" src=\"data:image/svg+xml;base64,{still}\" alt=\"{title}. {words}.\">\n\
+         <img class=\"still\" loading=\"lazy\" src=\"data:image/svg+xml;base64,{still}\" alt=\"{title}. {words}.\">\n\
          <figcaption>{caption}{thinned}</figcaption>\n\
          <p class=\"save screen\">Save: <button type=\"button\" data-save=\"csv\">CSV</button> <button type=\"button\" data-save=\"svg\">SVG</button> \
          <button type=\"button\" data-save=\"png\">PNG</button></p>\n</figure>\n",
@@ -149,22 +153,27 @@ fn figure(plot: &Plot, every: u64, drawn: Option<&Drawn>) -> String {
     )
 }
 
-/// The recording, inside the page where there is room, else beside it.
-fn film(left: &Left, room: usize) -> Result<String> {
+/// Where the recording is shown, and the recording itself for the end of the page, where there is room; else it stays beside the page.
+fn film(left: &Left, room: usize) -> Result<[String; 2]> {
     let path = left.path("overlay.mp4");
     let fits = left.overlay_bytes.is_some_and(|bytes| bytes.div_ceil(3) * 4 + 2000 <= room as u64);
-    let (source, note) = if fits {
+    let (source, note, data) = if fits {
         let bytes = std::fs::read(&path).map_err(|e| Error::unreadable(&path, e))?;
-        (format!("data:video/mp4;base64,{}", base64(&bytes)), String::new())
+        // at the end, so that everything else is seen before so much is read
+        let data =
+            format!("<script type=\"text/plain\" id=\"film-data\">data:video/mp4;base64,{}</script>\n", base64(&bytes));
+        ("", "", data)
     } else {
         let note = "<p class=\"note\">The recording is too large to be inside this page: keep <a href=\"overlay.mp4\">overlay.mp4</a> beside it.</p>\n";
-        ("overlay.mp4".to_owned(), note.to_owned())
+        (" src=\"overlay.mp4\"", note, String::new())
     };
-    Ok(format!(
-        "<div class=\"film\" id=\"film\"><div class=\"frame\">\n<video controls muted playsinline preload=\"auto\" src=\"{source}\" \
+    let [width, height] = left.track.as_ref().map_or([16, 9], |t| [t.video.width_px.max(1), t.video.height_px.max(1)]);
+    let place = format!(
+        "<div class=\"film\" id=\"film\"><div class=\"frame\">\n<video controls muted playsinline preload=\"auto\"{source} style=\"aspect-ratio: {width} / {height}\" \
          aria-label=\"The recording with the marks, their trails and the angles drawn in. Comma and full stop, or the arrow keys, step frame by frame.\"></video>\n\
          <p class=\"readout\" id=\"readout\"></p></div></div>\n{note}"
-    ))
+    );
+    Ok([place, data])
 }
 
 #[cfg(test)]

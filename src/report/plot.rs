@@ -55,6 +55,10 @@ pub struct Axis {
     pub rows: Vec<String>,
     /// From where to where, if not as the values go.
     pub range: Option<[f64; 2]>,
+    /// The part that is looked at first, if not all.
+    pub first: Option<[f64; 2]>,
+    /// From number to number, if not as it fits.
+    pub step: Option<f64>,
 }
 
 impl Axis {
@@ -289,7 +293,7 @@ impl Columns {
     pub fn plot(&mut self, plot: &Plot) -> Value {
         let every = plot.at.len().div_ceil(MOST_ROWS).max(1);
         let thinned = |values: &mut dyn Iterator<Item = Option<f64>>| values.step_by(every).collect::<Vec<_>>();
-        let axis = |axis: &Axis| json!({"label": axis.label, "unit": axis.unit, "log": axis.is_logarithmic, "rows": axis.rows, "range": axis.range});
+        let axis = |axis: &Axis| json!({"label": axis.label, "unit": axis.unit, "log": axis.is_logarithmic, "rows": axis.rows, "range": axis.range, "first": axis.first, "step": axis.step});
         let at = self.keep(&thinned(&mut plot.at.iter().copied().map(Some)));
         let series: Vec<Value> = plot
             .series

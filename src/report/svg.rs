@@ -67,6 +67,14 @@ impl Panel {
         }
     }
 
+    /// The same at multiples of a step.
+    pub fn numbers_up_by(&self, svg: &mut String, step: f64) {
+        let (first, last) = ((self.y.start / step).ceil() as i64, (self.y.end / step).floor() as i64);
+        for tick in (first..=last).map(|k| k as f64 * step) {
+            self.level(svg, "grid", tick, &label(tick));
+        }
+    }
+
     /// The same where the edges stand for logarithms.
     pub fn powers_up(&self, svg: &mut String) {
         for (power, words) in powers(&self.y) {

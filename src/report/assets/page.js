@@ -115,7 +115,7 @@
       axes: [
         { ...axis, label: words(plot.x), labelSize: 22, size: 34, values: labels },
         named ? { ...axis, size: narrow ? 150 : 190, splits: () => plot.y.rows.map((_, k) => k + 1), values: () => plot.y.rows, ticks: { show: false } }
-          : { ...axis, label: words(plot.y), labelSize: 20, size: (u, values) => 18 + 7 * Math.max(3, ...(values ?? []).map((v) => String(v).length)), values: plot.y.log ? powers : labels },
+          : { ...axis, label: words(plot.y), labelSize: 20, size: (u, values) => 26 + 7 * Math.max(3, ...(values ?? []).map((v) => String(v).length)), values: plot.y.log ? powers : labels, splits: plot.y.step ? (u, k, low, high) => Array.from({ length: Math.floor(high / plot.y.step) + 1 }, (_, n) => n * plot.y.step) : undefined },
       ],
       series: [{ label: plot.x.label, value: (u, v) => (v == null ? "" : `${digits(v, 6)} ${plot.x.unit}`) }, ...plot.series.map((s) => series(s, plot))],
       cursor: { drag: { x: true, y: false, dist: 5 }, points: { show: !named && !map }, y: false, bind: { dblclick: () => (event) => { reset(drawn.get(plot.id).u); } } },
@@ -130,10 +130,12 @@
     if (plot.time) options.cursor.sync = { key: "t", setSeries: false };
     live.replaceChildren();
     const u = new uPlot(options, [map ? edges[0] : at, ...plot.series.map((s) => column(s.values))], live);
-    reset(u);
+    if (plot.x.first) u.setScale("x", { min: plot.x.first[0], max: plot.x.first[1] }); else reset(u);
     u.root.classList.add("idle");
     if (named && plot.series.length < 2) u.root.querySelector(".u-legend")?.remove();
     if (map) live.append(scale(map));
+    const bands = plot.bands.filter((band) => band.name);
+    if (bands.length) live.append(key(bands));
     const one = { plot, u, head: null };
     if (plot.time) {
       one.head = Object.assign(document.createElement("div"), { className: "playhead" });
@@ -153,7 +155,8 @@
   // from where to where along x, intervals included, with some room
   function spread(plot, at, named) {
     const all = at.filter((v) => v != null);
-    if (named) plot.series.forEach((s) => { (s.ends ?? []).forEach((k) => all.push(...column(k).filter((v) => v != null))); if (s.style === "bars") all.push(0); });
+    if (named) plot.series.forEach((s) => { (s.ends ?? []).forEach((k) => all.push(...column(k).filter((v) => v != null))); });
+    if (plot.series.some((s) => s.style === "bars")) return [0, 1.04 * Math.max(...all, 1e-12)];
     if (!all.length) return [0, 1];
     let [low, high] = all.reduce(([a, b], v) => [Math.min(a, v), Math.max(b, v)], [Infinity, -Infinity]);
     const dots = named || plot.series.some((s) => s.style === "interval");
@@ -232,7 +235,7 @@
 
   const most = (map) => Math.max(1e-300, ...map.values.flat().map((v) => Math.abs(v ?? 0)));
   function tint(share) {
-    const dark = matchMedia("(prefers-color-scheme: dark)").matches && !printing;
+    const dark = matchMedia("(prefers-color-scheme: dark)").matches;
     const [ground, end] = [dark ? [40, 44, 50] : [255, 255, 255], share < 0 ? (dark ? [86, 180, 233] : [0, 114, 178]) : (dark ? [240, 130, 50] : [213, 94, 0])];
     const s = Math.min(1, Math.abs(share));
     return `rgb(${ground.map((g, k) => Math.round(g + s * (end[k] - g)))})`;
@@ -242,7 +245,9 @@
     map.values.forEach((column, i) => column.forEach((value, k) => {
       if (value == null) return;
       const [x0, x1] = [i, i + 1].map((n) => u.valToPos(map.x_edges[n], "x", true)), [y0, y1] = [k, k + 1].map((n) => u.valToPos(map.y_edges[n], "y", true));
-      c.fillStyle = tint(value / all); c.fillRect(x0, y1, x1 - x0 + 0.7, y0 - y1 + 0.7);
+      // whole pixels, or seams show between the cells
+      const [left, right, top, bottom] = [x0, x1, y1, y0].map(Math.round);
+      c.fillStyle = tint(value / all); c.fillRect(left, top, right - left, bottom - top);
     }));
   }
   function scale(map) {
@@ -250,6 +255,12 @@
     p.append(`${map.name}: ${digits(-all, 3)} ${map.unit} `);
     for (let s = -1; s <= 1.01; s += 0.25) { const i = document.createElement("i"); i.style.background = tint(s); p.append(i); }
     p.append(` ${digits(all, 3)} ${map.unit}`);
+    return p;
+  }
+
+  function key(bands) {
+    const p = Object.assign(document.createElement("p"), { className: "scale" });
+    for (const band of bands) { const i = document.createElement("i"); i.style.background = ink(band.ink); i.style.opacity = 0.35; p.append(i, ` ${band.name}   `); }
     return p;
   }
 
@@ -365,7 +376,9 @@
 
   // ---- begin ------------------------------------------------------------------------------------------------------
 
-  let printing = false;
+  const stills = () => document.querySelectorAll(".still").forEach((still) => { still.loading = "eager"; });
+  addEventListener("beforeprint", stills);
+  matchMedia("print").addEventListener("change", stills);
   root.classList.add("live-page");
   const height = (plot, wide) => (plot.y.rows.length ? 64 + 32 * plot.y.rows.length : wide ? 320 : 250);
   function draw() {
@@ -387,6 +400,11 @@
   let rounds = 0;
   draw();
   if (now != null) show(now);
+  // the recording is the last and the largest part of the page
+  addEventListener("DOMContentLoaded", () => {
+    const film = document.getElementById("film-data");
+    if (video && film) video.src = film.textContent;
+  });
   matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => { delete root.dataset.ready; draw(); });
   let width = innerWidth;
   addEventListener("resize", () => {

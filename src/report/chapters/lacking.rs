@@ -1,5 +1,6 @@
 //! What the model lacks: names, proof, the law, and where it acts.
 
+use std::collections::BTreeMap;
 use std::fmt::Write;
 
 use super::{Chapter, times};
@@ -11,13 +12,16 @@ use crate::report::plot::{Axis, Band, Ink, Line, Map, Plot, Series, Style};
 
 /// Explanations in the table.
 const LISTED: usize = 6;
+/// Swings that are looked at first, and how far they stand above the noise.
+const SWINGS: f64 = 5.0;
+const CLEAR: f64 = 15.0;
 /// Effects in the figure.
 const FEWEST_NAMES: usize = 3;
 const MOST_NAMES: usize = 12;
 /// Less probable ones are not worth a row.
 const LIKELY: f64 = 1e-3;
 /// Windows of time, of amplitude, and of phase in the maps.
-const MAP_CELLS: [usize; 3] = [28, 14, 24];
+const MAP_CELLS: [usize; 3] = [28, 14, 12];
 
 /// The chapter.
 pub fn chapter(left: &Left) -> Chapter {
@@ -43,7 +47,7 @@ pub fn chapter(left: &Left) -> Chapter {
     chapter.words(proof(found));
     if let Some(curves) = &left.diagnosis_curves {
         for link in 1..=curves.links() {
-            chapter.plot(swing(found, curves, link));
+            chapter.plot(swing(left, found, curves, link));
         }
         for link in 1..=curves.links() {
             chapter.plot(before_and_after(found, curves, link));
@@ -95,7 +99,9 @@ fn inclusion(found: &Diagnosed) -> Plot {
 }
 
 fn candidates(found: &Diagnosed) -> String {
-    let rows = found.candidates.iter().take(LISTED).map(|candidate| {
+    let listed = found.candidates.iter().take(LISTED).enumerate();
+    let listed = listed.filter(|(k, c)| *k < 2 || c.probability.is_some_and(|p| p >= LIKELY));
+    let rows = listed.map(|(_, candidate)| {
         let names = candidate.effects.iter().map(|id| escaped(&words(id))).collect::<Vec<_>>().join("<br>");
         let names = if names.is_empty() { "the base model alone".to_owned() } else { names };
         let coefficients = candidate
@@ -184,7 +190,18 @@ fn in_time(curves: &Curves) -> Plot {
     }
 }
 
-fn swing(found: &Diagnosed, curves: &Curves, link: usize) -> Plot {
+/// A few swings, the last that stand clear of the noise: there a model has had the longest time to depart.
+fn end_of_swing(left: &Left, found: &Diagnosed, curves: &Curves) -> Option<[f64; 2]> {
+    let f_hz = left.identified.as_ref()?.modes.iter().filter_map(|m| m.frequency_hz.value).min_by(f64::total_cmp)?;
+    let (t_s, angle) = (curves.column("t_s")?, curves.column("theta1_measured_rad")?);
+    let clear_rad = CLEAR * found.baseline.noise_rad.first().copied().flatten()?;
+    let seen = t_s.iter().zip(angle).filter(|(_, a)| a.is_some_and(|a| a.abs() > clear_rad)).filter_map(|(t, _)| *t);
+    let last_s = seen.last()?;
+    let first_s = t_s.first().copied().flatten()?;
+    Some([last_s - SWINGS / f_hz, last_s]).filter(|[from, _]| *from > first_s)
+}
+
+fn swing(left: &Left, found: &Diagnosed, curves: &Curves, link: usize) -> Plot {
     let column = |name: &str| curves.column(&format!("theta{link}_{name}")).map(<[_]>::to_vec);
     let mut series = vec![Series {
         name: format!("measured θ{link}"),
@@ -206,7 +223,8 @@ fn swing(found: &Diagnosed, curves: &Curves, link: usize) -> Plot {
         id: format!("before-after-{link}"),
         title: format!("θ{link} before and after"),
         alternative: format!("Measured θ{link}, the base model and the model with what was missing, against time"),
-        caption: "Drag over the end of the record to see where the base model departs.".into(),
+        caption: "The last swings that stand clear of the noise; on the screen a double click shows all.".into(),
+        x: Axis { first: end_of_swing(left, found, curves), ..Axis::of("t", "s") },
         y: Axis::of("angle", "rad"),
         series,
         ..in_time(curves)
@@ -373,11 +391,12 @@ fn energy(found: &Diagnosed) -> Plot {
 }
 
 fn gains(found: &Diagnosed) -> Plot {
-    let gains = found
-        .location
-        .unknown
-        .iter()
-        .filter_map(|u| Some((format!("{}, any {}", u.place, u.form), u.log_likelihood_gain?.max(0.0))));
+    let mut gains: BTreeMap<String, f64> = BTreeMap::new();
+    for unknown in &found.location.unknown {
+        let form = if unknown.form == "law" { "any law" } else { "any course in time" };
+        let gain = gains.entry(format!("{}: {form}", unknown.place)).or_default();
+        *gain = gain.max(unknown.log_likelihood_gain.unwrap_or(0.0));
+    }
     let plot = Plot {
         id: "where-place".into(),
         title: "What still gains by an unknown torque, place by place".into(),
@@ -386,7 +405,7 @@ fn gains(found: &Diagnosed) -> Plot {
         x: Axis::of("gain in log-likelihood", "nats"),
         ..Plot::default()
     };
-    bars(plot, gains.collect())
+    bars(plot, gains.into_iter().collect())
 }
 
 /// Along what a map runs.
@@ -435,7 +454,7 @@ fn map(curves: &Curves, place: &str, side: &Side) -> Plot {
         caption: "0° is the turning point on the right, 90° the way back to the left, 180° the left turning point, 270° the way to the right. A torque against the motion – a loss – is \
                   vermillion at 90° and blue at 270°; one that goes with the angle, as a spring does, is blue at 0° and vermillion at 180°.".into(),
         x: side.axis.clone(),
-        y: Axis::of("phase of the swing", "°"),
+        y: Axis { step: Some(90.0), ..Axis::of("phase of the swing", "°") },
         is_time: side.column == "t_s",
         map: Some(Map {
             name: "mean torque".into(),
@@ -459,7 +478,7 @@ mod tests {
         let side = Side { column: "t_s", axis: Axis::of("t", "s"), id: "where-time", along: "time", cells: 28 };
         let map = map(&curves, "hinge", &side).map.unwrap();
         assert_eq!(map.unit, "nN m");
-        assert!((map.values[0][0].unwrap() - 100.0).abs() < 1e-9 && (map.values[27][18].unwrap() + 200.0).abs() < 1e-9);
+        assert!((map.values[0][0].unwrap() - 100.0).abs() < 1e-9 && (map.values[27][9].unwrap() + 200.0).abs() < 1e-9);
         assert!(map.values[5][5].is_none() && map.x_edges.len() == 29);
     }
 
