@@ -12,7 +12,6 @@ pub use top::sentence;
 
 use super::left::Left;
 use super::plot::Plot;
-use crate::series::AngleSeries;
 
 /// A chapter.
 #[derive(Debug, Default)]
@@ -75,9 +74,4 @@ pub fn chapters(left: &Left) -> Vec<Chapter> {
 /// Values of one unit in another.
 fn times(values: &[Option<f64>], factor: f64) -> Vec<Option<f64>> {
     values.iter().map(|v| v.map(|v| factor * v)).collect()
-}
-
-/// The time stamps and angles of a table as series need them.
-fn stamps(angles: &AngleSeries) -> Vec<f64> {
-    angles.t_s.clone()
 }

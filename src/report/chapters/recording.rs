@@ -1,6 +1,6 @@
 //! The recording with its overlay, the angles, and the audit of the time stamps.
 
-use super::{Chapter, Part, stamps, times};
+use super::{Chapter, Part, times};
 use crate::report::html::{copyable, escaped, paragraph, table, value};
 use crate::report::left::{Left, Track};
 use crate::report::plot::{Axis, Ink, Plot, Series, Style};
@@ -43,7 +43,7 @@ fn swing(angles: &AngleSeries) -> Plot {
         x: Axis::of("t", "s"),
         y: Axis::of("angle", "rad"),
         is_time: true,
-        at: stamps(angles),
+        at: angles.t_s.clone(),
         series: angles.theta_rad.iter().enumerate().map(series).collect(),
         ..Plot::default()
     }
@@ -55,6 +55,11 @@ fn names(links: usize) -> String {
 }
 
 fn steps(angles: &AngleSeries) -> Plot {
+    let usual_ms = 1e3 * angles.step_s();
+    let (mut low, mut high) = (0.9 * usual_ms, 1.1 * usual_ms);
+    for step in angles.t_s.windows(2).map(|w| 1e3 * (w[1] - w[0])) {
+        (low, high) = (low.min(0.95 * step), high.max(1.05 * step));
+    }
     let steps = std::iter::once(None).chain(angles.t_s.windows(2).map(|w| Some(w[1] - w[0])));
     Plot {
         id: "time-steps".into(),
@@ -62,9 +67,9 @@ fn steps(angles: &AngleSeries) -> Plot {
         alternative: "Step between neighbouring time stamps against time; missing frames stand above the rest".into(),
         caption: "From the time stamps of the file, not from a frame rate. A missing frame doubles its step.".into(),
         x: Axis::of("t", "s"),
-        y: Axis::of("step", "ms"),
+        y: Axis { range: Some([low, high]), ..Axis::of("step", "ms") },
         is_time: true,
-        at: stamps(angles),
+        at: angles.t_s.clone(),
         series: vec![Series {
             name: "step".into(),
             ink: Ink::Blue,
