@@ -264,6 +264,8 @@ fn names_from_files_are_text() {
             value["verdict"]["statement"] = json!(hostile);
             value["verdict"]["effects"] = json!([hostile]);
             value["verdict"]["to_decide"] = json!(hostile);
+            let alternatives = json!([{"formula": hostile}]);
+            value["verdict"]["law"] = json!({"place": hostile, "formula": hostile, "unit": hostile, "toml": hostile, "alternatives": alternatives});
         }
         fs::write(path, value.to_string()).unwrap();
     }
@@ -271,6 +273,7 @@ fn names_from_files_are_text() {
     freeswing("report").arg(folder.path()).assert().success();
     let page = page(folder.path());
     assert!(!page.contains("<img src=x") && !page.contains("<script>alert") && page.contains("&lt;script&gt;alert(1)"));
+    assert!(page.contains("The law that was learnt"));
     assert_eq!(page.matches("<video").count(), 1);
     let Some(mut browser) = Browser::start() else { return };
     browser.open(&folder.path().join("report.html"));

@@ -42,11 +42,17 @@ pub fn copyable(words: &str, unit: &str) -> String {
     let raised_unit = unit.replace('2', "²").replace('3', "³");
     let shown = format!("{}{gap}{raised_unit}", minus(&powers(words)));
     let copied = format!("{words}{gap}{unit}");
-    format!(
-        "<button type=\"button\" class=\"n\" data-copy=\"{}\" title=\"copy\">{}</button>",
-        escaped(&copied),
-        escaped(&shown)
-    )
+    button(&shown, &copied)
+}
+
+/// What is copied as it stands: a digest, a version, a formula.
+pub fn verbatim_copyable(words: &str) -> String {
+    button(words, words)
+}
+
+fn button(shown: &str, copied: &str) -> String {
+    let (shown, copied) = (escaped(shown), escaped(copied));
+    format!("<button type=\"button\" class=\"n\" data-copy=\"{copied}\" title=\"copy\">{shown}</button>")
 }
 
 /// A sign in front as a sign, not a hyphen.
@@ -181,6 +187,11 @@ mod tests {
         );
         assert!(copyable("-1.5", "kg/m2").contains("data-copy=\"-1.5 kg/m2\" title=\"copy\">−1.5 kg/m²<"));
         assert_eq!(powers("1.5e-12 made"), "1.5·10⁻¹² made");
+    }
+
+    #[test]
+    fn a_digest_is_no_number() {
+        assert!(verbatim_copyable("b46e925").contains(">b46e925<"));
     }
 
     #[test]

@@ -1,7 +1,7 @@
 //! Commands, versions, hashes, configuration: what it takes to do it again.
 
 use super::Chapter;
-use crate::report::html::{copyable, escaped, table, verbatim};
+use crate::report::html::{escaped, table, verbatim, verbatim_copyable};
 use crate::report::left::Left;
 
 /// The chapter.
@@ -32,15 +32,15 @@ fn versions(left: &Left) -> String {
         .filter(|t| !t.version.is_empty())
         .map(|t| ("tracked by", format!("freeswing {}", t.version)));
     let rows = tracked.into_iter().chain([("this page", format!("freeswing {}", env!("CARGO_PKG_VERSION")))]);
-    let rows = rows.map(|(what, version)| vec![what.to_owned(), copyable(&version, "")]);
+    let rows = rows.map(|(what, version)| vec![what.to_owned(), verbatim_copyable(&version)]);
     format!("<h3>Versions</h3>\n{}", table(&["what", "program"], rows))
 }
 
 fn digests(left: &Left) -> String {
     let code = |name: &str| format!("<code>{}</code>", escaped(name));
     let source = left.track.as_ref().map(|t| &t.source).filter(|s| !s.sha256.is_empty());
-    let source = source.map(|s| vec![format!("the recording, {}", code(&s.file)), copyable(&s.sha256, "")]);
-    let rows = left.digests.iter().map(|(name, digest)| vec![code(name), copyable(digest, "")]);
+    let source = source.map(|s| vec![format!("the recording, {}", code(&s.file)), verbatim_copyable(&s.sha256)]);
+    let rows = left.digests.iter().map(|(name, digest)| vec![code(name), verbatim_copyable(digest)]);
     let rows: Vec<Vec<String>> = source.into_iter().chain(rows).collect();
     format!("<h3>SHA-256</h3>\n<div class=\"hashes\">{}</div>", table(&["file", "digest"], rows))
 }

@@ -216,60 +216,22 @@ fn half_power(mode: &Mode, signal: &Signal) -> Plot {
     }
 }
 
-/// Turning points of the angle that moves most, amplitudes of the modes, and the decrement through those of the strongest.
+/// Turning points of the angle that moves most, amplitudes of the modes, and the decrement through them.
 fn decay(found: &Identified, signal: Option<&Signal>) -> Plot {
-    let largest =
-        signal.and_then(|s| s.links.iter().enumerate().max_by(|a, b| a.1.range_rad().total_cmp(&b.1.range_rad())));
-    let mut at: Vec<(f64, usize, f64)> = Vec::new();
-    let (mut series, mut lines): (Vec<Series>, Vec<(usize, f64, (f64, f64))>) = (Vec::new(), Vec::new());
-    if let Some((link, samples)) = largest {
-        at.extend(
-            turning_points(&samples.t_s, &samples.theta_rad, samples.mean_rad()).into_iter().map(|(t, a)| (t, 0, a)),
-        );
-        series.push(Series {
-            name: format!("turning points of θ{}", link + 1),
-            ink: Ink::Grey,
-            style: Style::Dots,
-            ..Series::default()
-        });
+    let mut points = Scattered::default();
+    let links = signal.iter().flat_map(|s| s.links.iter().enumerate());
+    if let Some((link, samples)) = links.max_by(|a, b| a.1.range_rad().total_cmp(&b.1.range_rad())) {
+        let turning = turning_points(&samples.t_s, &samples.theta_rad, samples.mean_rad());
+        points.add(format!("turning points of θ{}", link + 1), Ink::Grey, turning);
     }
-    for mode in found.modes.iter().take(MOST_MODES) {
-        let Some(envelope) = mode.envelope.as_ref().filter(|e| !e.steps.is_empty()) else { continue };
-        let number = series.len();
-        at.extend(envelope.steps.iter().filter_map(|s| Some((s.t_s?, number, s.amplitude_rad?))));
-        series.push(Series {
-            name: format!("amplitude of mode {}", mode.number),
-            ink: Ink::number(mode.number - 1),
-            style: Style::Dots,
-            ..Series::default()
-        });
-        let decrement = mode.estimators.iter().find(|e| e.method == "decrement");
-        let rate =
-            decrement.and_then(|e| Some(std::f64::consts::TAU * e.frequency_hz?.value? * e.damping_ratio?.value?));
-        let middle = envelope.steps.get(envelope.steps.len() / 2).and_then(|s| Some((s.t_s?, s.amplitude_rad?)));
-        lines.extend(rate.zip(middle).map(|(rate, middle)| (mode.number, rate, middle)));
+    let modes = || found.modes.iter().take(MOST_MODES);
+    for mode in modes() {
+        let steps =
+            mode.envelope.iter().flat_map(|e| &e.steps).filter_map(|s| Some((s.t_s?, s.amplitude_rad?))).collect();
+        points.add(format!("amplitude of mode {}", mode.number), Ink::number(mode.number - 1), steps);
     }
-    at.sort_by(|a, b| a.0.total_cmp(&b.0));
-    let mut stamps: Vec<f64> = Vec::new();
-    for (t, number, a) in at {
-        if stamps.last() != Some(&t) {
-            stamps.push(t);
-            series.iter_mut().for_each(|s: &mut Series| s.values.push(None));
-        }
-        if let Some(last) = series[number].values.last_mut() {
-            *last = Some(1e3 * a).filter(|a| *a > 0.0);
-        }
-    }
-    for (mode, rate, (t0_s, a0)) in lines {
-        let values = stamps.iter().map(|t| Some(1e3 * a0 * (-rate * (t - t0_s)).exp())).collect();
-        series.push(Series {
-            name: format!("decrement, mode {mode}"),
-            ink: Ink::number(mode - 1),
-            style: Style::Dashed,
-            values,
-            ..Series::default()
-        });
-    }
+    let (at, mut series) = points.aligned();
+    series.extend(modes().filter_map(|mode| decrement(mode, &at)));
     Plot {
         id: "decay".into(),
         title: "Decay: peaks, amplitudes and decrement".into(),
@@ -279,9 +241,56 @@ fn decay(found: &Identified, signal: Option<&Signal>) -> Plot {
         x: Axis::of("t", "s"),
         y: Axis { is_logarithmic: true, ..Axis::of("amplitude", "mrad") },
         is_time: true,
-        at: stamps,
+        at,
         series,
         ..Plot::default()
+    }
+}
+
+/// The decay with the decrement over all peaks, through the amplitude in the middle of the record.
+fn decrement(mode: &Mode, at: &[f64]) -> Option<Series> {
+    let steps = &mode.envelope.as_ref()?.steps;
+    let middle = steps.get(steps.len() / 2)?;
+    let (t0_s, a0_rad) = (middle.t_s?, middle.amplitude_rad?);
+    let own = mode.estimators.iter().find(|e| e.method == "decrement")?;
+    let rate = std::f64::consts::TAU * own.frequency_hz?.value? * own.damping_ratio?.value?;
+    Some(Series {
+        name: format!("decrement, mode {}", mode.number),
+        ink: Ink::number(mode.number - 1),
+        style: Style::Dashed,
+        values: at.iter().map(|t| Some(1e3 * a0_rad * (-rate * (t - t0_s)).exp())).collect(),
+        ..Series::default()
+    })
+}
+
+/// Amplitudes (rad) of several series, each at stamps of its own.
+#[derive(Default)]
+struct Scattered {
+    series: Vec<(Series, Vec<(f64, f64)>)>,
+}
+
+impl Scattered {
+    fn add(&mut self, name: String, ink: Ink, points: Vec<(f64, f64)>) {
+        if !points.is_empty() {
+            self.series.push((Series { name, ink, style: Style::Dots, ..Series::default() }, points));
+        }
+    }
+
+    /// All stamps in order, and the values (mrad) of each series at them.
+    fn aligned(self) -> (Vec<f64>, Vec<Series>) {
+        let mut at: Vec<f64> = self.series.iter().flat_map(|(_, points)| points.iter().map(|p| p.0)).collect();
+        at.sort_by(f64::total_cmp);
+        at.dedup();
+        let placed = |(series, points): (Series, Vec<(f64, f64)>)| {
+            let mut values = vec![None; at.len()];
+            for (t_s, amplitude_rad) in points {
+                let row = at.partition_point(|t| *t < t_s);
+                values[row] = Some(1e3 * amplitude_rad).filter(|a| *a > 0.0);
+            }
+            Series { values, ..series }
+        };
+        let series = self.series.into_iter().map(placed).collect();
+        (at, series)
     }
 }
 

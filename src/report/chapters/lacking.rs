@@ -6,7 +6,7 @@ use std::fmt::Write;
 use super::{Chapter, times};
 use crate::diagnose::Effect;
 use crate::report::curves::Curves;
-use crate::report::html::{copyable, escaped, milli, paragraph, table, value, verbatim, with_half};
+use crate::report::html::{escaped, milli, paragraph, table, value, verbatim, verbatim_copyable, with_half};
 use crate::report::left::{Diagnosed, Law, Left, Remainder};
 use crate::report::plot::{Axis, Band, Ink, Line, Map, Plot, Series, Style};
 
@@ -195,8 +195,9 @@ fn end_of_swing(left: &Left, found: &Diagnosed, curves: &Curves) -> Option<[f64;
     let f_hz = left.identified.as_ref()?.modes.iter().filter_map(|m| m.frequency_hz.value).min_by(f64::total_cmp)?;
     let (t_s, angle) = (curves.column("t_s")?, curves.column("theta1_measured_rad")?);
     let clear_rad = CLEAR * found.baseline.noise_rad.first().copied().flatten()?;
-    let seen = t_s.iter().zip(angle).filter(|(_, a)| a.is_some_and(|a| a.abs() > clear_rad)).filter_map(|(t, _)| *t);
-    let last_s = seen.last()?;
+    let mut seen =
+        t_s.iter().zip(angle).filter(|(_, a)| a.is_some_and(|a| a.abs() > clear_rad)).filter_map(|(t, _)| *t);
+    let last_s = seen.next_back()?;
     let first_s = t_s.first().copied().flatten()?;
     Some([last_s - SWINGS / f_hz, last_s]).filter(|[from, _]| *from > first_s)
 }
@@ -298,9 +299,10 @@ fn learnt(law: &Law) -> String {
         format!("<p class=\"note\">Nearly as well do: {}</p>\n", others.join("; "))
     };
     format!(
-        "<h3>The law that was learnt</h3>\n<p>It acts {}: {}</p>\n{others}<p>For the experiment file:</p>\n{}",
+        "<h3>The law that was learnt</h3>\n<p>It acts {}: {} ({})</p>\n{others}<p>For the experiment file:</p>\n{}",
         escaped(&at(&law.place)),
-        copyable(&law.formula, &law.unit),
+        verbatim_copyable(&law.formula),
+        escaped(&law.unit),
         verbatim(&law.toml)
     )
 }

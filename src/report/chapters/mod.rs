@@ -30,7 +30,7 @@ pub enum Part {
     /// HTML.
     Words(String),
     /// A figure.
-    Plot(Plot),
+    Plot(Box<Plot>),
     /// The recording.
     Film,
     /// The modes as the strip, moving.
@@ -52,7 +52,7 @@ impl Chapter {
     /// Adds a figure that shows something.
     fn plot(&mut self, plot: Plot) {
         if !plot.is_empty() {
-            self.parts.push(Part::Plot(plot));
+            self.parts.push(Part::Plot(Box::new(plot)));
         }
     }
 }
