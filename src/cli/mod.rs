@@ -12,10 +12,10 @@ mod init;
 mod modes;
 mod paper;
 mod render;
+mod report;
 mod run;
 mod shell;
 mod simulate;
-mod svg;
 mod table;
 mod track;
 
@@ -50,6 +50,7 @@ enum Command {
     Simulate(simulate::SimulateArgs),
     Modes(modes::ModesArgs),
     Render(render::RenderArgs),
+    Report(report::ReportArgs),
     Paper(paper::PaperArgs),
     Run(run::RunArgs),
     Batch(batch::BatchArgs),
@@ -89,6 +90,7 @@ impl Command {
             Self::Render(args) => args.run(console),
             Self::Modes(args) => args.run(console),
             Self::Paper(args) => args.run(console),
+            Self::Report(args) => args.run(console),
             Self::Run(args) => args.run(console),
             Self::Export(args) => args.run(console),
             Self::Doctor(args) => args.run(console),

@@ -178,10 +178,12 @@ impl RunArgs {
             }
             Stage::Fit => {
                 all.extend(analysed("fit", "fit.json")?);
+                all.extend(words(&["--curves", &own("figures/fit.csv")?]));
             }
             Stage::Diagnose => {
                 all.extend(analysed("diagnose", "diagnosis.json")?);
                 all.extend(words(&["--figure", &own("figures/diagnosis.svg")?]));
+                all.extend(words(&["--curves", &own("figures/diagnosis.csv")?, "--map", &own("figures/where.csv")?]));
             }
             Stage::Report => all.extend(words(&["report", &own("")?])),
         }
