@@ -321,9 +321,9 @@ impl Default for MisfitSettings {
 impl Default for SearchSettings {
     fn default() -> Self {
         Self {
-            budget: 60_000_000,
+            budget: 90_000_000,
             shares: BudgetShares { usual: 0.45, restarts: 0.6, certified: 0.7, further: 0.9, law: 0.25 },
-            evaluations: 4000.0,
+            evaluations: 3000.0,
             early_swings: 12.0,
             part_worth: 0.6,
             geometry_share: 0.1,
