@@ -25,7 +25,8 @@ demo: setup
 	@echo '  demo/overlay.mp4  the recording with all of it drawn in'
 	@echo '  demo/angles.json  where they come from: source, options, time stamps, noise, warnings'
 
-test: setup
+test:
+	@scripts/setup tests
 	cargo test
 
 accuracy: setup

@@ -72,6 +72,10 @@ pub enum Error {
     #[error("{}{}: {message}", path.display(), line.map(|l| format!(":{l}")).unwrap_or_default())]
     Table { path: PathBuf, line: Option<u64>, message: String },
 
+    /// A folder of a run, or a file in it, that cannot be read back.
+    #[error("{}{}: {message}", path.display(), line.map(|l| format!(":{l}")).unwrap_or_default())]
+    Left { path: PathBuf, line: Option<usize>, message: String },
+
     /// An output that cannot be written.
     #[error("{}: cannot be written: {source}; check that the folder exists, is writable and has room", path.display())]
     Unwritable { path: PathBuf, source: std::io::Error },
@@ -99,6 +103,14 @@ pub enum Error {
     /// Results that cannot be kept, as the run of a recording says.
     #[error("{line}; what was finished is kept, and the batch goes on from there when it is started again")]
     Results { line: String },
+
+    /// A self-test that measured something else than the truth.
+    #[error("the self-test measured angles that are {:.2} mrad off, where {:.2} are allowed; FFmpeg or OpenCV of this machine is broken, install them anew", 1e3 * error_rad, 1e3 * most_rad)]
+    SelfTest { error_rad: f64, most_rad: f64 },
+
+    /// A figure that cannot be made a picture.
+    #[error("a figure cannot be drawn: {detail}; report it with the folder, and leave the figures out meanwhile")]
+    Drawing { detail: String },
 
     /// Stopped by the user.
     #[error("interrupted; nothing was written")]

@@ -18,6 +18,8 @@
 //! | fit | [`fit`] | angles and model → parameters, residuals, verdict |
 //! | diagnose | [`diagnose`] | angles and model → what the model lacks, how probable, and the proof |
 //! | paper | [`paper`] | the published tables, recomputed |
+//! | report | [`report`] | what a run left in a folder → one page, figures |
+//! | export | [`export`] | angles.csv → the file of another program |
 //! | batch | [`batch`] | a folder of recordings → a folder of results, and their summary |
 //! | synth | [`synth`] | exact swings, rendered recordings with known truth |
 
@@ -48,8 +50,10 @@ pub mod identify;
 pub mod fit;
 pub mod diagnose;
 pub mod paper;
+pub mod report;
 pub mod synth;
 pub mod batch;
+pub mod export;
 #[doc(hidden)]
 pub mod cli;
 

@@ -25,9 +25,14 @@ fn rendered(experiment: &Experiment, folder: &Path) -> PathBuf {
 }
 
 fn overlaid(source: &Path) -> (Measurement, PathBuf) {
+    overlaid_below(source, None)
+}
+
+fn overlaid_below(source: &Path, most_bytes: Option<u64>) -> (Measurement, PathBuf) {
     let m = measure(source, &Options::default(), Path::new(""), &Silent).unwrap();
     let target = source.with_file_name("seen.mp4");
-    let overlay = Overlay { tracks: &m.tracks, angles: &m.angles, pivot_px: None, rate_hz: m.timing.real_rate_hz };
+    let overlay =
+        Overlay { tracks: &m.tracks, angles: &m.angles, pivot_px: None, rate_hz: m.timing.real_rate_hz, most_bytes };
     let recording = Recording::open(source, &StillTimes::Beside).unwrap();
     overlay.write(recording, &target, 2, &Silent).unwrap();
     (m, target)
@@ -76,6 +81,30 @@ fn every_frame_keeps_its_stamp_and_has_a_blue_rectangle_around_each_mark() {
     assert!(bare.iter().flatten().all(|n| *n == 0), "the scene itself has no blue");
     let left: Vec<_> = std::fs::read_dir(folder.path()).unwrap().collect();
     assert_eq!(left.len(), 2, "no temporary file stays: {left:?}");
+}
+
+#[test]
+fn an_overlay_that_must_be_small_has_smaller_pictures_and_every_stamp() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut experiment = small();
+    experiment.render.duration_s = 4.0;
+    let source = rendered(&experiment, folder.path());
+    let (m, large) = overlaid_below(&source, None);
+    let [size, bytes] = [width(&large), std::fs::metadata(&large).unwrap().len() as usize];
+    let most = bytes as u64 / 5;
+    let (_, target) = overlaid_below(&source, Some(most));
+    let small = std::fs::metadata(&target).unwrap().len();
+    assert!(
+        small < most * 13 / 10 && width(&target) <= size,
+        "{small} bytes of {most}, {} px of {size}",
+        width(&target)
+    );
+    let (stamps, _) = blue_near_marks(&target, &m);
+    assert_eq!(stamps.len(), m.tracks.t_s.len());
+}
+
+fn width(video: &Path) -> usize {
+    Recording::open(video, &StillTimes::Beside).unwrap().info().stored_size_px.0
 }
 
 #[test]

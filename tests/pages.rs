@@ -128,6 +128,21 @@ fn the_page_on_troubleshooting_runs() {
 }
 
 #[test]
+fn the_page_on_folders_runs() {
+    let folder = run("docs/folders.md");
+    let summary = std::fs::read_to_string(folder.path().join("results/summary.csv")).unwrap();
+    let header: Vec<&str> = summary.lines().next().unwrap().split(',').collect();
+    let text = page("docs/folders.md");
+    let named: Vec<&str> = text
+        .lines()
+        .filter_map(|line| line.strip_prefix("| `").and_then(|rest| rest.split_once(" |")))
+        .flat_map(|(cell, _)| cell.trim_end_matches('`').split("`, `"))
+        .collect();
+    assert!(header.iter().all(|column| named.contains(column)), "{header:?} are not all in the table");
+    assert!(folder.path().join("results/kapton/small.mp4/identify.json").is_file());
+}
+
+#[test]
 fn the_page_on_diagnosis_runs() {
     run("docs/diagnosis.md");
 }

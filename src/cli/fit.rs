@@ -35,6 +35,9 @@ pub struct FitArgs {
     /// Write all of it as JSON; `-` for standard output.
     #[arg(long, value_name = "FILE")]
     json: Option<PathBuf>,
+    /// Write measured and simulated angles, and what is left, row by row, as CSV; `-` for standard output.
+    #[arg(long, value_name = "FILE")]
+    curves: Option<PathBuf>,
     /// Let a parameter or effect free that the file does not name; may be repeated.
     #[arg(long, value_name = "ID")]
     free: Vec<String>,
@@ -70,6 +73,7 @@ impl FitArgs {
             ));
         }
         let json = self.json.as_deref().map(OutputFile::create).transpose()?;
+        let curves = self.curves.as_deref().map(OutputFile::create).transpose()?;
         let seen: Vec<Option<Seen>> = records.iter().map(Seen::of).collect();
         for (record, seen) in records.iter().zip(&seen) {
             seen.as_ref().map_or(Ok(()), |seen| fit::refuse_another_pace(record, seen, &experiment))?;
@@ -87,14 +91,18 @@ impl FitArgs {
             specimen: &experiment.specimen.name,
         };
         drop(bar);
-        let text = if self.quiet { String::new() } else { report.text() };
+        let alone = curves.as_ref().is_some_and(OutputFile::is_standard_output);
+        if let Some(file) = curves {
+            file.commit(crate::report::fit_curves(&report.fitted.fit, &records).as_bytes())?;
+        }
+        let text = if self.quiet || alone { String::new() } else { report.text() };
         super::deliver(&text, &report.json(), json, console)
     }
 }
 
 /// The parameters a fit leaves free: those of the base model, with the user's changes.
 fn free_parameters(experiment: &Experiment, marks: usize, more: &[String], fix: &[String]) -> Result<Vec<Parameter>> {
-    let stated = experiment.model.law.iter().flat_map(|law| law.coefficients().map(|(own, _)| Parameter::Law(own)));
+    let stated = experiment.model.law.iter().flat_map(|law| law.coefficients().map(|(parameter, _)| parameter));
     let known: Vec<Parameter> = Parameter::ALL.into_iter().chain(stated).collect();
     let parse = |id: &String| {
         let nearest = || {

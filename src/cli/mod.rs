@@ -4,15 +4,18 @@ mod bar;
 mod batch;
 mod console;
 mod diagnose;
+mod doctor;
+mod export;
 mod fit;
 mod identify;
 mod init;
 mod modes;
 mod paper;
 mod render;
+mod report;
 mod run;
+mod shell;
 mod simulate;
-mod svg;
 mod table;
 mod track;
 
@@ -47,9 +50,14 @@ enum Command {
     Simulate(simulate::SimulateArgs),
     Modes(modes::ModesArgs),
     Render(render::RenderArgs),
+    Report(report::ReportArgs),
     Paper(paper::PaperArgs),
     Run(run::RunArgs),
     Batch(batch::BatchArgs),
+    Export(export::ExportArgs),
+    Doctor(doctor::DoctorArgs),
+    Completions(shell::CompletionsArgs),
+    Man(shell::ManArgs),
 }
 
 /// `track` alone, so that `track VIDEO --out angles.csv` works as typed.
@@ -82,7 +90,12 @@ impl Command {
             Self::Render(args) => args.run(console),
             Self::Modes(args) => args.run(console),
             Self::Paper(args) => args.run(console),
+            Self::Report(args) => args.run(console),
             Self::Run(args) => args.run(console),
+            Self::Export(args) => args.run(console),
+            Self::Doctor(args) => args.run(console),
+            Self::Completions(args) => args.run(console),
+            Self::Man(args) => args.run(console),
         }?;
         Ok(ExitCode::SUCCESS)
     }

@@ -163,7 +163,8 @@ impl RunArgs {
                 all.extend(words(&["track", &path_text(&self.recordings[0])?, "--out", &own("angles.csv")?]));
                 all.extend(config());
                 if !self.no_overlay {
-                    all.extend(words(&["--overlay", &own("overlay.mp4")?]));
+                    // so much fits into a page
+                    all.extend(words(&["--overlay", &own("overlay.mp4")?, "--overlay-mb", "5"]));
                 }
                 if let Some(threads) = self.threads {
                     all.extend(words(&["--threads", &threads.to_string()]));
@@ -177,10 +178,12 @@ impl RunArgs {
             }
             Stage::Fit => {
                 all.extend(analysed("fit", "fit.json")?);
+                all.extend(words(&["--curves", &own("figures/fit.csv")?]));
             }
             Stage::Diagnose => {
                 all.extend(analysed("diagnose", "diagnosis.json")?);
                 all.extend(words(&["--figure", &own("figures/diagnosis.svg")?]));
+                all.extend(words(&["--curves", &own("figures/diagnosis.csv")?, "--map", &own("figures/where.csv")?]));
             }
             Stage::Report => all.extend(words(&["report", &own("")?])),
         }

@@ -39,6 +39,9 @@ pub struct TrackArgs {
     /// The recording with what was measured drawn into it: .mp4, .mov or .mkv.
     #[arg(long, value_name = "VIDEO")]
     overlay: Option<PathBuf>,
+    /// Keep the overlay below about so many megabytes, with smaller pictures where that must be.
+    #[arg(long, value_name = "MB", requires = "overlay")]
+    overlay_mb: Option<f64>,
     /// A folder for pictures of each step from frame to marks.
     #[arg(long, value_name = "DIR")]
     debug_frames: Option<PathBuf>,
@@ -158,6 +161,7 @@ impl TrackArgs {
         let bar = console.bar_of_frames(self.quiet);
         let mut table = OutputFile::create(&self.out)?;
         let mut beside = self.sidecar_path().map(|path| OutputFile::create(&path)).transpose()?;
+        let most_bytes = self.most_bytes()?;
         self.overlay.as_deref().map(overlay::check_target).transpose()?;
         let debug = self.debug_frames.as_deref().map(DebugFolder::create).transpose()?;
         let mut session = Session::open(&self.video, &options, &folder)?;
@@ -176,7 +180,7 @@ impl TrackArgs {
             let mut tracks = tracks.clone();
             tracks.t_s.clone_from(&measurement.file_t_s);
             let rate_hz = timing.real_rate_hz.or(timing.nominal_rate_hz).map(|r| r * measurement.time_scale);
-            let overlay = Overlay { tracks: &tracks, angles, pivot_px: options.rig.pivot_px, rate_hz };
+            let overlay = Overlay { tracks: &tracks, angles, pivot_px: options.rig.pivot_px, rate_hz, most_bytes };
             let recording = Recording::open(&self.video, &options.still_times)?;
             overlay.write(recording, target, options.workers, &bar)?;
         }
@@ -279,6 +283,14 @@ impl TrackArgs {
             }
         }
         Ok(())
+    }
+
+    fn most_bytes(&self) -> Result<Option<u64>> {
+        match self.overlay_mb {
+            Some(mb) if mb > 0.0 && mb < 1e6 => Ok(Some((1e6 * mb) as u64)),
+            Some(mb) => Err(option("--overlay-mb", &format!("{mb}: must be a positive number of megabytes"))),
+            None => Ok(None),
+        }
     }
 
     fn sidecar_path(&self) -> Option<PathBuf> {

@@ -2,7 +2,7 @@
 
 use std::rc::Rc;
 
-use super::centroid::{self, Centroid, Channels};
+use super::centroid::{self, Centroid, Channels, Silhouette};
 use super::component::{BLOCK, HueAxis};
 use super::mask::{Mask, Part};
 use super::plane::Plane;
@@ -79,10 +79,7 @@ pub(super) fn find(
 ) -> Result<()> {
     let (parts, plane) = parts(picture, target, planes)?;
     for part in &parts {
-        let silhouette = match &plane {
-            Some(plane) => part.finer_silhouette(picture, plane, target.threshold),
-            None => part.silhouette(picture),
-        };
+        let silhouette = silhouette(picture, target, part, plane.as_deref());
         let samples = part.points.len() as u32;
         let binary_px = silhouette.centre_px;
         if let Some(centroid) = centroid::measure(picture, target.axis, &silhouette, channels) {
@@ -98,10 +95,7 @@ pub(super) fn glance(picture: &Picture<'_>, target: &Target, planes: &mut Planes
     let layout = &picture.layout;
     let sides_px = [layout.chroma_shift_x, layout.chroma_shift_y].map(|shift| f64::from(1u32 << shift));
     for part in &parts {
-        let silhouette = match &plane {
-            Some(plane) => part.finer_silhouette(picture, plane, target.threshold),
-            None => part.silhouette(picture),
-        };
+        let silhouette = silhouette(picture, target, part, plane.as_deref());
         let samples = silhouette.points_px.len() as f64;
         let binary_px = silhouette.centre_px;
         // a coarse plane has been interpolated; samples at full resolution count by what they have above the threshold
@@ -125,6 +119,14 @@ pub(super) fn glance(picture: &Picture<'_>, target: &Target, planes: &mut Planes
         }
     }
     Ok(())
+}
+
+/// The samples of a region in the picture, at full resolution also where it was found in a coarse plane.
+fn silhouette(picture: &Picture<'_>, target: &Target, part: &Part, plane: Option<&Plane>) -> Silhouette {
+    match plane {
+        Some(plane) => part.finer_silhouette(picture, plane, target.threshold),
+        None => part.silhouette(picture),
+    }
 }
 
 /// Mean of a region's samples in luma pixels, each with a weight of at least 1.

@@ -95,7 +95,12 @@ impl<'s> Swing<'s> {
             torque(&at.motion, &mut q);
             q[..self.around.links].iter().map(|q| [*q]).collect::<Vec<_>>()
         });
-        self.around.seen(&self.around.responses(&self.transitions, &held.collect::<Vec<_>>()))
+        self.seen(&held.collect::<Vec<_>>())
+    }
+
+    /// What torques on the links that are held from row to row add to the values seen, whitened, one column a course.
+    fn seen<const C: usize>(&self, held: &[Vec<[f64; C]>]) -> DMatrix<f64> {
+        self.around.seen(&self.around.responses(&self.transitions, held))
     }
 
     /// The torques on the links of each function of the angle and the rate on which an input works.
@@ -143,6 +148,15 @@ impl<'s> Swing<'s> {
     }
 }
 
+/// The motions of a fit, each along its linearisation; `None` where there is no such model.
+pub fn swings<'s>(fit: &Refit<'_>, around: &'s [Linearisation]) -> Option<Vec<Swing<'s>>> {
+    let swing = |(record, around)| {
+        let (model, _) = fit.problem.model(record, &fit.x[..fit.problem.free.len()]).ok()?;
+        Some(Swing::of(around, &model))
+    };
+    around.iter().enumerate().map(swing).collect()
+}
+
 /// What each function of a law adds to the values seen of all recordings, whitened, for a torque of root mean square 1 (of the camera an offset); and nothing
 /// to what else there is in as many rows, the beliefs. `acts` are the torques of a swing, or what it adds to the angles, and what that does to the values.
 fn columns<const C: usize>(
@@ -171,7 +185,7 @@ fn columns<const C: usize>(
 /// The torques on the links at all instants, and what they do to the values seen.
 fn torques<const C: usize>(swing: &Swing<'_>, of: impl Fn(&Instant) -> Vec<[f64; C]>) -> (Vec<[f64; C]>, DMatrix<f64>) {
     let held: Vec<Vec<[f64; C]>> = swing.instants.iter().map(of).collect();
-    let seen = swing.around.seen(&swing.around.responses(&swing.transitions, &held));
+    let seen = swing.seen(&held);
     (held.into_iter().flatten().collect(), seen)
 }
 
@@ -185,13 +199,7 @@ pub fn basis_laws(
 ) -> Vec<Latent> {
     let Some(projection) = Projection::of(fit) else { return Vec::new() };
     let rows = projection.residual.len();
-    let swing = |(record, around)| {
-        let (model, _) = fit.problem.model(record, &fit.x[..fit.problem.free.len()]).ok()?;
-        Some(Swing::of(around, &model))
-    };
-    let Some(swings) = around.iter().enumerate().map(swing).collect::<Option<Vec<Swing<'_>>>>() else {
-        return Vec::new();
-    };
+    let Some(swings) = swings(fit, around) else { return Vec::new() };
     let largest = |of: &dyn Fn(&Swing<'_>, &Instant) -> f64| {
         let all = swings.iter().flat_map(|swing| swing.instants.iter().map(|at| of(swing, at).abs()));
         all.fold(f64::MIN_POSITIVE, f64::max)

@@ -29,6 +29,15 @@ pub struct Term {
     pub drifts: bool,
 }
 
+impl Term {
+    /// Its formula with the numbers of its coefficients.
+    pub fn with_numbers(&self) -> String {
+        let number = |word: &str| self.law.parameters.get(word).map(|own| format!("{:.3e}", own.start));
+        // a negative amplitude turns the sign before it
+        with_words(&self.law.formula, number).replace("--", "")
+    }
+}
+
 /// The largest values of the state at a place, and the length of the recordings.
 #[derive(Debug, Clone, Copy)]
 pub struct Largest {
@@ -147,7 +156,8 @@ fn term(
 ) -> Term {
     let coefficient = |start: f64, min: Option<f64>, unit: &str| Coefficient { start, min, unit: unit.to_owned() };
     let times = changes.map_or(String::new(), |(modulation, _)| format!(" * {}", modulation.formula));
-    let formula = format!("-a * {}{times}", with_state(shape.formula, state));
+    let of_its_state = with_words(shape.formula, |word| (word == "u").then(|| state.to_owned()));
+    let formula = format!("-a * {of_its_state}{times}");
     let of_state = match state {
         "angle" => "rad",
         "rate" => "rad/s",
@@ -170,21 +180,19 @@ fn term(
     Term { law, state, shape: shape.words, modulation, drifts }
 }
 
-/// A shape's formula with its state in the place of u.
-fn with_state(formula: &str, state: &str) -> String {
+/// A formula with other text in the place of some of its words.
+fn with_words(formula: &str, of_word: impl Fn(&str) -> Option<String>) -> String {
     let is_word = |c: char| c.is_alphanumeric() || c == '_';
     let mut text = String::new();
-    let mut word = String::new();
-    for c in formula.chars().chain([' ']) {
-        if is_word(c) {
-            word.push(c);
-            continue;
-        }
-        text.push_str(if word == "u" { state } else { &word });
-        word.clear();
-        text.push(c);
+    let mut rest = formula;
+    while let Some(begin) = rest.find(is_word) {
+        let (between, from_word) = rest.split_at(begin);
+        let (word, after) = from_word.split_at(from_word.find(|c| !is_word(c)).unwrap_or(from_word.len()));
+        text.push_str(between);
+        text.push_str(of_word(word).as_deref().unwrap_or(word));
+        rest = after;
     }
-    text.trim_end().to_owned()
+    text + rest
 }
 
 /// The unit of an amplitude: the place's own over that of a power of the state and of what it changes with, powers of rad and s.
@@ -239,6 +247,19 @@ mod tests {
             formulas.dedup();
             assert_eq!(formulas.len(), count, "a term stands twice");
         }
+    }
+
+    #[test]
+    fn numbers_stand_for_the_words_that_are_coefficients_and_for_no_part_of_another() {
+        let bump = terms(LawPlace::Hinge, LARGEST).into_iter().find(|term| term.shape == BUMP).unwrap();
+        let of = |a: f64| {
+            let mut term = bump.clone();
+            term.law.parameters.get_mut("a").unwrap().start = a;
+            term.with_numbers()
+        };
+        assert_eq!(of(0.002), "-2.000e-3 * exp(-((angle - -2.500e-1) / 7.500e-2) ^ 2 / 2)");
+        assert_eq!(of(-0.002), "2.000e-3 * exp(-((angle - -2.500e-1) / 7.500e-2) ^ 2 / 2)");
+        assert_eq!(with_words("a * ab + 2", |word| (word == "a").then(|| "x".to_owned())), "x * ab + 2");
     }
 
     #[test]

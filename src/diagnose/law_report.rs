@@ -79,9 +79,9 @@ impl LearntLaw {
 impl WrittenTerm {
     fn of(term: &Term, learnt: &Learnt<'_>) -> Self {
         let law = &term.law;
-        let parameters = law.parameters.iter().zip(law.coefficients()).map(|((name, own), (coefficient, _))| {
-            let unit = crate::model::Parameter::Law(coefficient).unit();
-            (name.clone(), Quantity { value: Some(own.start), sd: learnt.sd(coefficient), unit })
+        let parameters = law.parameters.keys().zip(law.coefficients()).map(|(name, (parameter, own))| {
+            let quantity = Quantity { value: Some(own.start), sd: learnt.sd(parameter), unit: parameter.unit() };
+            (name.clone(), quantity)
         });
         Self {
             place: law.place.id(),
@@ -97,16 +97,11 @@ impl WrittenTerm {
 /// A term as an experiment file states it.
 fn toml_of(term: &Term) -> String {
     let law = &term.law;
-    let key = match law.place.unit() {
-        "N/m" => "force_n_per_m",
-        "N" => "force_n",
-        "m/s2" => "acceleration_m_s2",
-        _ => "torque_n_m",
-    };
     let mut text = format!(
-        "[[model.law]]\nname = \"{}\"\nplace = \"{}\"\n{key} = \"{}\"\n",
+        "[[model.law]]\nname = \"{}\"\nplace = \"{}\"\n{} = \"{}\"\n",
         law.name,
         law.place.id(),
+        law.place.key(),
         law.formula
     );
     for (name, own) in &law.parameters {

@@ -124,6 +124,11 @@ impl Linearisation {
         })
     }
 
+    /// Of every recording of a fit; `None` where one of the motions cannot be integrated.
+    pub fn of_all(fit: &Refit<'_>) -> Option<Vec<Self>> {
+        (0..fit.problem.records.len()).map(|record| Self::of(fit, record)).collect()
+    }
+
     /// Number of numbers in a state: δθ and δrate.
     pub fn state(&self) -> usize {
         self.links + self.rates

@@ -300,6 +300,8 @@ pub struct Drawn {
     pub before: Residuals,
     /// The effects named, and what is left with them.
     pub after: Option<(Vec<Effect>, Residuals)>,
+    /// What is left with the law that was learnt as well.
+    pub learnt: Option<Residuals>,
     /// From here on both are predictions.
     pub border_s: Option<f64>,
     /// Period of the swing.
@@ -474,7 +476,12 @@ impl Drawn {
         let fitted = || Some((base.residuals(0)?, named.residuals(0)?, None));
         let (before, after, border_s) = predicted.or_else(fitted)?;
         let effects = named.hypothesis.effects.clone();
+        let learnt = findings.learnt.as_ref().and_then(|learnt| match border_s {
+            Some(_) => learnt.prediction.left.clone(),
+            None => learnt.fit.residuals(0),
+        });
         Some(Self {
+            learnt,
             before,
             after: (!effects.is_empty()).then_some((effects, after)),
             border_s,

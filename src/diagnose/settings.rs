@@ -21,6 +21,8 @@ pub struct Settings {
     pub prior: PriorSettings,
     /// Which answer that makes.
     pub verdict: VerdictSettings,
+    /// What law is learnt beside it.
+    pub law: LawSettings,
 }
 
 /// What is noise.
@@ -262,6 +264,29 @@ pub struct VerdictSettings {
     pub confused: f64,
 }
 
+/// What law is learnt beside an answer.
+#[derive(Debug, Clone)]
+pub struct LawSettings {
+    /// A term of which the projection leaves less than this part does what is free already (judgement: a thousandth).
+    pub nothing_left: f64,
+    /// A term whose effect on the angles has this cosine with that of another, or of a name, is the same under another name (judgement).
+    pub the_same: f64,
+    /// The foremost terms, each of which is paired with every one that promises less (cost).
+    pub paired: usize,
+    /// Terms, and pairs, begun beside each set of names, and as many of all that was begun fitted to the end: at least (cost)…
+    pub fewest: usize,
+    /// … and at most (cost)…
+    pub most: usize,
+    /// … for each of which the budget must allow so many motions with derivatives (cost).
+    pub evaluations: f64,
+    /// The shortest descriptions of which it is asked what they predict (cost).
+    pub proven: usize,
+    /// Predictions that leave at most this many times what the best one does are alike (judgement: a tenth).
+    pub alike: f64,
+    /// Other formulas are told whose description is longer by less than so many nats (statistics: beyond it odds are e⁻⁵).
+    pub alternatives: f64,
+}
+
 impl Default for NoiseSettings {
     fn default() -> Self {
         Self {
@@ -296,9 +321,9 @@ impl Default for MisfitSettings {
 impl Default for SearchSettings {
     fn default() -> Self {
         Self {
-            budget: 60_000_000,
+            budget: 90_000_000,
             shares: BudgetShares { usual: 0.45, restarts: 0.6, certified: 0.7, further: 0.9, law: 0.25 },
-            evaluations: 4000.0,
+            evaluations: 3000.0,
             early_swings: 12.0,
             part_worth: 0.6,
             geometry_share: 0.1,
@@ -398,6 +423,22 @@ impl Default for VerdictSettings {
             seen: 4.0,
             named: 5.0,
             confused: 0.93,
+        }
+    }
+}
+
+impl Default for LawSettings {
+    fn default() -> Self {
+        Self {
+            nothing_left: 1e-3,
+            the_same: 0.999,
+            paired: 12,
+            fewest: 2,
+            most: 6,
+            evaluations: 80.0,
+            proven: 4,
+            alike: 1.1,
+            alternatives: 5.0,
         }
     }
 }

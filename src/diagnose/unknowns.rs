@@ -11,9 +11,7 @@ use crate::fit::Record;
 
 /// The unknown of each form and at each place around a fit, likeliest first; `variance` scales that of the noise.
 pub fn unknowns(fit: &Refit<'_>, variance: f64, assumed: Assumed) -> Vec<Latent> {
-    let records = 0..fit.problem.records.len();
-    let around: Option<Vec<Linearisation>> = records.map(|record| Linearisation::of(fit, record)).collect();
-    let Some(around) = around else { return Vec::new() };
+    let Some(around) = Linearisation::of_all(fit) else { return Vec::new() };
     let inputs = Input::ALL.into_par_iter().filter(|input| *input != Input::Joint || fit.problem.marks() > 1);
     let course = |input: Input| {
         let filters: Option<Vec<Filter<'_>>> = around

@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use serde::Deserialize;
 
 use super::finite;
-use crate::model::{Expression, LawCoefficient};
+use crate::model::{Expression, LawCoefficient, Parameter};
 
 /// Where a stated law acts, and what its formula is.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize)]
@@ -32,6 +32,16 @@ impl LawPlace {
             Self::Strip => "strip",
             Self::Tip => "tip",
             Self::Support => "support",
+        }
+    }
+
+    /// The key of a formula there, in files.
+    pub fn key(self) -> &'static str {
+        match self {
+            Self::Hinge | Self::Joint => "torque_n_m",
+            Self::Strip => "force_n_per_m",
+            Self::Tip => "force_n",
+            Self::Support => "acceleration_m_s2",
         }
     }
 
@@ -101,9 +111,9 @@ impl Law {
     }
 
     /// The coefficients, as a fit knows them.
-    pub fn coefficients(&self) -> impl Iterator<Item = (LawCoefficient, &Coefficient)> {
-        let of = |(name, own): (&String, &'_ Coefficient)| LawCoefficient::new(&self.name, name, &own.unit);
-        self.parameters.iter().map(move |named| (of(named), named.1))
+    pub fn coefficients(&self) -> impl Iterator<Item = (Parameter, &Coefficient)> {
+        let of = |name: &str, own: &Coefficient| Parameter::Law(LawCoefficient::new(&self.name, name, &own.unit));
+        self.parameters.iter().map(move |(name, own)| (of(name, own), own))
     }
 
     pub(super) fn validate(&self) -> Result<(), String> {

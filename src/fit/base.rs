@@ -40,7 +40,7 @@ pub fn base_parameters(experiment: &Experiment, marks: usize) -> Vec<Parameter> 
         (effects.differential_lag, Parameter::DifferentialLag),
     ];
     let named = named.into_iter().filter_map(|(value, parameter)| value.map(|_| parameter));
-    let stated = experiment.model.law.iter().flat_map(|law| law.coefficients().map(|(own, _)| Parameter::Law(own)));
+    let stated = experiment.model.law.iter().flat_map(|law| law.coefficients().map(|(parameter, _)| parameter));
     let named = named.chain(stated);
     free.extend(named.filter(|p| !free.contains(p)).collect::<Vec<_>>());
     free

@@ -274,7 +274,7 @@ impl<'a> Problem<'a> {
 
 /// Of the coefficients of a stated law those that have a least value.
 fn least_values(law: &Law) -> impl Iterator<Item = (Parameter, f64)> {
-    law.coefficients().filter_map(|(coefficient, own)| Some((Parameter::Law(coefficient), own.min?)))
+    law.coefficients().filter_map(|(parameter, own)| Some((parameter, own.min?)))
 }
 
 /// The error allowed in a step beside some noise: a hundredth of it. A minute of one, two or three links then errs by a two-hundredth of the noise, since errors of

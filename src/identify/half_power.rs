@@ -87,6 +87,14 @@ impl HalfPower {
     }
 }
 
+/// |X(f)|² of a signal at some frequencies, as a share of the largest: the curve whose width is measured.
+pub fn resonance_curve(signal: &Signal, frequencies_hz: &[f64]) -> Vec<f64> {
+    let cells: Vec<Vec<f64>> = signal.links.iter().map(|l| l.cells(signal.step_s)).collect();
+    let power: Vec<f64> = frequencies_hz.iter().map(|f| line_power(signal, &cells, *f)).collect();
+    let most = power.iter().fold(f64::MIN_POSITIVE, |most, p| most.max(*p));
+    power.into_iter().map(|p| p / most).collect()
+}
+
 /// |X(f)|² over the true time stamps, each sample standing for the time around it, summed over the links.
 fn line_power(signal: &Signal, cells: &[Vec<f64>], f_hz: f64) -> f64 {
     let omega = std::f64::consts::TAU * f_hz;

@@ -35,7 +35,7 @@ impl Session<'_> {
     pub fn glance(&self, hues: &[Hue], from_s: Option<f64>, progress: &dyn Progress) -> Result<Vec<FrameBlobs>> {
         progress.begin("looking", Some(MOST_FRAMES as u64));
         let detector = Detector::new(hues.to_vec());
-        let view = View { glance: true, ..self.view() };
+        let view = View { glance: true, ..View::of(&self.stream, self.options, &self.area, self.background.as_ref()) };
         let (mut held, mut frames) = (Vec::new(), Vec::new());
         let mut outcome = Ok(());
         let mut last_s = f64::NEG_INFINITY;

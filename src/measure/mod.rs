@@ -237,7 +237,7 @@ impl<'a> Session<'a> {
         sink: &mut dyn FnMut(FrameBlobs),
     ) -> Result<Decoded> {
         progress.begin("tracking", self.stream.stated_frames);
-        let view = view(&self.stream, self.options, &self.area, self.background.as_ref());
+        let view = View::of(&self.stream, self.options, &self.area, self.background.as_ref());
         let mut spread = DamageSpread::new(self.stream.delay_frames);
         let (stamps_s, camera) = (&mut self.stamps_s, &mut self.camera);
         let mut take = |frame: Outcome<Seen>| {
@@ -259,10 +259,6 @@ impl<'a> Session<'a> {
             })?;
         spread.finish().for_each(&mut take);
         Ok(decoded)
-    }
-
-    fn view(&self) -> View<'_> {
-        view(&self.stream, self.options, &self.area, self.background.as_ref())
     }
 
     fn conclude(&mut self, decoded: Decoded, tracker: Tracker) -> Result<Measurement> {
@@ -312,19 +308,6 @@ impl Camera {
         let n = frames.saturating_sub(self.lost_frames).max(1);
         self.patches /= n;
         self.sd_px = (self.sd_px / n as f64).sqrt();
-    }
-}
-
-fn view<'a>(stream: &StreamInfo, options: &Options, area: &'a Area, background: Option<&'a Background>) -> View<'a> {
-    let rig = &options.rig;
-    View {
-        orientation: stream.orientation,
-        size: stream.stored_size_px,
-        binary: options.binary_centroid,
-        glance: false,
-        area,
-        background,
-        span_s: [rig.from_s.unwrap_or(f64::NEG_INFINITY), rig.until_s.unwrap_or(f64::INFINITY)],
     }
 }
 

@@ -1,11 +1,12 @@
 //! One frame → what is seen in it, as displayed, the camera's motion taken out.
 
+use super::Options;
 use crate::area::Area;
 use crate::detect::{Blob, Detector};
 use crate::error::Result;
 use crate::steady::{Background, CameraShift};
 use crate::track::{FrameBlobs, Measured, Sighting};
-use crate::video::{Frame, Orientation, Outcome};
+use crate::video::{Frame, Orientation, Outcome, StreamInfo};
 
 /// One frame, looked at.
 pub struct Seen {
@@ -28,7 +29,21 @@ pub struct View<'a> {
     pub span_s: [f64; 2],
 }
 
-impl View<'_> {
+impl<'a> View<'a> {
+    /// Of a recording, every frame measured in full.
+    pub fn of(stream: &StreamInfo, options: &Options, area: &'a Area, background: Option<&'a Background>) -> Self {
+        let rig = &options.rig;
+        Self {
+            orientation: stream.orientation,
+            size: stream.stored_size_px,
+            binary: options.binary_centroid,
+            glance: false,
+            area,
+            background,
+            span_s: [rig.from_s.unwrap_or(f64::NEG_INFINITY), rig.until_s.unwrap_or(f64::INFINITY)],
+        }
+    }
+
     /// Time stamp and blobs of a frame, as displayed, the camera's motion taken out.
     pub fn look(&self, detector: &Detector, frame: &Frame<'_>) -> Result<Outcome<Seen>> {
         let outside = !(self.span_s[0]..=self.span_s[1]).contains(&frame.t_s);

@@ -61,26 +61,8 @@ pub(super) fn integrate(
 ) -> Result<()> {
     let mut run = Run::new(model, place, directions, accuracy)?;
     let columns = run.slopes.as_ref().map_or(0, |(theta, _)| theta.ncols());
-    let mut steps = 0;
-    let ended = loop {
-        if run.place.t_s >= until_s {
-            break Ok(());
-        }
-        steps += 1;
-        if steps > accuracy.most_steps {
-            let detail = format!("more than {} steps up to t = {:.4} s", accuracy.most_steps, run.place.t_s);
-            break Err(Error::Simulation { detail });
-        }
-        match run.advance(until_s) {
-            Ok(Some(step)) => visit(match model.shapes() {
-                Some(shapes) => step.of_links(shapes),
-                None => step,
-            }),
-            Ok(None) => {}
-            Err(error) => break Err(error),
-        }
-    };
-    model.work().add(steps, model.rates(), columns);
+    let ended = run.go_to(until_s, visit);
+    model.work().add(run.steps, model.rates(), columns);
     ended
 }
 
@@ -100,6 +82,8 @@ struct Run<'a> {
     length_s: f64,
     /// The step before, whose polynomial goes on into the next.
     last: Option<Step>,
+    /// Attempts at a step so far.
+    steps: usize,
     parameters: Vec<Parameter>,
     /// ∂θ and ∂rate at the place.
     slopes: Option<(DMatrix<f64>, DMatrix<f64>)>,
@@ -148,6 +132,7 @@ impl<'a> Run<'a> {
             first: vec![0.0; rates],
             length_s: 0.1 * accuracy.longest_step_s,
             last: None,
+            steps: 0,
             parameters: directions.map(|d| d.parameters.clone()).unwrap_or_default(),
             slopes,
         };
@@ -155,6 +140,24 @@ impl<'a> Run<'a> {
         run.first = run.accelerations(run.hinge)?;
         run.sides = run.sides_at_start();
         Ok(run)
+    }
+
+    /// Step after step until then, each accepted one handed to `visit`.
+    fn go_to(&mut self, until_s: f64, visit: &mut dyn FnMut(Step)) -> Result<()> {
+        while !(self.place.t_s >= until_s) {
+            self.steps += 1;
+            if self.steps > self.accuracy.most_steps {
+                let detail = format!("more than {} steps up to t = {:.4} s", self.accuracy.most_steps, self.place.t_s);
+                return Err(Error::Simulation { detail });
+            }
+            if let Some(step) = self.advance(until_s)? {
+                visit(match self.model.shapes() {
+                    Some(shapes) => step.of_links(shapes),
+                    None => step,
+                });
+            }
+        }
+        Ok(())
     }
 
     /// One attempt at a step; `None` where it was too long and is to be tried again.

@@ -231,11 +231,6 @@ impl Parameter {
         Self::AngleGain,
         Self::DifferentialLag,
     ];
-
-    /// The parameter of a name in files, but those of stated laws.
-    pub fn from_id(id: &str) -> Option<Self> {
-        Self::ALL.into_iter().find(|p| p.id() == id)
-    }
 }
 
 impl fmt::Display for Parameter {

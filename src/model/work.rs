@@ -3,9 +3,10 @@
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 
-/// A step's work by itself, and for each direction in which derivatives are taken; over that for each pair of links.
+/// A step's work beside that for each pair of rates, which is 1.
 const OF_STEP: u64 = 12;
-const OF_DIRECTION: u64 = 1;
+/// Derivatives in so many directions cost as much as the step itself.
+const DIRECTIONS_PER_STEP: u64 = 4;
 
 /// The work done on some problem, shared by all that comes of it. A bound on it ends a search at the same place on every machine, as no clock would.
 ///
@@ -17,7 +18,7 @@ impl Work {
     /// Adds an integration's steps, of so many rates, with derivatives in so many directions.
     pub fn add(&self, steps: usize, rates: usize, directions: usize) {
         let (steps, pairs) = (steps as u64, (rates * rates) as u64);
-        self.0.fetch_add(steps * (OF_STEP + pairs) * (1 + OF_DIRECTION * directions as u64 / 4), Ordering::Relaxed);
+        self.0.fetch_add(steps * (OF_STEP + pairs) * (1 + directions as u64 / DIRECTIONS_PER_STEP), Ordering::Relaxed);
     }
 
     /// The work done so far.

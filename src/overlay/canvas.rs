@@ -4,7 +4,8 @@
 //! laid on luma and on both colour differences. So edges are smooth in all three, and nothing passes through R′G′B′.
 
 use opencv::boxed_ref::BoxedRefMut;
-use opencv::core::Mat;
+use opencv::core::{Mat, Size};
+use opencv::imgproc;
 
 use crate::error::{Error, Result};
 use crate::video::{Layout, Orientation, OwnedPicture, Picture};
@@ -101,6 +102,28 @@ impl Canvas {
     /// The finished picture.
     pub fn picture(&self) -> &OwnedPicture {
         &self.picture
+    }
+
+    /// The picture at another size, sides even; each pixel is the mean of those that it stands for.
+    ///
+    /// # Errors
+    /// [`Error::OpenCv`].
+    pub fn at_size(&self, [width_px, height_px]: [usize; 2]) -> Result<OwnedPicture> {
+        let from = self.picture.layout;
+        let layout = Layout { width_px, height_px, ..from };
+        let mut smaller = OwnedPicture::black(layout);
+        let sizes = [(from.width_px, from.height_px), from.chroma_size(), from.chroma_size()];
+        let targets = [(width_px, height_px), layout.chroma_size(), layout.chroma_size()];
+        for (plane, (from, to)) in sizes.into_iter().zip(targets).enumerate() {
+            let source = Mat::new_rows_cols_with_data(from.1 as i32, from.0 as i32, &self.picture.planes[plane]);
+            let target = Mat::new_rows_cols_with_data_mut(to.1 as i32, to.0 as i32, &mut smaller.planes[plane]);
+            let resized = source.and_then(|source| {
+                let size = Size::new(to.0 as i32, to.1 as i32);
+                imgproc::resize(&source, &mut target?, size, 0.0, 0.0, imgproc::INTER_AREA)
+            });
+            resized.map_err(Error::opencv("making the overlay smaller"))?;
+        }
+        Ok(smaller)
     }
 
     /// Width and height.

@@ -22,12 +22,17 @@ use crate::error::{Error, Result};
 use crate::experiment::Codec;
 use crate::progress::Progress;
 use crate::track::Tracks;
-use crate::video::{Recording, VideoWriter};
+use crate::video::{Layout, Recording, VideoWriter};
 
 /// How far back a trail reaches.
 const TRAIL_S: f64 = 1.0;
 /// Pictures a second where the recording has a single one.
 const USUAL_RATE_HZ: f64 = 30.0;
+
+/// Bits a pixel at which H.264 shows a still scene and a few marks without blocks.
+const BITS_PER_PIXEL: f64 = 0.05;
+/// In pictures with smaller sides nobody can tell whether a mark was followed.
+const LEAST_SIDE_PX: f64 = 480.0;
 
 /// What is drawn.
 #[derive(Debug, Clone, Copy)]
@@ -40,6 +45,29 @@ pub struct Overlay<'a> {
     pub pivot_px: Option<[f64; 2]>,
     /// Pictures a second, about; the stamps are the recording's own.
     pub rate_hz: Option<f64>,
+    /// Bytes that the file stays below, nearly: its pictures are made smaller where that must be.
+    pub most_bytes: Option<u64>,
+}
+
+/// How a file stays below some bytes.
+#[derive(Debug, Clone, Copy)]
+struct Room {
+    /// Sides of its pictures.
+    size_px: [usize; 2],
+    bits_per_s: u64,
+}
+
+impl Room {
+    /// For pictures of a size, at a rate, over a time.
+    fn for_bytes(bytes: u64, size_px: [usize; 2], rate_hz: f64, duration_s: f64) -> Self {
+        // a tenth for what is not pictures, and for a rate that is held only on average
+        let bits_per_s = 0.9 * 8.0 * bytes as f64 / duration_s.max(1.0);
+        let [width, height] = size_px.map(|side| side as f64);
+        let scale = (bits_per_s / (BITS_PER_PIXEL * rate_hz * width * height)).sqrt();
+        let scale = scale.max(LEAST_SIDE_PX / width.max(height)).min(1.0);
+        let size_px = size_px.map(|side| ((scale * side as f64 / 2.0).round() as usize * 2).max(16));
+        Self { size_px, bits_per_s: bits_per_s as u64 }
+    }
 }
 
 /// Sizes of lines and letters, from the size of the picture.
@@ -105,7 +133,7 @@ impl Overlay<'_> {
                 film.push(t_s, canvas)
             },
         )?;
-        film.writer.map_or(Ok(()), |(writer, _)| writer.finish())
+        film.writer.map_or(Ok(()), |(writer, ..)| writer.finish())
     }
 
     fn draw(&self, canvas: &mut Canvas, look: &Look, panel: &Panel, frame: usize) -> Result<()> {
@@ -160,7 +188,7 @@ struct Film<'a> {
     overlay: &'a Overlay<'a>,
     target: &'a Path,
     /// Made for the first picture, with the panel's place.
-    writer: Option<(VideoWriter, (Look, Panel))>,
+    writer: Option<(VideoWriter, (Look, Panel), Option<Room>)>,
     /// The next frame of the tracks.
     frame: usize,
     last_pts: i64,
@@ -168,7 +196,7 @@ struct Film<'a> {
 
 impl Film<'_> {
     fn push(&mut self, t_s: f64, mut canvas: Canvas) -> Result<()> {
-        let (writer, (look, panel)) = match &mut self.writer {
+        let (writer, (look, panel), room) = match &mut self.writer {
             Some(film) => film,
             none => none.insert(Self::begin(self.overlay, self.target, &canvas)?),
         };
@@ -182,16 +210,29 @@ impl Film<'_> {
         // a stamp that repeats or runs backwards is shown one tick later
         let pts = writer.stamp(t_s).0.max(self.last_pts.saturating_add(1));
         self.last_pts = pts;
-        writer.write(canvas.picture(), pts)
+        match room {
+            Some(room) => writer.write(&canvas.at_size(room.size_px)?, pts),
+            None => writer.write(canvas.picture(), pts),
+        }
     }
 
-    fn begin(overlay: &Overlay<'_>, target: &Path, canvas: &Canvas) -> Result<(VideoWriter, (Look, Panel))> {
+    fn begin(
+        overlay: &Overlay<'_>,
+        target: &Path,
+        canvas: &Canvas,
+    ) -> Result<(VideoWriter, (Look, Panel), Option<Room>)> {
         let look = Look::for_size(canvas.size_px());
         let everywhere: Vec<[f64; 2]> =
             overlay.tracks.marks.iter().flatten().filter_map(|p| p.measured).map(|m| m.position_px).collect();
         let panel = Panel::new(&look, canvas, overlay.angles, &everywhere);
         let rate_hz = overlay.rate_hz.filter(|r| (0.1..=1000.0).contains(r)).unwrap_or(USUAL_RATE_HZ);
-        let writer = VideoWriter::create(target, &codec(), canvas.picture().layout, rate_hz)?;
-        Ok((writer, (look, panel)))
+        let stamps = &overlay.tracks.t_s;
+        let duration_s = stamps.last().zip(stamps.first()).map_or(0.0, |(last, first)| last - first);
+        let room = overlay.most_bytes.map(|most| Room::for_bytes(most, canvas.size_px(), rate_hz, duration_s));
+        let codec = Codec { most_bits_per_s: room.map(|room| room.bits_per_s), ..codec() };
+        let [width_px, height_px] = room.map_or(canvas.size_px(), |room| room.size_px);
+        let layout = Layout { width_px, height_px, ..canvas.picture().layout };
+        let writer = VideoWriter::create(target, &codec, layout, rate_hz)?;
+        Ok((writer, (look, panel), room))
     }
 }

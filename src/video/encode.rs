@@ -245,6 +245,10 @@ fn encoder_options(codec: &Codec) -> Dictionary {
             options.set("crf", codec.crf.to_string());
             options.set("preset", &codec.preset);
             options.set("x264-params", "open-gop=0");
+            if let Some(most) = codec.most_bits_per_s {
+                options.set("maxrate", most.to_string());
+                options.set("bufsize", most.to_string());
+            }
         }
         CodecName::Hevc => {
             options.set("crf", codec.crf.to_string());

@@ -1,6 +1,7 @@
 //! Frames with their time stamps: a container is split at key frames and decoded on all cores, in order;
 //! a folder of stills is read likewise.
 
+pub mod codecs;
 mod container;
 mod damage;
 mod decode;

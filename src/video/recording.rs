@@ -4,7 +4,7 @@ use std::ops::ControlFlow;
 use std::path::Path;
 
 use super::container::{Container, StreamInfo};
-use super::decode::{self, Decoded, DecoderRecipe};
+use super::decode::{self, Decoded, DecoderRecipe, StreamDecoder};
 use super::frame::Frame;
 use super::still_times::StillTimes;
 use super::stills::Stills;
@@ -156,10 +156,16 @@ impl Recording {
     }
 }
 
+/// A container at its first packet, with a decoder of its stream.
+fn opened(path: &Path, threads: usize) -> Result<(Container, StreamDecoder)> {
+    let container = Container::open(path)?;
+    let decoder = DecoderRecipe::new(&container).decoder(threads).map_err(|e| decode::cannot_open(&container, &e))?;
+    Ok((container, decoder))
+}
+
 fn sample_container(path: &Path, count: usize, see: &mut dyn FnMut(&Frame<'_>)) -> Result<()> {
-    let mut container = Container::open(path)?;
+    let (mut container, mut decoder) = opened(path, 1)?;
     let duration_s = container.stated_duration_s().unwrap_or(0.0);
-    let mut decoder = DecoderRecipe::new(&container).decoder(1).map_err(|e| decode::cannot_open(&container, &e))?;
     let mut last_s = f64::NEG_INFINITY;
     for sample in 0..count {
         if sample > 0 && (duration_s <= 0.0 || container.seek(duration_s * sample as f64 / count as f64).is_err()) {
@@ -189,9 +195,7 @@ fn stretch_of_container(
     threads: usize,
     see: &mut dyn FnMut(&Frame<'_>) -> ControlFlow<()>,
 ) -> Result<()> {
-    let mut container = Container::open(path)?;
-    let mut decoder =
-        DecoderRecipe::new(&container).decoder(threads).map_err(|e| decode::cannot_open(&container, &e))?;
+    let (mut container, mut decoder) = opened(path, threads)?;
     // a file that cannot be sought in is decoded up to there
     let sought = from_s.is_none_or(|from_s| container.seek(from_s).is_ok());
     if !sought {
@@ -207,8 +211,7 @@ fn stretch_of_container(
 }
 
 fn show_container(path: &Path, t_s: f64, seek: bool, see: &mut dyn FnMut(&Frame<'_>)) -> Result<bool> {
-    let mut container = Container::open(path)?;
-    let mut decoder = DecoderRecipe::new(&container).decoder(1).map_err(|e| decode::cannot_open(&container, &e))?;
+    let (mut container, mut decoder) = opened(path, 1)?;
     if seek && container.seek(t_s).is_err() {
         return Ok(false);
     }

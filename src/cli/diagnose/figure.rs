@@ -7,11 +7,11 @@
 use std::fmt::Write;
 use std::ops::Range;
 
-use crate::cli::svg::{Panel, line, text};
 use crate::cli::table::number;
 use crate::diagnose::{Diagnosis, Drawn, MissingTorque, Place};
 use crate::error::{Error, Result};
 use crate::fit::{Residual, Residuals};
+use crate::report::svg::{Panel, line, text};
 
 /// Swings in the upper panel.
 const SWINGS: f64 = 4.0;

@@ -14,6 +14,7 @@ use crate::error::{Error, Result};
 use crate::experiment::Experiment;
 use crate::model::ForwardModel;
 use crate::output::OutputFile;
+use crate::report::{diagnosis_curves, where_curves};
 use figure::Figure;
 
 /// Longest planned recording.
@@ -42,6 +43,12 @@ pub struct DiagnoseArgs {
     /// Draw before and after as SVG; `-` for standard output.
     #[arg(long, value_name = "FILE")]
     figure: Option<PathBuf>,
+    /// Write the angles, measured and simulated before and after, row by row, as CSV; `-` for standard output.
+    #[arg(long, value_name = "FILE")]
+    curves: Option<PathBuf>,
+    /// Write the missing torque by time, amplitude and phase as CSV; `-` for standard output.
+    #[arg(long, value_name = "FILE")]
+    map: Option<PathBuf>,
     /// Use rows from this stamp on.
     #[arg(long, value_name = "S", default_value_t = f64::NEG_INFINITY, hide_default_value = true, allow_negative_numbers = true)]
     from: f64,
@@ -85,14 +92,21 @@ impl DiagnoseArgs {
         let marks = ForwardModel::of(&experiment)?.chain().groups().len();
         let records = super::recordings(&self.angles, marks, (self.from, self.until), console)?;
         let json = self.json.as_deref().map(OutputFile::create).transpose()?;
-        let figure = self.figure.as_deref().map(OutputFile::create).transpose()?;
+        let [figure, curves, map] =
+            [&self.figure, &self.curves, &self.map].map(|path| path.as_deref().map(OutputFile::create).transpose());
+        let (figure, curves, map) = (figure?, curves?, map?);
         let bar = console.bar_of_fits(self.quiet);
         let diagnosis = diagnose::diagnose(&records, &experiment, &self.options(), &bar)?;
         drop(bar);
-        let alone = figure.as_ref().is_some_and(OutputFile::is_standard_output);
+        let alone = [&figure, &curves, &map].into_iter().flatten().any(OutputFile::is_standard_output);
         let text = if self.quiet || alone { String::new() } else { page::page(&diagnosis) };
         if let Some(file) = figure {
             file.commit(Figure::of(&diagnosis)?.svg().as_bytes())?;
+        }
+        for (file, table) in [(curves, diagnosis_curves(&diagnosis)), (map, where_curves(&diagnosis))] {
+            if let (Some(file), Some(table)) = (file, table) {
+                file.commit(table.as_bytes())?;
+            }
         }
         super::deliver(&text, &json!(diagnosis), json, console)
     }

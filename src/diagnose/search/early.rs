@@ -3,11 +3,8 @@
 //! A search fits some hundred hypotheses. Where the budget does not allow that of the whole recordings, it is made on as much of their beginning as the budget
 //! allows; the best fits of each number of coefficients then follow the recordings to their end, part after part.
 
-use super::super::base::candidates;
 use super::super::context::first_part;
-use super::super::laws;
 use super::super::refit::Refit;
-use super::super::screen::Screen;
 use super::rounds::{Round, Tried};
 use super::{Search, horizon};
 
@@ -26,23 +23,8 @@ impl<'a> Search<'a, '_> {
         let records = first_part(self.context.records, part);
         let context = self.context.on(&records);
         let Some(base) = horizon::on_the_beginning(&self.context, &context, self.base()) else { return };
-        let effects = candidates(&context);
-        let scored = laws::cheap_to_score(&context, &effects);
-        let scores = Screen::at(&context, &base).map(|screen| laws::scores(&screen, &scored)).unwrap_or_default();
-        let mut early = Search {
-            prepared: self.prepared,
-            context,
-            effects,
-            fits: vec![base],
-            rounds: Vec::new(),
-            undecided: Vec::new(),
-            scores,
-            is_loose: self.is_loose,
-            begun_at: self.begun_at,
-            until: self.until,
-            part,
-            progress: self.progress,
-        };
+        let begun = Search::begun(self.prepared, context, base, self.begun_at, self.progress);
+        let mut early = Search { is_loose: self.is_loose, until: self.until, part, ..begun };
         early.usual();
         early.restarts();
         early.allow(self.context.settings.search.shares.certified);

@@ -100,23 +100,35 @@ impl<'a, 'p> Search<'a, 'p> {
         let context = base::context(prepared, experiment, taken, settings)?;
         let begun_at = context.work.done();
         let fit = base::fitted(&context, prepared)?;
+        let is_loose = taken == Taken::Loosely;
+        Ok(Self { is_loose, ..Self::begun(prepared, context, fit, begun_at, progress) })
+    }
+
+    /// Of the whole recordings, the file taken at its word: there is the base model's fit, and no work is allowed yet.
+    fn begun(
+        prepared: &'a Prepared,
+        context: FitContext<'a>,
+        base: Refit<'a>,
+        begun_at: u64,
+        progress: &'p dyn Progress,
+    ) -> Self {
         let effects = base::candidates(&context);
         let scored = laws::cheap_to_score(&context, &effects);
-        let scores = Screen::at(&context, &fit).map(|screen| laws::scores(&screen, &scored)).unwrap_or_default();
-        Ok(Self {
+        let scores = Screen::at(&context, &base).map(|screen| laws::scores(&screen, &scored)).unwrap_or_default();
+        Self {
             prepared,
             context,
             effects,
-            fits: vec![fit],
+            fits: vec![base],
             rounds: Vec::new(),
             undecided: Vec::new(),
             scores,
-            is_loose: taken == Taken::Loosely,
+            is_loose: false,
             begun_at,
             until: begun_at,
             part: 1.0,
             progress,
-        })
+        }
     }
 
     /// Searches for what the base model lacks, the file taken at its word.

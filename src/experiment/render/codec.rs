@@ -79,6 +79,9 @@ pub struct Codec {
     pub siting: Siting,
     /// Clockwise turn by which a player shows the picture, from the display matrix; the stored picture is not turned.
     pub rotation_deg: i32,
+    /// Bits a second that H.264 stays below over a few seconds, whatever the rate factor asks for.
+    #[serde(skip)]
+    pub most_bits_per_s: Option<u64>,
 }
 
 impl Default for Codec {
@@ -94,6 +97,7 @@ impl Default for Codec {
             matrix: Matrix::Bt709,
             siting: Siting::Left,
             rotation_deg: 0,
+            most_bits_per_s: None,
         }
     }
 }

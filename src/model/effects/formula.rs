@@ -3,14 +3,14 @@
 use super::{Effect, air};
 use crate::experiment::{Law, LawPlace};
 use crate::model::expression::{Dual, Expression};
-use crate::model::{Chain, LawCoefficient, Motion, Parameter, Partials};
+use crate::model::{Chain, Motion, Parameter, Partials};
 
 /// The law.
 #[derive(Debug, Clone)]
 pub struct Formula {
     place: LawPlace,
     expression: Expression,
-    coefficients: Vec<LawCoefficient>,
+    coefficients: Vec<Parameter>,
     /// The state where it is looked at, then the values of the coefficients.
     values: Vec<f64>,
 }
@@ -32,7 +32,7 @@ impl Formula {
     pub fn of(law: &Law) -> Option<Self> {
         let state = vec![0.0; law.place.variables().len()];
         let values = state.into_iter().chain(law.parameters.values().map(|own| own.start)).collect();
-        let coefficients = law.coefficients().map(|(coefficient, _)| coefficient).collect();
+        let coefficients = law.coefficients().map(|(parameter, _)| parameter).collect();
         Some(Self { place: law.place, expression: law.expression().ok()?, coefficients, values })
     }
 
@@ -44,7 +44,7 @@ impl Formula {
 
     /// Where the derivative with a coefficient stands.
     fn slope_of(&self, parameter: Parameter) -> Option<usize> {
-        let index = self.coefficients.iter().position(|own| Parameter::Law(*own) == parameter)?;
+        let index = self.coefficients.iter().position(|own| *own == parameter)?;
         Some(self.place.variables().len() + index)
     }
 
@@ -115,7 +115,7 @@ impl Effect for Formula {
 
     fn parameters(&self) -> Vec<(Parameter, f64)> {
         let values = &self.values[self.place.variables().len()..];
-        self.coefficients.iter().zip(values).map(|(own, value)| (Parameter::Law(*own), *value)).collect()
+        self.coefficients.iter().copied().zip(values.iter().copied()).collect()
     }
 
     fn set(&mut self, parameter: Parameter, value: f64) {

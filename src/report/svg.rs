@@ -21,7 +21,7 @@ pub struct Panel {
 
 impl Panel {
     /// Where a value stands on the page.
-    fn place(&self, x: f64, y: f64) -> [f64; 2] {
+    pub fn place(&self, x: f64, y: f64) -> [f64; 2] {
         let along = |value: f64, of: &Range<f64>| (value - of.start) / (of.end - of.start);
         [
             self.x_px.start + along(x, &self.x) * (self.x_px.end - self.x_px.start),
@@ -31,18 +31,70 @@ impl Panel {
 
     /// Grid, numbers along the left edge, and along the lower one if they are wanted.
     pub fn axes(&self, svg: &mut String, with_x_numbers: bool) {
-        for tick in ticks(&self.x, (self.x_px.end - self.x_px.start) / 70.0) {
+        if with_x_numbers {
+            self.numbers_along(svg);
+        } else {
+            self.grid_along(svg);
+        }
+        self.numbers_up(svg);
+    }
+
+    /// Upright lines, and below them their numbers.
+    pub fn numbers_along(&self, svg: &mut String) {
+        self.grid_along(svg);
+        for tick in self.ticks_along() {
+            let [x_px, _] = self.place(tick, self.y.start);
+            text(svg, "number middle", [x_px, self.y_px.end + 18.0], &label(tick));
+        }
+    }
+
+    fn grid_along(&self, svg: &mut String) {
+        for tick in self.ticks_along() {
             let [x_px, _] = self.place(tick, self.y.start);
             line(svg, "grid", [x_px, self.y_px.start], [x_px, self.y_px.end]);
-            if with_x_numbers {
-                text(svg, "number middle", [x_px, self.y_px.end + 18.0], &label(tick));
-            }
         }
+    }
+
+    fn ticks_along(&self) -> Vec<f64> {
+        ticks(&self.x, (self.x_px.end - self.x_px.start) / 70.0)
+    }
+
+    /// Level lines, and to the left of them their numbers.
+    pub fn numbers_up(&self, svg: &mut String) {
         for tick in ticks(&self.y, (self.y_px.end - self.y_px.start) / 30.0) {
-            let [_, y_px] = self.place(self.x.start, tick);
-            line(svg, if tick == 0.0 { "zero" } else { "grid" }, [self.x_px.start, y_px], [self.x_px.end, y_px]);
-            text(svg, "number end", [self.x_px.start - 8.0, y_px + 4.5], &label(tick));
+            let class = if tick == 0.0 { "zero" } else { "grid" };
+            self.level(svg, class, tick, &label(tick));
         }
+    }
+
+    /// The same at multiples of a step.
+    pub fn numbers_up_by(&self, svg: &mut String, step: f64) {
+        let (first, last) = ((self.y.start / step).ceil() as i64, (self.y.end / step).floor() as i64);
+        for tick in (first..=last).map(|k| k as f64 * step) {
+            self.level(svg, "grid", tick, &label(tick));
+        }
+    }
+
+    /// The same where the edges stand for logarithms.
+    pub fn powers_up(&self, svg: &mut String) {
+        for (power, words) in powers(&self.y) {
+            self.level(svg, "grid", power, &words);
+        }
+    }
+
+    /// Upright lines where the edges stand for logarithms.
+    pub fn powers_along(&self, svg: &mut String) {
+        for (power, words) in powers(&self.x) {
+            let [x_px, _] = self.place(power, self.y.start);
+            line(svg, "grid", [x_px, self.y_px.start], [x_px, self.y_px.end]);
+            text(svg, "number middle", [x_px, self.y_px.end + 18.0], &words);
+        }
+    }
+
+    fn level(&self, svg: &mut String, class: &str, at: f64, words: &str) {
+        let [_, y_px] = self.place(self.x.start, at);
+        line(svg, class, [self.x_px.start, y_px], [self.x_px.end, y_px]);
+        text(svg, "number end", [self.x_px.start - 8.0, y_px + 4.5], words);
     }
 
     /// The rectangle's outline.
@@ -78,6 +130,21 @@ impl Panel {
         for (x, y) in values.iter().filter(inside).step_by(values.len() / MOST_DOTS + 1) {
             let [x_px, y_px] = self.place(*x, y.clamp(self.y.start, self.y.end));
             let _ = write!(path, "M{x_px:.1} {y_px:.1}h0");
+        }
+        let _ = writeln!(svg, r#"<path class="{class}" d="{path}"/>"#);
+    }
+
+    /// Straight from value to value, broken where one is absent; what lies above or below is drawn at the edge.
+    pub fn polyline(&self, svg: &mut String, class: &str, values: &[Option<(f64, f64)>]) {
+        let mut path = String::new();
+        let mut goes_on = false;
+        for value in values {
+            let inside = value.filter(|(x, _)| self.x.start <= *x && *x <= self.x.end);
+            if let Some((x, y)) = inside {
+                let [x_px, y_px] = self.place(x, y.clamp(self.y.start, self.y.end));
+                let _ = write!(path, "{}{x_px:.1} {y_px:.1}", if goes_on { 'L' } else { 'M' });
+            }
+            goes_on = inside.is_some();
         }
         let _ = writeln!(svg, r#"<path class="{class}" d="{path}"/>"#);
     }
@@ -138,10 +205,26 @@ fn ticks(range: &Range<f64>, most: f64) -> Vec<f64> {
     (0..=(last - first) as usize).map(|k| (first + k as f64) * step).collect()
 }
 
+/// Powers of ten within a range of logarithms, with 2 and 5 times them where there are few.
+fn powers(range: &Range<f64>) -> Vec<(f64, String)> {
+    if !(range.end - range.start).is_finite() {
+        return Vec::new();
+    }
+    let parts: &[f64] = if range.end - range.start > 3.0 { &[1.0] } else { &[1.0, 2.0, 5.0] };
+    let whole = (range.start.floor() as i32)..=(range.end.ceil() as i32);
+    let all = whole.flat_map(|power| parts.iter().map(move |part| part * 10f64.powi(power)));
+    all.filter(|value| range.contains(&value.log10())).map(|value| (value.log10(), label(value))).collect()
+}
+
 /// A tick's number, without the digits that rounding adds.
 fn label(tick: f64) -> String {
     let rounded: f64 = format!("{tick:.9e}").parse().unwrap_or(tick);
-    if rounded == 0.0 { "0".to_owned() } else { rounded.to_string().replace('-', "−") }
+    let words = match rounded.abs() {
+        0.0 => "0".to_owned(),
+        size if (1e-4..1e6).contains(&size) => rounded.to_string(),
+        _ => format!("{rounded:e}"),
+    };
+    words.replace('-', "−")
 }
 
 #[cfg(test)]
@@ -154,6 +237,21 @@ mod tests {
         assert_eq!(ticks(&(0.0..25.0), 10.0), [0.0, 5.0, 10.0, 15.0, 20.0, 25.0]);
         assert!(ticks(&(1.0..1.0), 10.0).is_empty());
         assert!(ticks(&(f64::NAN..1.0), 10.0).is_empty());
+    }
+
+    #[test]
+    fn a_few_powers_of_ten_have_steps_between_them() {
+        let words = |range| powers(&range).into_iter().map(|p| p.1).collect::<Vec<_>>();
+        assert_eq!(words(-1.1..0.2), ["0.1", "0.2", "0.5", "1"]);
+        assert_eq!(words(-6.5..-1.9), ["1e−6", "1e−5", "0.0001", "0.001", "0.01"]);
+    }
+
+    #[test]
+    fn a_curve_is_broken_where_a_value_is_absent() {
+        let panel = Panel { x_px: 0.0..10.0, y_px: 0.0..10.0, x: 0.0..10.0, y: 0.0..10.0 };
+        let mut svg = String::new();
+        panel.polyline(&mut svg, "c", &[Some((0.0, 0.0)), Some((1.0, 1.0)), None, Some((3.0, 3.0))]);
+        assert_eq!(svg, "<path class=\"c\" d=\"M0.0 10.0L1.0 9.0M3.0 7.0\"/>\n");
     }
 
     #[test]

@@ -1,0 +1,40 @@
+//! `freeswing export`: a table of angles for another program.
+
+use std::path::PathBuf;
+
+use super::Console;
+use crate::error::{Error, Result};
+use crate::export::{self, Format};
+
+/// Write a table of angles as Parquet, MATLAB, SEP005 or HDF5.
+#[derive(Debug, clap::Args)]
+#[command(after_help = "\
+Examples:
+  freeswing export angles.csv --out angles.mat        (MATLAB: load angles.mat)
+  freeswing export angles.csv --out angles.parquet    (Python: pandas.read_parquet('angles.parquet'))
+  freeswing export angles.csv --out angles.json       (SEP005: time series for SDyPy)
+  freeswing export angles.csv --out angles.h5         (HDF5, if built with --features hdf5)
+
+Every column keeps its name, with the unit at its end. A missing number is NaN, in Parquet and SEP005 null.")]
+pub struct ExportArgs {
+    /// The table.
+    angles: PathBuf,
+    /// The file; its extension says the format.
+    #[arg(long, value_name = "FILE")]
+    out: PathBuf,
+}
+
+impl ExportArgs {
+    /// Writes the file.
+    ///
+    /// # Errors
+    /// One line: what, where, what to do.
+    pub fn run(&self, _console: &Console) -> Result<()> {
+        let format = Format::of(&self.out)?;
+        if self.angles.canonicalize().is_ok_and(|input| self.out.canonicalize().is_ok_and(|out| input == out)) {
+            let message = format!("{} is the input and would be overwritten; use another name", self.out.display());
+            return Err(Error::Option { option: "--out".to_owned(), message });
+        }
+        export::write(&export::read(&self.angles)?, &self.out, format)
+    }
+}

@@ -1,0 +1,116 @@
+//! What is fitted: names with and without laws of the grammar, in full simulation, and the length of each description.
+
+use rayon::prelude::*;
+
+use super::super::context::FitContext;
+use super::super::effect::Effect;
+use super::super::evidence::{Scatter, normalised};
+use super::super::grammar::Term;
+use super::super::hypothesis::Hypothesis;
+use super::super::refit::Refit;
+use super::sought::{Candidate, candidates};
+use crate::experiment::Law;
+
+/// Terms that were fitted beside some effects, with the length of the description.
+pub struct Described<'a> {
+    /// The terms, with their coefficients.
+    pub terms: Vec<Term>,
+    /// The fit.
+    pub fit: Refit<'a>,
+    /// The length of its description (nats).
+    pub length: f64,
+}
+
+/// Names with and without laws of the grammar, fitted in full simulation, the shortest description first.
+pub fn descriptions<'a>(context: &FitContext<'a>, best: &Refit<'a>) -> Option<Vec<Described<'a>>> {
+    let before = context.work.done();
+    let linearised = best.linearised()?;
+    let each = (context.work.done() - before).max(1) as f64;
+    let (search, law) = (&context.settings.search, &context.settings.law);
+    let allowed = search.shares.law * search.budget as f64 / each;
+    let count = ((allowed / law.evaluations) as usize).clamp(law.fewest, law.most);
+    let begun: Vec<(Candidate, Refit<'a>)> = candidates(best, &linearised, count, law)?
+        .into_par_iter()
+        .with_max_len(1)
+        .filter_map(|candidate| Some((candidate.clone(), begun_fit(context, best, &candidate, count > law.fewest)?)))
+        .collect();
+    let ended = |(candidate, fit): (Candidate, Refit<'a>)| ended(context, candidate, fit);
+    let fitted: Vec<(Vec<Term>, Refit<'a>)> =
+        foremost(begun, count).into_par_iter().with_max_len(1).map(ended).chain([(Vec::new(), best.clone())]).collect();
+    described(fitted)
+}
+
+/// The context of fits with some laws more.
+pub fn with_laws<'a>(context: &FitContext<'a>, terms: &[Term]) -> FitContext<'a> {
+    let laws: Vec<Law> = terms.iter().map(|term| term.law.clone()).collect();
+    let coefficients = laws.iter().flat_map(|law| law.coefficients().map(|(parameter, _)| parameter));
+    let base = context.base.iter().copied().chain(coefficients).collect();
+    FitContext { laws, base, ..context.clone() }
+}
+
+/// The first steps of a candidate, where it promises anything. What the names do together is not linear in each: in their place it begins along the motion that they
+/// follow, where there is time for that.
+fn begun_fit<'a>(
+    context: &FitContext<'a>,
+    best: &Refit<'a>,
+    candidate: &Candidate,
+    has_time: bool,
+) -> Option<Refit<'a>> {
+    (candidate.gain > context.settings.misfit.counts).then_some(())?;
+    let (with, hypothesis) = (with_laws(context, &candidate.terms), &candidate.hypothesis);
+    let begun = with.begin(hypothesis, best, &[]);
+    let along = (has_time && *hypothesis != best.hypothesis).then(|| with.refit_along(hypothesis, best, &[])).flatten();
+    begun.into_iter().chain(along).min_by(|a, b| a.chi2.total_cmp(&b.chi2))
+}
+
+/// Of what was begun the best, and the best term and the best pair beside each set of names.
+fn foremost<'a>(mut begun: Vec<(Candidate, Refit<'a>)>, most: usize) -> Vec<(Candidate, Refit<'a>)> {
+    begun.sort_by(|a, b| a.1.chi2.total_cmp(&b.1.chi2));
+    let mut seen: Vec<(Hypothesis, usize)> = Vec::new();
+    let mut rank = 0;
+    begun.retain(|(candidate, _)| {
+        let kind = (candidate.hypothesis.clone(), candidate.terms.len());
+        let is_first = !seen.contains(&kind);
+        seen.push(kind);
+        rank += 1;
+        is_first || rank <= most
+    });
+    begun
+}
+
+/// A candidate to the end, its coefficients those of the fit.
+fn ended<'a>(context: &FitContext<'a>, candidate: Candidate, begun: Refit<'a>) -> (Vec<Term>, Refit<'a>) {
+    let mut terms = candidate.terms;
+    let steps = context.settings.descent.most_steps;
+    let with = with_laws(context, &terms);
+    let fit = if begun.converged { begun } else { with.go_on(&begun, steps).unwrap_or(begun) };
+    for term in &mut terms {
+        let fitted: Vec<Option<f64>> = term.law.coefficients().map(|(parameter, _)| fit.value(parameter)).collect();
+        for (own, value) in term.law.parameters.values_mut().zip(fitted) {
+            own.start = value.unwrap_or(own.start);
+        }
+    }
+    (terms, fit)
+}
+
+/// The fits with the lengths of their descriptions, the shortest first.
+fn described(fitted: Vec<(Vec<Term>, Refit<'_>)>) -> Option<Vec<Described<'_>>> {
+    let least = fitted.iter().map(|(_, fit)| fit).min_by(|a, b| a.chi2.total_cmp(&b.chi2))?;
+    let scatter = Scatter::of(least, least.values());
+    let together = (scatter.of_all / scatter.of_values).max(1.0);
+    let length = |terms: &[Term], fit: &Refit<'_>| {
+        let count = fit.added().len() + terms.iter().map(|term| term.law.parameters.len()).sum::<usize>();
+        0.5 * fit.chi2 / scatter.of_all + 0.5 * count as f64 * (fit.values() as f64 / together).ln()
+    };
+    let mut order: Vec<Described<'_>> =
+        fitted.into_iter().map(|(terms, fit)| Described { length: length(&terms, &fit), terms, fit }).collect();
+    order.sort_by(|a, b| a.length.total_cmp(&b.length));
+    Some(order)
+}
+
+/// The probability of a name among all descriptions.
+pub fn needed(order: &[Described<'_>], effect: Effect) -> f64 {
+    let weights = normalised(&order.iter().map(|own| -own.length).collect::<Vec<f64>>());
+    let with = order.iter().zip(weights).filter(|(own, _)| own.fit.hypothesis.has(effect));
+    with.map(|(_, weight)| weight).sum()
+}
