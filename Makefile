@@ -7,6 +7,7 @@ help:
 	@echo 'make test      every test'
 	@echo 'make accuracy  the slow accuracy tests, optimised'
 	@echo 'make concealed find hidden effects in recordings made by another program, and score it'
+	@echo 'make test-cluster  a Slurm of two nodes on this machine: every way to share a folder out, one node killed, against batch'
 	@echo 'make bench     each stage, then the whole against ffmpeg and OpenCV'
 	@echo 'make lint      formatting, clippy, documentation; no warning passes'
 	@echo 'make clean     remove what was built or made'
@@ -54,6 +55,11 @@ target/concealed/%/labels.json: | setup-concealed
 setup-concealed:
 	@scripts/setup concealed
 
+test-cluster:
+	@scripts/setup cluster
+	cargo build --release
+	FREESWING=$(FREESWING) workflow/test-cluster.sh $${CARGO_TARGET_DIR:-target}/cluster
+
 bench: setup
 	cargo bench
 	benches/paired.sh
@@ -67,4 +73,4 @@ clean:
 	cargo clean
 	rm -rf demo
 
-.PHONY: help setup setup-concealed demo test accuracy concealed bench lint clean
+.PHONY: help setup setup-concealed demo test accuracy concealed test-cluster bench lint clean

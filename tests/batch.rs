@@ -242,6 +242,35 @@ fn parts_on_several_machines_come_to_the_same_summary() {
 }
 
 #[test]
+fn a_run_that_is_killed_alone_is_done_again_without_being_asked_for() {
+    let lab = Laboratory::new();
+    Clip { scene: Scene::default(), frames: 900, ..Clip::default() }.write(&lab.path("in/film.mp4"));
+    assert_eq!(lab.batch("undisturbed", &[]).0, Some(0));
+    let batch = lab.command("out").stderr(Stdio::piped()).spawn().unwrap();
+    let began = std::time::Instant::now();
+    let run = loop {
+        let children = fs::read_to_string(format!("/proc/{0}/task/{0}/children", batch.id())).unwrap_or_default();
+        let threads = fs::read_dir(format!("/proc/{}/task", batch.id())).unwrap().flatten();
+        let all = threads.map(|own| fs::read_to_string(own.path().join("children")).unwrap_or_default());
+        let all: String = all.chain([children]).collect();
+        if let Some(run) = all.split_whitespace().next() {
+            break run.to_owned();
+        }
+        assert!(began.elapsed() < Duration::from_secs(60), "no run has begun");
+        std::thread::sleep(Duration::from_millis(2));
+    };
+    // as a machine that goes down kills them, one after the other
+    Command::new("kill").args(["-KILL", &run]).status().unwrap();
+    let output = batch.wait_with_output().unwrap();
+    assert_eq!(output.status.code(), Some(1), "{}", said(&output));
+    let reason = &lab.rows("out")["film.mp4"]["reason"];
+    assert!(reason.contains("ended from outside (signal: 9"), "{reason}");
+    let (code, told) = lab.batch("out", &[]);
+    assert!(code == Some(0) && told.contains("1 to run"), "{told}");
+    assert_eq!(lab.summary("out"), lab.summary("undisturbed"));
+}
+
+#[test]
 fn what_has_changed_is_done_again_and_nothing_else() {
     let lab = Laboratory::new().with_tables(4);
     lab.write("in/day 0/bad.csv", "t_s,theta1_rad\n0,0.1\n");
@@ -296,6 +325,27 @@ fn what_would_be_done_is_said_and_not_done() {
     assert!(output.status.success() && !lab.path("out").exists(), "{told}");
     let line = told.lines().find(|line| line.contains("swing00")).unwrap();
     assert!(line.contains("run") && line.contains("experiment.toml, day 0/swing00.toml"), "{line}");
+    let planned = |part: &[&str]| -> Vec<(String, String)> {
+        let output = lab.command("out").args(["--dry-run", "--json", "-"]).args(part).output().unwrap();
+        let told: serde_json::Value = serde_json::from_slice(&output.stdout).unwrap();
+        assert_eq!(told["recordings"][0]["files"][2], "in/day 0/swing00.toml", "{told}");
+        let text = |value: &serde_json::Value| value.as_str().unwrap().to_owned();
+        let all = told["recordings"].as_array().unwrap().iter();
+        all.map(|own| (text(&own["recording"]), text(&own["plan"]))).collect()
+    };
+    let expected = |plans: [&str; 2]| {
+        ["day 0/swing00.csv", "day 1/swing01.csv"]
+            .into_iter()
+            .zip(plans)
+            .map(|(a, b)| (a.to_owned(), b.to_owned()))
+            .collect::<Vec<_>>()
+    };
+    assert_eq!(planned(&[]), expected(["run", "run"]));
+    // the second in order is part 2 of 2
+    assert_eq!(planned(&["--shard", "2/2"]), expected(["skipped", "run"]));
+    assert_eq!(lab.batch("out", &["--shard", "2/2"]).0, Some(0));
+    assert_eq!(planned(&[]), expected(["run", "done"]));
+    assert_eq!(lab.batch("out", &["--json", "plan.json"]).0, Some(2), "only with --dry-run");
 }
 
 #[test]

@@ -6,6 +6,7 @@
 use std::collections::VecDeque;
 use std::fs;
 use std::io::{BufRead, BufReader, Read};
+use std::os::unix::process::ExitStatusExt;
 use std::path::{Path, PathBuf};
 use std::process::{ChildStderr, Command, Stdio};
 use std::sync::{Mutex, PoisonError};
@@ -96,11 +97,12 @@ impl Crew<'_> {
         let fingerprint = Fingerprint::of(job.found, &self.options.words);
         let mut ended = self.process(lane, job, threads)?;
         let unchanged = seen(&job.found.paths) == before;
-        if ended.is_none() && !unchanged {
+        if matches!(ended, Ended::Well) && !unchanged {
             let path = job.found.path().display();
-            ended = Some(format!("error: {path}: changed while it was processed; run the batch again"));
+            ended = Ended::Failed(format!("error: {path}: changed while it was processed; run the batch again"));
         }
         // what has no fingerprint is done again the next time
+        let is_final = unchanged && !matches!(ended, Ended::Killed(_));
         let unknown = Fingerprint {
             recording_sha256: String::new(),
             config_sha256: String::new(),
@@ -109,17 +111,17 @@ impl Crew<'_> {
         };
         let finished = Finished {
             schema: "freeswing.run/1".to_owned(),
-            fingerprint: fingerprint.ok().filter(|_| unchanged).unwrap_or(unknown),
-            status: if ended.is_none() { Status::Done } else { Status::Failed },
-            reason: ended.unwrap_or_default(),
+            fingerprint: fingerprint.ok().filter(|_| is_final).unwrap_or(unknown),
+            status: if matches!(ended, Ended::Well) { Status::Done } else { Status::Failed },
+            reason: ended.reason(),
         };
         state::write(&job.folder, &finished)?;
         self.watch.ended(lane, &job.found.name, &finished, began.elapsed().as_secs_f64());
         Ok(())
     }
 
-    /// The process of a run; the line with which it failed, if it did.
-    fn process(&self, lane: usize, job: &Job<'_>, threads: usize) -> Result<Option<String>> {
+    /// The process of a run.
+    fn process(&self, lane: usize, job: &Job<'_>, threads: usize) -> Result<Ended> {
         let config = match layers::together(&job.found.configs) {
             Ok(Layered::None) => None,
             Ok(Layered::One(path)) => Some(path),
@@ -128,13 +130,15 @@ impl Crew<'_> {
                 OutputFile::create(&path)?.commit(text.as_bytes())?;
                 Some(path)
             }
-            Err(error) => return Ok(Some(format!("error: {error}"))),
+            Err(error) => return Ok(Ended::Failed(format!("error: {error}"))),
         };
         let mut command = Command::new(&self.options.program);
         command.arg("run").args(job.found.paths.iter().map(|path| as_argument(path)));
         command.arg("--out").arg(as_argument(&job.folder));
         command.args(config.iter().flat_map(|config| ["--config".into(), as_argument(config)]));
         command.args(["--threads", &threads.to_string(), "--watched"]).args(&self.options.words);
+        // a fit and a diagnosis take what is idle, but no more than the batch was given: the machine may be shared
+        command.env("RAYON_NUM_THREADS", self.options.cores.to_string());
         // its standard input ends when this process does, however that comes about, and with it the run
         let child = command.stdin(Stdio::piped()).stdout(Stdio::piped()).stderr(Stdio::piped()).spawn();
         let mut child = child.map_err(|e| Error::unreadable(&self.options.program, e))?;
@@ -151,12 +155,15 @@ impl Crew<'_> {
         });
         let status = child.wait().map_err(|e| Error::unreadable(&self.options.program, e))?;
         if status.success() {
-            return Ok(None);
+            return Ok(Ended::Well);
         }
-        let line = said.lines().rev().find(|line| line.starts_with("error: "));
-        let line = line.map_or_else(|| ended_without_a_word(job.found.path(), &status), str::to_owned);
-        self.unless_of_all(&line, &job.folder)?;
-        Ok(Some(line))
+        let Some(line) = said.lines().rev().find(|line| line.starts_with("error: ")) else {
+            let line = ended_without_a_word(job.found.path(), &status);
+            let is_killed = matches!(status.signal(), Some(libc::SIGKILL | libc::SIGTERM | libc::SIGHUP));
+            return Ok(if is_killed { Ended::Killed(line) } else { Ended::Failed(line) });
+        };
+        self.unless_of_all(line, &job.folder)?;
+        Ok(Ended::Failed(line.to_owned()))
     }
 
     /// What is no fault of the recording: the user has stopped it all, or nothing can be written any more.
@@ -170,6 +177,25 @@ impl Crew<'_> {
             return Err(Error::Results { line: told.to_owned() });
         }
         Ok(())
+    }
+}
+
+/// How the process of a run ended.
+enum Ended {
+    /// Every stage.
+    Well,
+    /// With this line.
+    Failed(String),
+    /// By a signal that comes from others: of a machine that goes down, or that wants memory. Another time it may end well.
+    Killed(String),
+}
+
+impl Ended {
+    fn reason(self) -> String {
+        match self {
+            Self::Well => String::new(),
+            Self::Failed(line) | Self::Killed(line) => line,
+        }
     }
 }
 

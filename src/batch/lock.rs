@@ -11,6 +11,8 @@ use crate::error::{Error, Result};
 
 /// The file whose lock is taken, which also marks a folder as results.
 pub const FILE: &str = ".batch";
+/// Those of its parts begin so.
+const PART: &str = ".batch-";
 
 /// Held while a batch works.
 #[derive(Debug)]
@@ -27,7 +29,7 @@ impl Lock {
     pub fn take(output: &Path, shard: Option<Shard>) -> Result<Self> {
         let whole = Locked { path: &output.join(FILE), folder: output };
         let Some(shard) = shard else { return Ok(Self { _whole: whole.alone()?, _part: None }) };
-        let part = output.join(format!(".batch-{}-of-{}", shard.part, shard.of));
+        let part = output.join(format!("{PART}{}-of-{}", shard.part, shard.of));
         Ok(Self { _whole: whole.beside_others()?, _part: Some(Locked { path: &part, folder: output }.alone()?) })
     }
 }
@@ -55,6 +57,8 @@ impl Locked<'_> {
     fn beside_others(&self) -> Result<File> {
         let mut file = self.open()?;
         self.taken(file.try_lock_shared(), &mut file)?;
+        // the last batch that was alone is not among the holders
+        file.set_len(0).map_err(|e| Error::unwritable(self.path, e))?;
         Ok(file)
     }
 
@@ -67,13 +71,26 @@ impl Locked<'_> {
                 // without a name the message still says what is the matter
                 let _ = file.read_to_string(&mut holder);
                 let holder = match holder.trim() {
-                    "" => "another batch".to_owned(),
+                    "" => part_at_work(self.folder).unwrap_or_else(|| "another batch".to_owned()),
                     holder => format!("another batch ({holder})"),
                 };
                 Err(Error::Busy { path: self.folder.to_owned(), holder })
             }
         }
     }
+}
+
+/// One of the parts that are at work in an output folder.
+fn part_at_work(output: &Path) -> Option<String> {
+    let entries = std::fs::read_dir(output).ok()?.flatten();
+    entries.into_iter().find_map(|entry| {
+        let name = entry.file_name().to_string_lossy().strip_prefix(PART)?.replace("-of-", " of ");
+        let mut file = File::open(entry.path()).ok()?;
+        matches!(file.try_lock_shared(), Err(TryLockError::WouldBlock)).then_some(())?;
+        let mut holder = String::new();
+        file.read_to_string(&mut holder).ok()?;
+        Some(format!("part {name} of a batch ({})", holder.trim()))
+    })
 }
 
 /// The machine's name.
@@ -100,11 +117,13 @@ mod tests {
     #[test]
     fn parts_work_beside_each_other_each_once() {
         let folder = tempfile::tempdir().unwrap();
+        drop(Lock::take(folder.path(), None).unwrap());
         let part = |part| Lock::take(folder.path(), Some(Shard { part, of: 2 }));
         let first = part(1).unwrap();
         let _second = part(2).unwrap();
         assert!(part(1).is_err());
-        assert!(Lock::take(folder.path(), None).is_err());
+        let refused = Lock::take(folder.path(), None).unwrap_err().to_string();
+        assert!(refused.contains(" of 2 of a batch (process "), "{refused}");
         drop(first);
         part(1).unwrap();
     }

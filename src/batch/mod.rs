@@ -25,6 +25,9 @@ pub mod together;
 
 use std::path::PathBuf;
 
+use rayon::prelude::*;
+use serde::Serialize;
+
 use crate::error::{Error, Result};
 use crew::{Crew, Job, Watch};
 use find::Found;
@@ -109,7 +112,8 @@ pub fn plan(options: &Options) -> Result<Vec<Planned>> {
         let plan = options.plan_of(index, &found, &names);
         Planned { found, plan }
     };
-    Ok(found.into_iter().enumerate().map(planned).collect())
+    // what was finished is read whole, to see whether it is still the same
+    Ok(found.into_par_iter().enumerate().map(planned).collect())
 }
 
 impl Options {
@@ -144,6 +148,42 @@ impl Options {
     }
 }
 
+/// What would be done, for a program that shares the recordings out: part k of n (`--shard`) of so many recordings is the k-th of them.
+#[derive(Debug, Serialize)]
+pub struct Intentions {
+    schema: &'static str,
+    recordings: Vec<Intended>,
+}
+
+#[derive(Debug, Serialize)]
+struct Intended {
+    recording: String,
+    /// `run`, or the status that it has or will have.
+    plan: &'static str,
+    reason: String,
+    /// What it depends on: itself and the experiment files that hold for it.
+    files: Vec<PathBuf>,
+}
+
+impl From<&[Planned]> for Intentions {
+    fn from(planned: &[Planned]) -> Self {
+        let intended = |planned: &Planned| {
+            let (plan, reason) = match &planned.plan {
+                Plan::Run => ("run", ""),
+                Plan::Finished(finished) => (finished.status.id(), finished.reason.as_str()),
+                Plan::Skip(reason) => (Status::Skipped.id(), reason.as_str()),
+            };
+            Intended {
+                recording: planned.found.name.clone(),
+                plan,
+                reason: reason.to_owned(),
+                files: planned.found.paths.iter().chain(&planned.found.configs).cloned().collect(),
+            }
+        };
+        Self { schema: "freeswing.plan/1", recordings: planned.iter().map(intended).collect() }
+    }
+}
+
 /// Runs what is to be run, and writes the summary of all: `summary.csv`, `summary.parquet`, `index.html`. A part of several writes none.
 ///
 /// # Errors
@@ -159,7 +199,7 @@ pub fn run(options: &Options, watch: &dyn Watch) -> Result<Tally> {
         .collect();
     watch.begin(planned.len(), jobs.len());
     Crew { options, watch }.run(jobs)?;
-    let rows = planned.iter().map(|planned| options.row(planned)).collect::<Vec<Row>>();
+    let rows = planned.par_iter().map(|planned| options.row(planned)).collect::<Vec<Row>>();
     if options.shard.is_none() {
         let specimens = options.together(planned, watch)?;
         summary::write(&options.output, &rows)?;

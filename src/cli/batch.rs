@@ -16,8 +16,9 @@ use super::run::Stage;
 use super::table::Table;
 use crate::batch::crew::Watch;
 use crate::batch::state::{Finished, Status};
-use crate::batch::{self, Options, Plan, Shard, Tally};
+use crate::batch::{self, Intentions, Options, Plan, Planned, Shard, Tally};
 use crate::error::{Error, Result};
+use crate::output::OutputFile;
 use crate::progress::{Heard, Progress};
 
 /// Run every recording and every table of angles below a folder, and sum them up.
@@ -25,7 +26,7 @@ use crate::progress::{Heard, Progress};
 #[command(after_help = "\
 Examples:
   freeswing batch experiments --out results
-  freeswing batch experiments --out results --dry-run
+  freeswing batch experiments --out results --dry-run --json plan.json
   freeswing batch experiments --out results --until identify --no-overlay --only 'monday/**'
   freeswing batch experiments --out results --shard 3/8
 
@@ -56,6 +57,9 @@ pub struct BatchArgs {
     /// Say what would be done, and do nothing.
     #[arg(long)]
     dry_run: bool,
+    /// With --dry-run: the same as JSON, for a program that shares the recordings out; `-` for standard output, instead of the table.
+    #[arg(long, value_name = "FILE", requires = "dry_run")]
+    json: Option<PathBuf>,
     /// Part K of N, for several machines that share the folders.
     #[arg(long, value_name = "K/N", value_parser = shard)]
     shard: Option<Shard>,
@@ -82,8 +86,15 @@ impl BatchArgs {
     /// One line: what, where, what to do.
     pub fn run(&self, console: &Console) -> Result<ExitCode> {
         let options = self.options()?;
+        if let Some(jobs) = self.jobs {
+            // refused where there are threads already; there are none yet
+            let _ = rayon::ThreadPoolBuilder::new().num_threads(jobs.into()).build_global();
+        }
         if self.dry_run {
-            console.print(&intentions(&options)?)?;
+            let json = self.json.as_deref().map(OutputFile::create).transpose()?;
+            let planned = batch::plan(&options)?;
+            let text = if self.quiet { String::new() } else { intentions(&planned, &options) };
+            super::deliver(&text, &Intentions::from(&planned[..]), json, console)?;
             return Ok(ExitCode::SUCCESS);
         }
         let display = Display::new(self.quiet);
@@ -135,9 +146,9 @@ impl BatchArgs {
 }
 
 /// What would be done.
-fn intentions(options: &Options) -> Result<String> {
+fn intentions(planned: &[Planned], options: &Options) -> String {
     let mut table = Table::new(["recording", "would be", "experiment files"]);
-    for planned in batch::plan(options)? {
+    for planned in planned {
         let what = match &planned.plan {
             Plan::Run => "run".to_owned(),
             Plan::Finished(finished) if finished.status == Status::Failed => {
@@ -148,9 +159,13 @@ fn intentions(options: &Options) -> Result<String> {
         };
         let shown = |path: &PathBuf| path.strip_prefix(&options.input).unwrap_or(path).display().to_string();
         let configs: Vec<String> = planned.found.configs.iter().map(shown).collect();
-        table.row([planned.found.name, what, if configs.is_empty() { "none".to_owned() } else { configs.join(", ") }]);
+        table.row([
+            planned.found.name.clone(),
+            what,
+            if configs.is_empty() { "none".to_owned() } else { configs.join(", ") },
+        ]);
     }
-    Ok(table.text())
+    table.text()
 }
 
 /// Bars on a terminal, one a run and one of all; elsewhere a line a recording.
