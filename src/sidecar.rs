@@ -140,7 +140,7 @@ impl Sidecar {
     /// Gathers everything; reads the source once more for its digest.
     ///
     /// # Errors
-    /// [`Error::Unreadable`].
+    /// [`crate::Error::Unreadable`].
     pub fn new(path: &Path, options: &Options, m: &Measurement) -> Result<Self> {
         let (width_px, height_px) = m.stream.orientation.size(m.stream.stored_size_px);
         let mut sidecar = Self {

@@ -31,8 +31,7 @@ impl Laboratory {
 
     /// Tables of swings that differ in frequency.
     fn with_tables(self, count: usize) -> Self {
-        (0..count)
-            .for_each(|k| self.write(&format!("in/day {}/swing{k:02}.csv", k % 3), &table(1.0 + 0.05 * k as f64)));
+        (0..count).for_each(|k| self.write(&format!("in/day {}/swing{k:02}.csv", k % 3), table(1.0 + 0.05 * k as f64)));
         self.write("in/experiment.toml", SPECIMEN);
         self
     }
@@ -50,7 +49,7 @@ impl Laboratory {
     fn film(&self, name: &str) {
         let path = self.path(name);
         fs::create_dir_all(path.parent().unwrap()).unwrap();
-        Clip { scene: Scene::default(), frames: 90, ..Clip::default() }.write(&path);
+        Clip { scene: Scene::default(), frames: 90 }.write(&path);
     }
 
     fn command(&self, out: &str) -> Command {
@@ -132,7 +131,7 @@ fn every_recording_has_a_row_and_a_bad_one_says_why_as_its_command_alone_does() 
     lab.write("in/films/wrong.toml", "[rig]\npivot = [1.0, 2.0]\n");
     lab.write("in/day 0/short.csv", "t_s,theta1_rad\n0,0.1\n");
     lab.write("in/day 0/volts.csv", "time,volts\n0,1\n");
-    Clip { scene: Scene { marks: Vec::new(), ..Scene::default() }, frames: 30, ..Clip::default() }
+    Clip { scene: Scene { marks: Vec::new(), ..Scene::default() }, frames: 30 }
         .write(&lab.path("in/films/no marks.mp4"));
     let (code, told) = lab.batch("out", &[]);
     assert_eq!(code, Some(1), "{told}");
@@ -244,7 +243,7 @@ fn parts_on_several_machines_come_to_the_same_summary() {
 #[test]
 fn a_run_that_is_killed_alone_is_done_again_without_being_asked_for() {
     let lab = Laboratory::new();
-    Clip { scene: Scene::default(), frames: 900, ..Clip::default() }.write(&lab.path("in/film.mp4"));
+    Clip { scene: Scene::default(), frames: 900 }.write(&lab.path("in/film.mp4"));
     assert_eq!(lab.batch("undisturbed", &[]).0, Some(0));
     let batch = lab.command("out").stderr(Stdio::piped()).spawn().unwrap();
     let began = std::time::Instant::now();

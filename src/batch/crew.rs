@@ -33,8 +33,8 @@ pub struct Job<'p> {
 
 /// Hears how a batch goes. A lane is one of the processes that run at a time.
 pub trait Watch: Sync {
-    /// So many recordings there are, and so many are to be run.
-    fn begin(&self, all: usize, to_run: usize);
+    /// So many recordings, or specimens, there are, and so many are to be run.
+    fn begin(&self, what: &'static str, all: usize, to_run: usize);
     /// A run begins.
     fn begun(&self, lane: usize, name: &str);
     /// How far it is.

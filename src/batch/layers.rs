@@ -79,7 +79,7 @@ fn read(path: &Path) -> Result<Table> {
 fn lay_over(all: &mut Table, nearer: Table) {
     if let (Some(Value::Table(far)), Some(Value::Table(near))) = (all.get_mut("specimen"), nearer.get("specimen")) {
         if near.contains_key(AS_LINKS) {
-            far.retain(|key, _| !AS_STRIP.iter().any(|own| key == *own));
+            far.retain(|key, _| !AS_STRIP.contains(&key));
         } else if AS_STRIP.iter().any(|key| near.contains_key(*key)) {
             far.remove(AS_LINKS);
         }

@@ -197,7 +197,7 @@ pub fn run(options: &Options, watch: &dyn Watch) -> Result<Tally> {
         .filter(|planned| matches!(planned.plan, Plan::Run))
         .map(|planned| options.job(planned))
         .collect();
-    watch.begin(planned.len(), jobs.len());
+    watch.begin("recordings", planned.len(), jobs.len());
     Crew { options, watch }.run(jobs)?;
     let rows = planned.par_iter().map(|planned| options.row(planned)).collect::<Vec<Row>>();
     if options.shard.is_none() {
@@ -227,7 +227,9 @@ impl Options {
         };
         let planned: Vec<Planned> = specimens.into_iter().map(plan).collect();
         let to_run = planned.iter().filter(|planned| matches!(planned.plan, Plan::Run));
-        Crew { options: self, watch }.run(to_run.map(|planned| self.job(planned)).collect())?;
+        let jobs: Vec<Job<'_>> = to_run.map(|planned| self.job(planned)).collect();
+        watch.begin("specimens", planned.len(), jobs.len());
+        Crew { options: self, watch }.run(jobs)?;
         Ok(planned.iter().map(|planned| self.row(planned)).collect())
     }
 

@@ -207,17 +207,20 @@ fn style(template: &str) -> ProgressStyle {
 }
 
 impl Watch for Display {
-    fn begin(&self, all: usize, to_run: usize) {
+    fn begin(&self, what: &'static str, all: usize, to_run: usize) {
         self.to_run.store(to_run, Ordering::SeqCst);
+        self.ended.store(0, Ordering::SeqCst);
         let finished = all - to_run;
         if let (Some(bars), Ok(mut own)) = (&self.bars, self.all.lock()) {
             let bar = bars.add(ProgressBar::new(to_run as u64));
-            bar.set_style(style("{prefix:>11} {wide_bar} {pos}/{len} recordings, {elapsed}"));
-            bar.set_prefix("all");
+            bar.set_style(style("{prefix:>11} {wide_bar} {pos}/{len}, {elapsed}"));
+            bar.set_prefix(what);
             bar.enable_steady_tick(std::time::Duration::from_millis(200));
-            *own = Some(bar);
-        } else if !self.quiet {
-            eprintln!("{all} recordings, {to_run} to run, {finished} finished before or left out");
+            if let Some(before) = own.replace(bar) {
+                before.finish_and_clear();
+            }
+        } else if !self.quiet && all > 0 {
+            eprintln!("{all} {what}, {to_run} to run, {finished} finished before or left out");
         }
     }
 

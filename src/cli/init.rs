@@ -98,8 +98,7 @@ impl InitArgs {
             Some(picture) => {
                 console.remark(format!("look at {} to see whether these are the marks", picture.display()))
             }
-            None => console
-                .remark(format!("to see whether these are the marks, run it again with --force --preview seen.png")),
+            None => console.remark("to see whether these are the marks, run it again with --force --preview seen.png"),
         }
         if self.out.as_os_str() == "-" {
             console.remark(format!(
