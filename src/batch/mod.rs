@@ -29,6 +29,7 @@ use rayon::prelude::*;
 use serde::Serialize;
 
 use crate::error::{Error, Result};
+use crate::output;
 use crew::{Crew, Job, Watch};
 use find::Found;
 use lock::Lock;
@@ -191,6 +192,10 @@ impl From<&[Planned]> for Intentions {
 pub fn run(options: &Options, watch: &dyn Watch) -> Result<Tally> {
     std::fs::create_dir_all(&options.output).map_err(|e| Error::unwritable(&options.output, e))?;
     let _lock = Lock::take(&options.output, options.shard)?;
+    if options.shard.is_none() {
+        // of a batch that was ended while it wrote its summary
+        output::remove_left_temporaries(&options.output);
+    }
     let planned = plan(options)?;
     let jobs: Vec<Job<'_>> = planned
         .iter()
