@@ -236,7 +236,10 @@ fn every_option_that_a_page_names_exists() {
         let output = Command::new(cargo_bin(program)).args(command).arg("--help").output().unwrap();
         String::from_utf8(output.stdout).unwrap()
     };
-    let commands = ["init", "track", "identify", "fit", "diagnose", "simulate", "render", "modes", "paper"];
+    let commands = [
+        "init", "track", "identify", "fit", "diagnose", "simulate", "render", "modes", "paper", "run", "batch",
+        "report", "export", "doctor",
+    ];
     let help: String = commands.iter().map(|command| help("freeswing", &[command])).collect();
     for name in pages() {
         let text = prose(&page(&name));
@@ -249,7 +252,16 @@ fn every_option_that_a_page_names_exists() {
 
 #[test]
 fn no_page_has_examples_that_are_not_run() {
-    let run = ["README", "first-recording", "filming", "experiment-file", "outputs", "troubleshooting", "diagnosis"];
+    let run = [
+        "README",
+        "first-recording",
+        "filming",
+        "experiment-file",
+        "outputs",
+        "folders",
+        "troubleshooting",
+        "diagnosis",
+    ];
     for name in pages() {
         let has_examples = blocks(&page(&name)).iter().any(|(mark, _)| *mark == "sh");
         let stem = Path::new(&name).file_stem().unwrap().to_str().unwrap();
