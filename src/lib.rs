@@ -52,8 +52,8 @@ pub mod diagnose;
 pub mod paper;
 pub mod report;
 pub mod synth;
-pub mod batch;
 pub mod export;
+pub mod batch;
 #[doc(hidden)]
 pub mod cli;
 

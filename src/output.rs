@@ -136,6 +136,11 @@ impl OutputFile {
     }
 }
 
+/// Whether two paths lead to one file, or folder, that is there.
+pub fn is_same_file(a: &Path, b: &Path) -> bool {
+    a.canonicalize().is_ok_and(|a| b.canonicalize().is_ok_and(|b| a == b))
+}
+
 /// A copy of a file, whole or not at all.
 ///
 /// # Errors

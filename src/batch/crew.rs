@@ -103,15 +103,9 @@ impl Crew<'_> {
         }
         // what has no fingerprint is done again the next time
         let is_final = unchanged && !matches!(ended, Ended::Killed(_));
-        let unknown = Fingerprint {
-            recording_sha256: String::new(),
-            config_sha256: String::new(),
-            words: Vec::new(),
-            version: String::new(),
-        };
         let finished = Finished {
             schema: "freeswing.run/1".to_owned(),
-            fingerprint: fingerprint.ok().filter(|_| is_final).unwrap_or(unknown),
+            fingerprint: fingerprint.ok().filter(|_| is_final).unwrap_or_default(),
             status: if matches!(ended, Ended::Well) { Status::Done } else { Status::Failed },
             reason: ended.reason(),
         };

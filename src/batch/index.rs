@@ -8,6 +8,7 @@ use super::summary::Row;
 use crate::digits;
 use crate::error::Result;
 use crate::output::OutputFile;
+use crate::report::html::escaped;
 use crate::series::AngleSeries;
 
 /// Beyond so many rows the page has no pictures: with them it would take a browser longer than a person waits.
@@ -199,11 +200,6 @@ fn swing(table: &Path, name: &str) -> String {
         digits::number(largest.to_degrees(), 3),
         points.join(" ")
     )
-}
-
-fn escaped(text: &str) -> String {
-    let text: String = text.chars().filter(|c| !c.is_control()).collect();
-    text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;").replace('"', "&quot;")
 }
 
 /// A path as an address relative to the page.

@@ -58,6 +58,12 @@ impl Layered {
     }
 }
 
+/// The specimen's name in the text of an experiment file.
+pub fn specimen_name(text: &str) -> Option<String> {
+    let table: Table = toml::from_str(text).ok()?;
+    Some(table.get("specimen")?.get("name")?.as_str()?.to_owned())
+}
+
 fn read(path: &Path) -> Result<Table> {
     let text = std::fs::read_to_string(path).map_err(|e| Error::unreadable(path, e))?;
     let mut table: Table = toml::from_str(&text).map_err(|error: toml::de::Error| Error::Config {

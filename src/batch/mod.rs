@@ -197,14 +197,7 @@ pub fn run(options: &Options, watch: &dyn Watch) -> Result<Tally> {
         output::remove_left_temporaries(&options.output);
     }
     let planned = plan(options)?;
-    let jobs: Vec<Job<'_>> = planned
-        .iter()
-        .filter(|planned| matches!(planned.plan, Plan::Run))
-        .map(|planned| options.job(planned))
-        .collect();
-    watch.begin("recordings", planned.len(), jobs.len());
-    Crew { options, watch }.run(jobs)?;
-    let rows = planned.par_iter().map(|planned| options.row(planned)).collect::<Vec<Row>>();
+    let rows = options.carry_out("recordings", &planned, watch)?;
     if options.shard.is_none() {
         let specimens = options.together(planned, watch)?;
         summary::write(&options.output, &rows)?;
@@ -215,6 +208,15 @@ pub fn run(options: &Options, watch: &dyn Watch) -> Result<Tally> {
 }
 
 impl Options {
+    /// Runs what is to be run; a row each of all.
+    fn carry_out(&self, what: &'static str, planned: &[Planned], watch: &dyn Watch) -> Result<Vec<Row>> {
+        let to_run = planned.iter().filter(|planned| matches!(planned.plan, Plan::Run));
+        let jobs: Vec<Job<'_>> = to_run.map(|planned| self.job(planned)).collect();
+        watch.begin(what, planned.len(), jobs.len());
+        Crew { options: self, watch }.run(jobs)?;
+        Ok(planned.par_iter().map(|planned| self.row(planned)).collect())
+    }
+
     fn job<'p>(&self, planned: &'p Planned) -> Job<'p> {
         Job { found: &planned.found, folder: self.folder_of(&planned.found), bytes: planned.found.bytes() }
     }
@@ -231,11 +233,7 @@ impl Options {
             Planned { found, plan: finished.map_or(Plan::Run, Plan::Finished) }
         };
         let planned: Vec<Planned> = specimens.into_iter().map(plan).collect();
-        let to_run = planned.iter().filter(|planned| matches!(planned.plan, Plan::Run));
-        let jobs: Vec<Job<'_>> = to_run.map(|planned| self.job(planned)).collect();
-        watch.begin("specimens", planned.len(), jobs.len());
-        Crew { options: self, watch }.run(jobs)?;
-        Ok(planned.iter().map(|planned| self.row(planned)).collect())
+        self.carry_out("specimens", &planned, watch)
     }
 
     /// The row of a recording, from what stands in its folder.

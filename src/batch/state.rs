@@ -14,7 +14,7 @@ use crate::output::OutputFile;
 pub const FILE: &str = "run.json";
 
 /// How a run ended.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Status {
     /// Every stage.
@@ -22,6 +22,7 @@ pub enum Status {
     /// A stage ended with an error.
     Failed,
     /// It was not run.
+    #[default]
     Skipped,
 }
 
@@ -37,7 +38,7 @@ impl Status {
 }
 
 /// What a result depends on.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Fingerprint {
     /// Of the recording: SHA-256 of a file; of stills that of all in order; of several tables that of their digests.
     pub recording_sha256: String,

@@ -4,21 +4,17 @@
 //! and how often the work broke off do not show.
 
 use std::path::Path;
-use std::sync::Arc;
 
-use parquet::data_type::{ByteArray, ByteArrayType, DoubleType, Int64Type};
-use parquet::file::properties::WriterProperties;
-use parquet::file::writer::{SerializedFileWriter, SerializedRowGroupWriter};
-use parquet::schema::parser::parse_message_type;
-use serde_json::Value;
-
+use super::layers::specimen_name;
 use super::state::{Finished, Status};
 use crate::digits;
 use crate::error::{Error, Result};
+use crate::export::parquet::{self as columnar, Cells};
 use crate::output::OutputFile;
+use crate::report::left::{Diagnosed, Fitted, Identified, Mode, Track, report_of};
 
 /// A row of the summary. What was not found out is missing.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, Default, PartialEq)]
 pub struct Row {
     /// Path below the input folder.
     pub recording: String,
@@ -75,6 +71,20 @@ enum Cell {
     Number(Option<f64>),
 }
 
+impl Cell {
+    fn text(self) -> Option<String> {
+        if let Self::Text(text) = self { text } else { None }
+    }
+
+    fn count(self) -> Option<i64> {
+        if let Self::Count(count) = self { count } else { None }
+    }
+
+    fn number(self) -> Option<f64> {
+        if let Self::Number(number) = self { number } else { None }
+    }
+}
+
 impl Row {
     /// Of a recording that was not run.
     pub fn skipped(name: &str, reason: &str) -> Self {
@@ -83,66 +93,49 @@ impl Row {
 
     /// Of a run, from what it left in a folder.
     pub fn of(name: &str, folder: &Path, finished: &Finished) -> Self {
-        let [angles, identified, fit, diagnosis] =
-            ["angles.json", "identify.json", "fit.json", "diagnosis.json"].map(|file| Json::read(&folder.join(file)));
-        let text = |text: &String| (!text.is_empty()).then(|| text.clone());
-        let modes = Modes::of(&identified);
-        let parameter = |id: &str| fit.number(&["parameters", id, "value"]);
-        let held_out = |which: &str| diagnosis.root_mean_square(&["heldout", which]);
+        let track: Option<Track> = report_of(&folder.join("angles.json"));
+        let identified: Option<Identified> = report_of(&folder.join("identify.json"));
+        let fit: Fitted = report_of(&folder.join("fit.json")).unwrap_or_default();
+        let diagnosis: Diagnosed = report_of(&folder.join("diagnosis.json")).unwrap_or_default();
+        let rows = identified.as_ref().map(|own| own.record.rows);
+        let frames = track.map(|own| own.time_stamps.frames).or(rows).map(|count| count as i64);
+        let identified = identified.unwrap_or_default();
+        // the slowest mode and the strongest of the others
+        let slowest = identified.swing_mode.unwrap_or(1);
+        let first = identified.modes.iter().find(|mode| mode.number == slowest);
+        let second = identified.modes.iter().find(|mode| mode.number != slowest);
+        let frequency = |mode: Option<&Mode>| mode.map(|mode| mode.frequency_hz);
+        let damping = |mode: Option<&Mode>| mode.and_then(|mode| mode.damping.identified);
+        let equivalents = identified.equivalents.unwrap_or_default();
+        let parameter = |id: &str| fit.parameters.get(id).and_then(|own| own.value);
+        let held_out = diagnosis.heldout.unwrap_or_default();
         Self {
-            specimen: specimen_of(folder),
-            frames: angles
-                .number(&["time_stamps", "frames"])
-                .or_else(|| identified.number(&["record", "rows"]))
-                .map(|n| n as i64),
-            duration_s: identified.number(&["record", "duration_s"]),
-            f1_hz: modes.first(&["frequency_hz", "value"]),
-            f1_sd_hz: modes.first(&["frequency_hz", "sd"]),
-            zeta1: modes.first(&["damping", "identified", "value"]),
-            zeta1_sd: modes.first(&["damping", "identified", "sd"]),
-            f2_hz: modes.second(&["frequency_hz", "value"]),
-            zeta2: modes.second(&["damping", "identified", "value"]),
-            k_eq_n_per_m: identified.number(&["equivalents", "k_eq_n_per_m", "value"]),
-            c_eq_n_s_per_m: identified.number(&["equivalents", "c_eq_n_s_per_m", "value"]),
+            specimen: std::fs::read_to_string(folder.join("experiment.toml")).ok().as_deref().and_then(specimen_name),
+            frames,
+            duration_s: identified.record.duration_s,
+            f1_hz: frequency(first).and_then(|own| own.value),
+            f1_sd_hz: frequency(first).and_then(|own| own.sd),
+            zeta1: damping(first).and_then(|own| own.value),
+            zeta1_sd: damping(first).and_then(|own| own.sd),
+            f2_hz: frequency(second).and_then(|own| own.value),
+            zeta2: damping(second).and_then(|own| own.value),
+            k_eq_n_per_m: equivalents.k_eq_n_per_m.value,
+            c_eq_n_s_per_m: equivalents.c_eq_n_s_per_m.and_then(|own| own.value),
             k_n_m_per_rad: parameter("k_eq_n_m_per_rad"),
             c_n_m_s_per_rad: parameter("c_eq_n_m_s_per_rad"),
-            verdict: diagnosis.text(&["verdict", "status"]),
-            effects: diagnosis.texts(&["verdict", "effects"]),
-            probability: diagnosis.number(&["verdict", "probability"]),
-            heldout_before_rad: held_out("baseline_rmse_rad"),
-            heldout_after_rad: held_out("augmented_rmse_rad"),
-            sha256: text(&finished.fingerprint.recording_sha256),
-            version: text(&finished.fingerprint.version),
+            verdict: word(&diagnosis.verdict.status),
+            effects: word(&diagnosis.verdict.effects.join("+")),
+            probability: diagnosis.verdict.probability,
+            heldout_before_rad: root_mean_square(&held_out.baseline_rmse_rad),
+            heldout_after_rad: root_mean_square(&held_out.augmented_rmse_rad),
+            sha256: word(&finished.fingerprint.recording_sha256),
+            version: word(&finished.fingerprint.version),
             ..Self::empty(name, finished.status, &finished.reason)
         }
     }
 
     fn empty(name: &str, status: Status, reason: &str) -> Self {
-        Self {
-            recording: name.to_owned(),
-            status,
-            reason: reason.to_owned(),
-            specimen: None,
-            frames: None,
-            duration_s: None,
-            f1_hz: None,
-            f1_sd_hz: None,
-            zeta1: None,
-            zeta1_sd: None,
-            f2_hz: None,
-            zeta2: None,
-            k_eq_n_per_m: None,
-            c_eq_n_s_per_m: None,
-            k_n_m_per_rad: None,
-            c_n_m_s_per_rad: None,
-            verdict: None,
-            effects: None,
-            probability: None,
-            heldout_before_rad: None,
-            heldout_after_rad: None,
-            sha256: None,
-            version: None,
-        }
+        Self { recording: name.to_owned(), status, reason: reason.to_owned(), ..Self::default() }
     }
 
     /// The columns in order.
@@ -176,73 +169,16 @@ impl Row {
     }
 }
 
-/// A report of an earlier stage, of which single values are wanted. What is not there is missing.
-struct Json(Value);
-
-impl Json {
-    fn read(path: &Path) -> Self {
-        let text = std::fs::read_to_string(path).unwrap_or_default();
-        Self(serde_json::from_str(&text).unwrap_or_default())
-    }
-
-    fn at(&self, keys: &[&str]) -> &Value {
-        at(&self.0, keys)
-    }
-
-    fn number(&self, keys: &[&str]) -> Option<f64> {
-        self.at(keys).as_f64()
-    }
-
-    fn text(&self, keys: &[&str]) -> Option<String> {
-        self.at(keys).as_str().map(str::to_owned)
-    }
-
-    /// Words of a list, with `+` between them.
-    fn texts(&self, keys: &[&str]) -> Option<String> {
-        let words: Vec<&str> = self.at(keys).as_array()?.iter().filter_map(Value::as_str).collect();
-        (!words.is_empty()).then(|| words.join("+"))
-    }
-
-    fn root_mean_square(&self, keys: &[&str]) -> Option<f64> {
-        let values: Vec<f64> = self.at(keys).as_array()?.iter().filter_map(Value::as_f64).collect();
-        let mean = values.iter().map(|value| value * value).sum::<f64>() / values.len() as f64;
-        mean.is_finite().then(|| mean.sqrt())
-    }
+/// Root mean square of the values that there are.
+fn root_mean_square(values: &[Option<f64>]) -> Option<f64> {
+    let values: Vec<f64> = values.iter().copied().flatten().collect();
+    let mean = values.iter().map(|value| value * value).sum::<f64>() / values.len() as f64;
+    mean.is_finite().then(|| mean.sqrt())
 }
 
-/// The specimen's name in the experiment file that a run has left.
-fn specimen_of(folder: &Path) -> Option<String> {
-    let text = std::fs::read_to_string(folder.join("experiment.toml")).ok()?;
-    let table: toml::Table = toml::from_str(&text).ok()?;
-    Some(table.get("specimen")?.get("name")?.as_str()?.to_owned())
-}
-
-fn at<'v>(value: &'v Value, keys: &[&str]) -> &'v Value {
-    keys.iter().fold(value, |value, key| &value[*key])
-}
-
-/// The slowest mode and the strongest of the others.
-struct Modes<'j> {
-    first: Option<&'j Value>,
-    second: Option<&'j Value>,
-}
-
-impl<'j> Modes<'j> {
-    fn of(identified: &'j Json) -> Self {
-        let all: Vec<&Value> = identified.at(&["modes"]).as_array().into_iter().flatten().collect();
-        let swing = identified.number(&["swing_mode"]).unwrap_or(1.0);
-        let is_first = |mode: &&&Value| mode["number"].as_f64() == Some(swing);
-        let first = all.iter().find(is_first).copied();
-        Self { first, second: all.iter().find(|mode| !is_first(mode)).copied() }
-    }
-
-    fn first(&self, keys: &[&str]) -> Option<f64> {
-        at(self.first?, keys).as_f64()
-    }
-
-    fn second(&self, keys: &[&str]) -> Option<f64> {
-        at(self.second?, keys).as_f64()
-    }
+/// What is no empty word.
+fn word(text: &str) -> Option<String> {
+    (!text.is_empty()).then(|| text.to_owned())
 }
 
 /// Writes both tables into a folder.
@@ -258,7 +194,7 @@ pub fn write(folder: &Path, rows: &[Row]) -> Result<()> {
 
 fn csv(rows: &[Row]) -> Vec<u8> {
     let mut writer = csv::Writer::from_writer(Vec::new());
-    let header: Vec<&str> = Row::skipped("", "").cells().into_iter().map(|(name, _)| name).collect();
+    let header: Vec<&str> = Row::default().cells().into_iter().map(|(name, _)| name).collect();
     // a vector takes all that is written
     let _ = writer.write_record(&header);
     for row in rows {
@@ -273,51 +209,17 @@ fn csv(rows: &[Row]) -> Vec<u8> {
 }
 
 fn parquet(rows: &[Row]) -> parquet::errors::Result<Vec<u8>> {
-    let column = |(name, cell): (&str, Cell)| match cell {
-        Cell::Text(_) => format!("optional binary {name} (UTF8);"),
-        Cell::Count(_) => format!("optional int64 {name};"),
-        Cell::Number(_) => format!("optional double {name};"),
-    };
-    let columns: Vec<String> = Row::skipped("", "").cells().into_iter().map(column).collect();
-    let schema = parse_message_type(&format!("message summary {{ {} }}", columns.join(" ")))?;
-    let mut bytes = Vec::new();
-    let mut file = SerializedFileWriter::new(&mut bytes, Arc::new(schema), Arc::new(WriterProperties::default()))?;
-    let mut group = file.next_row_group()?;
-    let mut cells: Vec<_> = rows.iter().map(|row| row.cells().into_iter()).collect();
-    for _ in 0..columns.len() {
-        let column: Vec<Cell> = cells.iter_mut().filter_map(|row| row.next()).map(|(_, cell)| cell).collect();
-        write_column(&mut group, column)?;
-    }
-    group.close()?;
-    file.close()?;
-    Ok(bytes)
-}
-
-/// One column: which rows have a value, and these values.
-fn write_column<W: std::io::Write + Send>(
-    group: &mut SerializedRowGroupWriter<'_, W>,
-    cells: Vec<Cell>,
-) -> parquet::errors::Result<()> {
-    let Some(mut column) = group.next_column()? else { return Ok(()) };
-    let (mut present, mut texts, mut counts, mut numbers) = (Vec::new(), Vec::new(), Vec::new(), Vec::new());
-    let is_text = matches!(cells.first(), Some(Cell::Text(_)));
-    let is_count = matches!(cells.first(), Some(Cell::Count(_)));
-    for cell in cells {
-        let has_value = match cell {
-            Cell::Text(value) => value.map(|value| texts.push(ByteArray::from(value.into_bytes()))).is_some(),
-            Cell::Count(value) => value.map(|value| counts.push(value)).is_some(),
-            Cell::Number(value) => value.map(|value| numbers.push(value)).is_some(),
+    let mut left: Vec<_> = rows.iter().map(|row| row.cells().into_iter()).collect();
+    let column = |(name, kind): (&'static str, Cell)| {
+        let cells = left.iter_mut().filter_map(Iterator::next).map(|(_, cell)| cell);
+        let cells = match kind {
+            Cell::Text(_) => Cells::Texts(cells.map(Cell::text).collect()),
+            Cell::Count(_) => Cells::Counts(cells.map(Cell::count).collect()),
+            Cell::Number(_) => Cells::Numbers(cells.map(Cell::number).collect()),
         };
-        present.push(i16::from(has_value));
-    }
-    if is_text {
-        column.typed::<ByteArrayType>().write_batch(&texts, Some(&present), None)?;
-    } else if is_count {
-        column.typed::<Int64Type>().write_batch(&counts, Some(&present), None)?;
-    } else {
-        column.typed::<DoubleType>().write_batch(&numbers, Some(&present), None)?;
-    }
-    column.close()
+        (name.to_owned(), cells)
+    };
+    columnar::bytes("summary", Row::default().cells().into_iter().map(column).collect())
 }
 
 #[cfg(test)]

@@ -56,9 +56,7 @@ fn specimen(own: &Found) -> Option<String> {
 
 /// The specimen's name as that of a folder.
 fn named(config: &str) -> String {
-    let table: Option<Table> = toml::from_str(config).ok();
-    let name = table.and_then(|table| Some(table.get("specimen")?.get("name")?.as_str()?.to_owned()));
-    let name: String = name
+    let name: String = layers::specimen_name(config)
         .unwrap_or_default()
         .chars()
         .map(|c| if c.is_alphanumeric() || "-_.".contains(c) { c } else { '_' })

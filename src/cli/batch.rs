@@ -12,13 +12,13 @@ use indicatif::{MultiProgress, ProgressBar, ProgressStyle};
 
 use super::Console;
 use super::bar::{self, Bar};
-use super::run::Stage;
+use super::run::{Extent, Stage};
 use super::table::Table;
 use crate::batch::crew::Watch;
 use crate::batch::state::{Finished, Status};
 use crate::batch::{self, Intentions, Options, Plan, Planned, Shard, Tally};
 use crate::error::{Error, Result};
-use crate::output::OutputFile;
+use crate::output::{OutputFile, is_same_file};
 use crate::progress::{Heard, Progress};
 
 /// Run every recording and every table of angles below a folder, and sum them up.
@@ -42,12 +42,8 @@ pub struct BatchArgs {
     /// The folder for the results.
     #[arg(long, value_name = "DIR")]
     out: PathBuf,
-    /// The last stage of each run.
-    #[arg(long, value_name = "STAGE", default_value = "report")]
-    until: Stage,
-    /// No overlay.mp4, which takes about as long as the tracking.
-    #[arg(long)]
-    no_overlay: bool,
+    #[command(flatten)]
+    extent: Extent,
     /// Only recordings whose path below the folder matches, such as '2024-*/**' or '*.mp4' ('*' stands for no '/').
     #[arg(long, value_name = "GLOB")]
     only: Option<String>,
@@ -108,16 +104,11 @@ impl BatchArgs {
 
     fn options(&self) -> Result<Options> {
         let refused = |option: &str, message: String| Error::Option { option: option.to_owned(), message };
-        let same = |a: &PathBuf, b: &PathBuf| a.canonicalize().is_ok_and(|a| b.canonicalize().is_ok_and(|b| a == b));
-        if same(&self.folder, &self.out) {
+        if is_same_file(&self.folder, &self.out) {
             return Err(refused("--out", "must be another folder than the recordings'".to_owned()));
         }
         let glob = |text: &String| GlobBuilder::new(text).literal_separator(true).build();
         let only = self.only.as_ref().map(glob).transpose().map_err(|e| refused("--only", e.to_string()))?;
-        let until =
-            clap::ValueEnum::to_possible_value(&self.until).map_or(String::new(), |own| own.get_name().to_owned());
-        let mut words = vec!["--until".to_owned(), until];
-        words.extend(self.no_overlay.then(|| "--no-overlay".to_owned()));
         let all = std::thread::available_parallelism().map_or(1, usize::from);
         Ok(Options {
             input: self.folder.clone(),
@@ -126,8 +117,8 @@ impl BatchArgs {
             retry_failed: self.retry_failed,
             shard: self.shard,
             cores: self.jobs.map_or(all, usize::from),
-            words,
-            fits: self.until >= Stage::Fit,
+            words: self.extent.words(),
+            fits: self.extent.until >= Stage::Fit,
             program: std::env::current_exe().map_err(|e| Error::unreadable("freeswing".as_ref(), e))?,
         })
     }

@@ -5,6 +5,7 @@ use std::path::PathBuf;
 use super::Console;
 use crate::error::{Error, Result};
 use crate::export::{self, Format};
+use crate::output::is_same_file;
 
 /// Write a table of angles as Parquet, MATLAB, SEP005 or HDF5.
 #[derive(Debug, clap::Args)]
@@ -31,7 +32,7 @@ impl ExportArgs {
     /// One line: what, where, what to do.
     pub fn run(&self, _console: &Console) -> Result<()> {
         let format = Format::of(&self.out)?;
-        if self.angles.canonicalize().is_ok_and(|input| self.out.canonicalize().is_ok_and(|out| input == out)) {
+        if is_same_file(&self.angles, &self.out) {
             let message = format!("{} is the input and would be overwritten; use another name", self.out.display());
             return Err(Error::Option { option: "--out".to_owned(), message });
         }

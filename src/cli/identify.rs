@@ -6,7 +6,7 @@ use super::Console;
 use crate::error::{Error, Result};
 use crate::experiment::Experiment;
 use crate::identify::identify;
-use crate::output::OutputFile;
+use crate::output::{OutputFile, is_same_file};
 use crate::series::AngleSeries;
 
 /// Find frequencies, damping and mode shapes in a table of angles, every estimator side by side.
@@ -80,9 +80,8 @@ impl IdentifyArgs {
 
     /// The output may not take the place of an input.
     fn keep_inputs(&self) -> Result<()> {
-        let same = |a: &PathBuf, b: &PathBuf| a.canonicalize().is_ok_and(|a| b.canonicalize().is_ok_and(|b| a == b));
         let Some(json) = &self.json else { return Ok(()) };
-        if [Some(&self.angles), self.config.as_ref()].into_iter().flatten().any(|input| same(input, json)) {
+        if [Some(&self.angles), self.config.as_ref()].into_iter().flatten().any(|input| is_same_file(input, json)) {
             let message = format!("{} is an input and would be overwritten; use another name", json.display());
             return Err(Error::Option { option: "--json".to_owned(), message });
         }

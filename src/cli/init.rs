@@ -6,7 +6,7 @@ use super::Console;
 use crate::error::{Error, Result};
 use crate::look::{Finding, look, preview, to_toml};
 use crate::measure::Options;
-use crate::output::OutputFile;
+use crate::output::{OutputFile, is_same_file};
 
 /// Look at a recording and write a starting experiment file.
 #[derive(Debug, clap::Args)]
@@ -66,8 +66,7 @@ impl InitArgs {
 
     /// The recording is never written over, nor is one output by the other; the preview is a PNG.
     fn keep_inputs(&self) -> Result<()> {
-        let same =
-            |a: &Path, b: &Path| a == b || a.canonicalize().is_ok_and(|a| b.canonicalize().is_ok_and(|b| a == b));
+        let same = |a: &Path, b: &Path| a == b || is_same_file(a, b);
         let refused = |option: &str, message: String| Err(Error::Option { option: option.to_owned(), message });
         for (option, target) in [("--out", Some(&self.out)), ("--preview", self.preview.as_ref())] {
             if let Some(target) = target.filter(|target| same(target, &self.video)) {

@@ -33,12 +33,8 @@ pub struct RunArgs {
     /// The folder for all of it.
     #[arg(long, value_name = "DIR")]
     out: PathBuf,
-    /// The last stage.
-    #[arg(long, value_name = "STAGE", default_value = "report")]
-    until: Stage,
-    /// No overlay.mp4, which takes about as long as the tracking.
-    #[arg(long)]
-    no_overlay: bool,
+    #[command(flatten)]
+    extent: Extent,
     /// Cores to use; all by default.
     #[arg(long, value_name = "N")]
     threads: Option<usize>,
@@ -48,6 +44,26 @@ pub struct RunArgs {
     /// Progress as lines of JSON on standard output, for a program that watches.
     #[arg(long, hide = true)]
     watched: bool,
+}
+
+/// How far a run goes, and with what.
+#[derive(Debug, clap::Args)]
+pub struct Extent {
+    /// The last stage of a run.
+    #[arg(long, value_name = "STAGE", default_value = "report")]
+    pub until: Stage,
+    /// No overlay.mp4, which takes about as long as the tracking.
+    #[arg(long)]
+    pub no_overlay: bool,
+}
+
+impl Extent {
+    /// The same as words of a command.
+    pub fn words(&self) -> Vec<String> {
+        let until = self.until.to_possible_value().map_or(String::new(), |own| own.get_name().to_owned());
+        let no_overlay = self.no_overlay.then(|| "--no-overlay".to_owned());
+        ["--until".to_owned(), until].into_iter().chain(no_overlay).collect()
+    }
 }
 
 /// A stage of a run, in order.
@@ -103,7 +119,7 @@ impl RunArgs {
             console.log(&format!("error: {error}"));
         }
         // the page shows how far it came, and why not further
-        let page = if self.until == Stage::Report { self.stage(Stage::Report, &console) } else { Ok(()) };
+        let page = if self.extent.until == Stage::Report { self.stage(Stage::Report, &console) } else { Ok(()) };
         outcome.and(page)?;
         if self.shown() == Shown::OnTerminal {
             Console::default().print(&format!("{}\n", self.done()))?;
@@ -113,7 +129,7 @@ impl RunArgs {
 
     /// Every stage before the page.
     fn stages(&self, console: &Console) -> Result<()> {
-        let wanted = Stage::ALL.into_iter().filter(|stage| *stage <= self.until && *stage != Stage::Report);
+        let wanted = Stage::ALL.into_iter().filter(|stage| *stage <= self.extent.until && *stage != Stage::Report);
         for stage in wanted {
             if self.config.is_none() && stage > Stage::Identify {
                 console.warning("fit and diagnose need the specimen: give --config");
@@ -162,7 +178,7 @@ impl RunArgs {
                 }
                 all.extend(words(&["track", &path_text(&self.recordings[0])?, "--out", &own("angles.csv")?]));
                 all.extend(config());
-                if !self.no_overlay {
+                if !self.extent.no_overlay {
                     // so much fits into a page
                     all.extend(words(&["--overlay", &own("overlay.mp4")?, "--overlay-mb", "5"]));
                 }
@@ -204,8 +220,7 @@ impl RunArgs {
         let kept = self.own_config();
         for output in OUTPUTS.map(|name| self.out.join(name)).into_iter().filter(|output| kept.as_ref() != Some(output))
         {
-            let Ok(output) = output.canonicalize() else { continue };
-            if inputs.iter().any(|input| input.canonicalize().is_ok_and(|input| input == output)) {
+            if inputs.iter().any(|input| output::is_same_file(input, &output)) {
                 let message = format!("{} is an input and would be overwritten; give another folder", output.display());
                 return Err(Error::Option { option: "--out".to_owned(), message });
             }
@@ -261,7 +276,7 @@ impl RunArgs {
     /// The configuration in the folder itself, if it is that.
     fn own_config(&self) -> Option<PathBuf> {
         let own = self.out.join("experiment.toml");
-        let is_own = self.config.as_ref()?.canonicalize().ok()? == own.canonicalize().ok()?;
+        let is_own = output::is_same_file(self.config.as_ref()?, &own);
         is_own.then_some(own)
     }
 
@@ -274,7 +289,7 @@ impl RunArgs {
     }
 
     fn done(&self) -> String {
-        let last = match self.until {
+        let last = match self.extent.until {
             Stage::Report => "report.html",
             _ => LOG,
         };

@@ -11,7 +11,7 @@ use crate::detect::debug::DebugFolder;
 use crate::error::{Error, Result};
 use crate::experiment::{Experiment, MarkColour};
 use crate::measure::{Measurement, Options, Session, Steadying};
-use crate::output::OutputFile;
+use crate::output::{OutputFile, is_same_file};
 use crate::overlay::{self, Overlay};
 use crate::sidecar::Sidecar;
 use crate::video::{Recording, StillTimes};
@@ -274,10 +274,9 @@ impl TrackArgs {
         }
         let inputs = [Some(&self.video), self.config.as_ref(), self.times.as_ref()];
         let outputs = [("--out", Some(&self.out)), ("--out", beside.as_ref()), ("--overlay", self.overlay.as_ref())];
-        let same = |a: &Path, b: &Path| a.canonicalize().is_ok_and(|a| b.canonicalize().is_ok_and(|b| a == b));
         for (name, output) in outputs {
             let Some(output) = output else { continue };
-            if inputs.iter().flatten().any(|input| same(input, output)) {
+            if inputs.iter().flatten().any(|input| is_same_file(input, output)) {
                 let message = format!("{} is an input and would be overwritten; use another name", output.display());
                 return Err(option(name, &message));
             }

@@ -5,13 +5,14 @@
 #[cfg(feature = "hdf5")]
 mod hdf5;
 mod matlab;
-mod parquet;
+pub mod parquet;
 mod sep005;
 
 use std::path::Path;
 
 use crate::error::{Error, Result};
 use crate::output::OutputFile;
+use parquet::Cells;
 
 /// A column of a table.
 #[derive(Debug, Clone, PartialEq)]
@@ -29,6 +30,17 @@ pub enum Values {
     Numbers(Vec<f64>),
     /// Words, such as flags.
     Texts(Vec<String>),
+}
+
+impl Column {
+    /// Its name and its values, a missing number absent.
+    fn cells(&self) -> (String, Cells) {
+        let cells = match &self.values {
+            Values::Numbers(numbers) => Cells::Numbers(numbers.iter().map(|v| (!v.is_nan()).then_some(*v)).collect()),
+            Values::Texts(texts) => Cells::Texts(texts.iter().cloned().map(Some).collect()),
+        };
+        (self.name.clone(), cells)
+    }
 }
 
 /// A format, by the extension of the file.
@@ -110,7 +122,8 @@ pub fn read(path: &Path) -> Result<Vec<Column>> {
 pub fn write(columns: &[Column], path: &Path, format: Format) -> Result<()> {
     let failed = |error: String| Error::unwritable(path, std::io::Error::other(error));
     let bytes = match format {
-        Format::Parquet => parquet::bytes(columns).map_err(|error| failed(error.to_string()))?,
+        Format::Parquet => parquet::bytes("angles", columns.iter().map(Column::cells).collect())
+            .map_err(|error| failed(error.to_string()))?,
         Format::Matlab => matlab::bytes(columns),
         Format::Sep005 => sep005::bytes(columns),
         #[cfg(feature = "hdf5")]

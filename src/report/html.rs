@@ -2,6 +2,8 @@
 
 use std::fmt::Write;
 
+use base64::prelude::{BASE64_STANDARD, Engine};
+
 use super::left::Interval;
 use crate::digits::number;
 
@@ -157,16 +159,7 @@ pub fn verbatim(text: &str) -> String {
 
 /// Bytes as base64, for `data:` addresses.
 pub fn base64(bytes: &[u8]) -> String {
-    const SIGNS: &[u8; 64] = b"ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
-    let mut text = String::with_capacity(bytes.len().div_ceil(3) * 4);
-    for three in bytes.chunks(3) {
-        let bits = three.iter().fold(0u32, |bits, b| bits << 8 | u32::from(*b)) << (8 * (3 - three.len()));
-        for k in 0..4 {
-            let sign = char::from(SIGNS[(bits >> (18 - 6 * k) & 63) as usize]);
-            text.push(if k <= three.len() { sign } else { '=' });
-        }
-    }
-    text
+    BASE64_STANDARD.encode(bytes)
 }
 
 #[cfg(test)]

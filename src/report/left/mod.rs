@@ -2,16 +2,30 @@
 //!
 //! Of the JSON files only the fields that the page shows are read. A field that is absent leaves its line out, a file of another format its part.
 
-use std::collections::BTreeMap;
+mod diagnosed;
+mod fitted;
+mod identified;
+mod tracked;
+
 use std::path::{Path, PathBuf};
 
 use serde::Deserialize;
 use serde::de::DeserializeOwned;
-use sha2::{Digest, Sha256};
 
 use super::curves::Curves;
+use crate::digest;
 use crate::error::{Error, Result};
 use crate::series::AngleSeries;
+
+pub use diagnosed::{Candidate, Diagnosed, Law, Remainder, Verdict};
+pub use fitted::{FitSide, Fitted};
+pub use identified::{Estimator, Identified, Mode, Step};
+pub use tracked::Track;
+
+/// A report of a stage from a folder, of which single values are wanted; nothing where there is none, or none that can be read.
+pub fn report_of<T: DeserializeOwned>(path: &Path) -> Option<T> {
+    serde_json::from_slice(&std::fs::read(path).ok()?).ok()
+}
 
 /// Everything in the folder that the page can show.
 #[derive(Debug, Default)]
@@ -65,404 +79,6 @@ pub struct Interval {
     pub sd: Option<f64>,
     pub low: Option<f64>,
     pub high: Option<f64>,
-}
-
-/// `angles.json`.
-#[derive(Debug, Default, Deserialize)]
-#[serde(default)]
-pub struct Track {
-    pub version: String,
-    pub source: Source,
-    pub options: TrackOptions,
-    pub video: Video,
-    pub time_stamps: TimeStamps,
-    pub angles: Vec<TrackedAngle>,
-    pub warnings: Vec<String>,
-}
-
-/// The recording.
-#[derive(Debug, Default, Deserialize)]
-#[serde(default)]
-pub struct Source {
-    pub file: String,
-    pub bytes: u64,
-    pub sha256: String,
-}
-
-/// What of the options moves the clock.
-#[derive(Debug, Default, Deserialize)]
-#[serde(default)]
-pub struct TrackOptions {
-    pub time_scale: Option<f64>,
-    pub mirrored: bool,
-}
-
-/// The stream.
-#[derive(Debug, Default, Deserialize)]
-#[serde(default)]
-pub struct Video {
-    pub container: String,
-    pub codec: String,
-    pub width_px: u64,
-    pub height_px: u64,
-}
-
-/// The audit of the time stamps.
-#[derive(Debug, Default, Deserialize)]
-#[serde(default)]
-pub struct TimeStamps {
-    pub frames: usize,
-    pub first_s: f64,
-    pub last_s: f64,
-    pub nominal_rate_hz: Option<f64>,
-    pub real_rate_hz: Option<f64>,
-    pub median_step_s: f64,
-    pub shortest_step_s: f64,
-    pub longest_step_s: f64,
-    pub jitter_sd_s: f64,
-    pub repeated_or_backward_frames: Vec<usize>,
-    pub gap_count: usize,
-    pub missing_frames: u64,
-}
-
-/// Noise of one angle.
-#[derive(Debug, Default, Deserialize)]
-#[serde(default)]
-pub struct TrackedAngle {
-    pub frames_measured: usize,
-    pub noise_rad: Option<f64>,
-}
-
-/// `identify.json`.
-#[derive(Debug, Default, Deserialize)]
-#[serde(default)]
-pub struct Identified {
-    pub summary: String,
-    pub record: Recorded,
-    pub spectrum: SpectrumFound,
-    pub drift_rad: Vec<Option<f64>>,
-    pub modes: Vec<Mode>,
-    pub swing_mode: Option<usize>,
-    pub floor: Option<Statement>,
-    pub equivalents: Option<Equivalents>,
-    pub notes: Vec<String>,
-}
-
-/// The table that was identified.
-#[derive(Debug, Default, Deserialize)]
-#[serde(default)]
-pub struct Recorded {
-    pub rows: usize,
-    pub duration_s: Option<f64>,
-    pub step_s: Option<f64>,
-    pub noise_rad: Vec<Option<f64>>,
-}
-
-/// What of the spectrum is in the file.
-#[derive(Debug, Default, Deserialize)]
-#[serde(default)]
-pub struct SpectrumFound {
-    pub resolution_hz: Option<f64>,
-    pub window_width_hz: Option<f64>,
-    pub peaks: Vec<Peak>,
-}
-
-/// A peak.
-#[derive(Debug, Default, Deserialize)]
-#[serde(default)]
-pub struct Peak {
-    pub frequency_hz: Interval,
-    pub amplitude_rad: Option<f64>,
-}
-
-/// Words alone.
-#[derive(Debug, Default, Deserialize)]
-#[serde(default)]
-pub struct Statement {
-    pub statement: String,
-}
-
-/// A mode.
-#[derive(Debug, Default, Deserialize)]
-#[serde(default)]
-pub struct Mode {
-    pub number: usize,
-    pub frequency_hz: Interval,
-    pub damping: Damping,
-    pub basis: String,
-    pub shape: Vec<LinkMotion>,
-    pub estimators: Vec<Estimator>,
-    pub frequency_consistency: Option<Consistency>,
-    pub damping_consistency: Option<Consistency>,
-    pub envelope: Option<Envelope>,
-}
-
-/// ξ, or why there is none.
-#[derive(Debug, Default, Deserialize)]
-#[serde(default)]
-pub struct Damping {
-    pub identified: Option<Interval>,
-    pub not_identifiable: Option<NotIdentifiable>,
-}
-
-/// Why there is no ξ.
-#[derive(Debug, Default, Deserialize)]
-#[serde(default)]
-pub struct NotIdentifiable {
-    pub estimate: Option<Interval>,
-    pub reason: String,
-}
-
-/// One link's part in a mode.
-#[derive(Debug, Default, Deserialize)]
-#[serde(default)]
-pub struct LinkMotion {
-    pub amplitude_rad: Option<f64>,
-    pub ratio_to_first: Interval,
-    pub phase_to_first_rad: Interval,
-}
-
-/// What one method says.
-#[derive(Debug, Default, Deserialize)]
-#[serde(default)]
-pub struct Estimator {
-    pub method: String,
-    pub frequency_hz: Option<Interval>,
-    pub damping_ratio: Option<Interval>,
-    pub note: Option<String>,
-}
-
-/// Whether the methods agree.
-#[derive(Debug, Default, Deserialize)]
-#[serde(default)]
-pub struct Consistency {
-    pub agree: bool,
-}
-
-/// A mode from window to window.
-#[derive(Debug, Default, Deserialize)]
-#[serde(default)]
-pub struct Envelope {
-    pub window_s: Option<f64>,
-    pub steps: Vec<Step>,
-    pub frequency: Option<FrequencyLaw>,
-}
-
-/// From one window to the next.
-#[derive(Debug, Default, Deserialize)]
-#[serde(default)]
-pub struct Step {
-    pub t_s: Option<f64>,
-    pub amplitude_rad: Option<f64>,
-    pub frequency_hz: Interval,
-    pub damping_ratio: Interval,
-}
-
-/// f = f₀ (1 − κA²).
-#[derive(Debug, Default, Deserialize)]
-#[serde(default)]
-pub struct FrequencyLaw {
-    pub f0_hz: Interval,
-    pub kappa_per_rad2: Interval,
-}
-
-/// The equivalent oscillator.
-#[derive(Debug, Default, Deserialize)]
-#[serde(default)]
-pub struct Equivalents {
-    pub k_eq_n_per_m: Interval,
-    pub c_eq_n_s_per_m: Option<Interval>,
-    pub k_rot_n_m_per_rad: Interval,
-    pub c_rot_n_m_s_per_rad: Option<Interval>,
-    pub k_gravity_n_m_per_rad: Option<f64>,
-}
-
-/// `fit.json`.
-#[derive(Debug, Default, Deserialize)]
-#[serde(default)]
-pub struct Fitted {
-    pub specimen: String,
-    pub parameters: BTreeMap<String, FittedParameter>,
-    pub coloured_residuals: bool,
-    pub converged: Option<bool>,
-    pub recordings: Vec<FittedRecording>,
-}
-
-/// A fitted parameter.
-#[derive(Debug, Default, Deserialize)]
-#[serde(default)]
-pub struct FittedParameter {
-    pub value: Option<f64>,
-    pub sd: Option<f64>,
-    pub low95: Option<f64>,
-    pub high95: Option<f64>,
-    pub start: Option<f64>,
-    pub unit: String,
-    pub determined: Option<bool>,
-}
-
-/// A recording that was fitted.
-#[derive(Debug, Default, Deserialize)]
-#[serde(default)]
-pub struct FittedRecording {
-    pub fitted: FitSide,
-    pub pace: Option<PaceFound>,
-}
-
-/// What the fitted model leaves.
-#[derive(Debug, Default, Deserialize)]
-#[serde(default)]
-pub struct FitSide {
-    pub rmse_rad: Vec<Option<f64>>,
-    pub noise_rad: Vec<Option<f64>>,
-    pub reproduced: Option<bool>,
-    pub statement: String,
-}
-
-/// How fast it swings beside the specimen.
-#[derive(Debug, Default, Deserialize)]
-#[serde(default)]
-pub struct PaceFound {
-    pub statement: Option<String>,
-}
-
-/// `diagnosis.json`.
-#[derive(Debug, Default, Deserialize)]
-#[serde(default)]
-pub struct Diagnosed {
-    pub specimen: String,
-    pub baseline: Baseline,
-    #[serde(rename = "where")]
-    pub location: Location,
-    pub candidates: Vec<Candidate>,
-    pub verdict: Verdict,
-    pub heldout: Option<HeldOut>,
-    pub detectable: BTreeMap<String, Detectable>,
-    pub undecided: Vec<String>,
-}
-
-/// The base model.
-#[derive(Debug, Default, Deserialize)]
-#[serde(default)]
-pub struct Baseline {
-    pub rmse_rad: Vec<Option<f64>>,
-    pub noise_rad: Vec<Option<f64>>,
-    pub adequate: Option<bool>,
-    pub p_value: Option<f64>,
-}
-
-/// Where it departs.
-#[derive(Debug, Default, Deserialize)]
-#[serde(default)]
-pub struct Location {
-    pub place: Option<String>,
-    pub energy_share: BTreeMap<String, Option<f64>>,
-    pub statement: String,
-    pub missing_torque: Option<MissingTorque>,
-    pub unknown: Vec<Unknown>,
-}
-
-/// The torque that the base model lacks.
-#[derive(Debug, Default, Deserialize)]
-#[serde(default)]
-pub struct MissingTorque {
-    pub place: String,
-}
-
-/// An unknown at some place.
-#[derive(Debug, Default, Deserialize)]
-#[serde(default)]
-pub struct Unknown {
-    pub place: String,
-    pub form: String,
-    pub log_likelihood_gain: Option<f64>,
-}
-
-/// A value with its unit.
-#[derive(Debug, Default, Deserialize)]
-#[serde(default)]
-pub struct Quantity {
-    pub value: Option<f64>,
-    pub sd: Option<f64>,
-    pub unit: String,
-}
-
-/// An explanation.
-#[derive(Debug, Default, Deserialize)]
-#[serde(default)]
-pub struct Candidate {
-    pub effects: Vec<String>,
-    pub probability: Option<f64>,
-    pub parameters: BTreeMap<String, Quantity>,
-    pub rmse_rad: Vec<Option<f64>>,
-}
-
-/// The verdict.
-#[derive(Debug, Default, Deserialize)]
-#[serde(default)]
-pub struct Verdict {
-    pub status: String,
-    pub effects: Vec<String>,
-    pub further_effects: Vec<String>,
-    pub class: Vec<String>,
-    pub probability: Option<f64>,
-    pub unknown_probability: Option<f64>,
-    pub inclusion: BTreeMap<String, Option<f64>>,
-    pub remainder: Option<Remainder>,
-    pub law: Option<Law>,
-    pub statement: String,
-    pub to_decide: Option<String>,
-}
-
-/// What the names leave.
-#[derive(Debug, Default, Deserialize)]
-#[serde(default)]
-pub struct Remainder {
-    pub present: Option<f64>,
-    pub place: Option<String>,
-    pub phase: Option<String>,
-    pub frequency_hz: Option<f64>,
-    pub rms_rad: Vec<Option<f64>>,
-    pub over_noise: Vec<Option<f64>>,
-    pub share: Option<f64>,
-}
-
-/// A law that was learnt.
-#[derive(Debug, Default, Deserialize)]
-#[serde(default)]
-pub struct Law {
-    pub place: String,
-    pub formula: String,
-    pub unit: String,
-    pub alternatives: Vec<Alternative>,
-    pub toml: String,
-}
-
-/// Another formula.
-#[derive(Debug, Default, Deserialize)]
-#[serde(default)]
-pub struct Alternative {
-    pub formula: String,
-}
-
-/// The prediction of what was not fitted.
-#[derive(Debug, Default, Deserialize)]
-#[serde(default)]
-pub struct HeldOut {
-    pub from_s: Option<f64>,
-    pub baseline_rmse_rad: Vec<Option<f64>>,
-    pub named_rmse_rad: Vec<Option<f64>>,
-    pub augmented_rmse_rad: Vec<Option<f64>>,
-}
-
-/// From which amount on an effect would have been seen.
-#[derive(Debug, Default, Deserialize)]
-#[serde(default)]
-pub struct Detectable {
-    pub smallest: Option<f64>,
-    pub named_from: Option<f64>,
-    pub unit: String,
-    pub confused_with: Vec<String>,
 }
 
 /// `log.txt`: what was called, and what was said.
@@ -573,8 +189,7 @@ impl Left {
         let path = self.path(name);
         match std::fs::read(&path) {
             Ok(bytes) => {
-                let digest = Sha256::digest(&bytes).iter().map(|b| format!("{b:02x}")).collect();
-                self.digests.push((name.to_owned(), digest));
+                self.digests.push((name.to_owned(), digest::of_bytes(&bytes)));
                 Ok(Some(bytes))
             }
             Err(error) if error.kind() == std::io::ErrorKind::NotFound => Ok(None),
