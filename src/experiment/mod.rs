@@ -5,6 +5,7 @@
 mod consistency;
 mod keys;
 mod law;
+mod light;
 mod model;
 mod render;
 mod rig;
@@ -16,9 +17,10 @@ use std::path::Path;
 use serde::Deserialize;
 
 pub use law::{Coefficient, Law, LawPlace};
+pub use light::{Coating, Face, Film, Heat, Laser, Light};
 pub use model::{Effects, Hysteresis, Model, SupportMotion};
 pub use render::{Caption, Codec, CodecName, Distractor, Lens, Noise, Occlusion, PixelFormat, Render, Rgb, Siting};
-pub use rig::{Look, MarkColour, Rig};
+pub use rig::{Look, MarkColour, Rig, Support};
 pub use specimen::{Inertia, Link, Reflectivity, Specimen};
 
 use crate::error::{Error, Result};
@@ -35,6 +37,12 @@ pub struct Experiment {
     pub model: Model,
     /// How a synthetic recording is made.
     pub render: Render,
+    /// The spotlight.
+    pub light: Option<Light>,
+    /// How light warms the strip.
+    pub heat: Option<Heat>,
+    /// The sensor of displacements.
+    pub laser: Option<Laser>,
     /// What of the specimen the file does not say, in words; nothing where it says enough.
     #[serde(skip)]
     pub missing: Option<String>,
@@ -102,6 +110,10 @@ impl Experiment {
         experiment.rig.validate().map_err(invalid)?;
         experiment.model.validate().map_err(invalid)?;
         experiment.render.validate().map_err(invalid)?;
+        let length_m = experiment.specimen.length_m;
+        experiment.light.as_ref().map_or(Ok(()), |light| light.validate(length_m)).map_err(invalid)?;
+        experiment.heat.as_ref().map_or(Ok(()), Heat::validate).map_err(invalid)?;
+        experiment.laser.as_ref().map_or(Ok(()), |laser| laser.validate(length_m)).map_err(invalid)?;
         let odd = consistency::contradictions(&experiment, &keys).map_err(invalid)?;
         experiment.warnings = odd.into_iter().map(|warning| format!("{}: {warning}", path.display())).collect();
         Ok(experiment)
@@ -139,6 +151,13 @@ fn example(key: &str) -> String {
         ("yield_rad", "rad; for example yield_rad = 0.03"),
         ("amplitude_m", "m; for example amplitude_m = 1e-4"),
         ("frequency_hz", "Hz; for example frequency_hz = 2.0"),
+        ("specular", "share of the light; for example specular = 0.60"),
+        ("diffuse", "share of the light; for example diffuse = 0.26"),
+        ("absorbed", "share of the light; for example absorbed = 0.14"),
+        ("thickness_m", "m; for example thickness_m = 1e-7"),
+        ("young_modulus_pa", "Pa; for example young_modulus_pa = 70e9"),
+        ("expansion_per_k", "1/K; for example expansion_per_k = 23.1e-6"),
+        ("face", "the side it is on; face = \"front\" or \"back\""),
     ];
     known.iter().find(|(name, _)| *name == key).map_or(String::new(), |(_, text)| format!(" ({text})"))
 }

@@ -99,12 +99,27 @@ impl<'de> Deserialize<'de> for MarkColour {
     }
 }
 
+/// How the strip is held at its upper end.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Deserialize, serde::Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Support {
+    /// Held and free to turn.
+    #[default]
+    Hinged,
+    /// Held and kept vertical.
+    Clamped,
+}
+
 /// How the specimen hangs and is seen.
 #[derive(Debug, Clone, PartialEq, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct Rig {
     /// Local gravity.
     pub gravity_m_s2: f64,
+    /// How a strip under light is held.
+    pub support: Support,
+    /// A torsion spring at a hinge.
+    pub support_stiffness_n_m_per_rad: f64,
     /// The camera looks into a mirror.
     pub mirrored: bool,
     /// A fixed, unmarked hinge; then the first mark is the joint.
@@ -135,6 +150,8 @@ impl Default for Rig {
     fn default() -> Self {
         Self {
             gravity_m_s2: 9.80665,
+            support: Support::Hinged,
+            support_stiffness_n_m_per_rad: 0.0,
             mirrored: false,
             pivot_px: None,
             marks: Vec::new(),
@@ -158,6 +175,7 @@ impl Rig {
     /// A line that names the key.
     pub(crate) fn validate(&self) -> Result<(), String> {
         positive("rig.gravity_m_s2", self.gravity_m_s2)?;
+        super::not_negative("rig.support_stiffness_n_m_per_rad", self.support_stiffness_n_m_per_rad)?;
         self.pixel_aspect.map_or(Ok(()), |v| positive("rig.pixel_aspect", v))?;
         if let Some([upper, lower]) = self.plumb_px
             && !((upper[0] - lower[0]).hypot(upper[1] - lower[1]) >= 1.0)

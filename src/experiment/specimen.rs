@@ -25,6 +25,39 @@ pub struct Reflectivity {
     pub diffuse: f64,
     /// Absorbed share, C_a.
     pub absorbed: f64,
+    /// Share that passes through.
+    #[serde(default)]
+    pub transmitted: f64,
+}
+
+/// Shares are printed with three or four digits.
+const SHARES_SUM: f64 = 1e-3;
+
+impl Reflectivity {
+    /// A surface that light does not pass through.
+    pub const fn opaque(specular: f64, diffuse: f64, absorbed: f64) -> Self {
+        Self { specular, diffuse, absorbed, transmitted: 0.0 }
+    }
+
+    fn validate(&self, key: &str) -> Result<(), String> {
+        let shares = [
+            ("specular", self.specular),
+            ("diffuse", self.diffuse),
+            ("absorbed", self.absorbed),
+            ("transmitted", self.transmitted),
+        ];
+        if let Some((share, value)) = shares.iter().find(|(_, value)| !(0.0..=1.0).contains(value)) {
+            return Err(format!("{key}.{share} = {value}: a share of the light, from 0 to 1"));
+        }
+        let sum: f64 = shares.iter().map(|(_, value)| value).sum();
+        if (sum - 1.0).abs() > SHARES_SUM {
+            return Err(format!(
+                "{key}: specular, diffuse, absorbed and transmitted sum to {}; they must sum to 1",
+                (sum * 1e4).round() / 1e4
+            ));
+        }
+        Ok(())
+    }
 }
 
 /// One general rigid link.
@@ -59,8 +92,12 @@ pub struct Specimen {
     pub density_kg_m3: Option<f64>,
     /// Young's modulus of the material.
     pub young_modulus_pa: Option<f64>,
-    /// Optical shares of the surface.
+    /// Optical shares of the surface, of the face towards the lamp.
     pub reflectivity: Option<Reflectivity>,
+    /// Optical shares of the other face, where it differs.
+    pub reflectivity_back: Option<Reflectivity>,
+    /// Curvature of the strip at rest, without load; positive towards +x at the free end.
+    pub curl_per_m: f64,
     /// Lengths between the marks, top to bottom.
     pub link_lengths_m: Vec<f64>,
     /// Rods or lumps.
@@ -83,6 +120,8 @@ impl Default for Specimen {
             density_kg_m3: None,
             young_modulus_pa: None,
             reflectivity: None,
+            reflectivity_back: None,
+            curl_per_m: 0.0,
             link_lengths_m: vec![0.10, 0.10],
             inertia: Inertia::Rods,
             lumps: None,
@@ -112,6 +151,12 @@ impl Specimen {
         ] {
             value.map_or(Ok(()), |v| positive(key, v))?;
         }
+        for (key, surface) in
+            [("specimen.reflectivity", self.reflectivity), ("specimen.reflectivity_back", self.reflectivity_back)]
+        {
+            surface.map_or(Ok(()), |surface| surface.validate(key))?;
+        }
+        super::finite("specimen.curl_per_m", self.curl_per_m)?;
         if self.link_lengths_m.is_empty() {
             return Err("specimen.link_lengths_m: needs at least one length".to_owned());
         }

@@ -44,7 +44,7 @@ pub fn radiation_force_n(flux_w_m2: f64, area_m2: f64, incidence_rad: f64, surfa
 mod tests {
     use super::*;
 
-    const MLI: Reflectivity = Reflectivity { specular: 0.60, diffuse: 0.26, absorbed: 0.14 };
+    const MLI: Reflectivity = Reflectivity::opaque(0.60, 0.26, 0.14);
 
     #[test]
     fn two_kilowatt_at_a_metre_press_with_19_nanonewton() {
@@ -57,7 +57,7 @@ mod tests {
     #[test]
     fn a_mirror_takes_twice_and_a_black_surface_once_the_light() {
         let of = |specular, diffuse, absorbed| {
-            let [normal, along] = radiation_force_n(1.0, 1.0, 0.0, &Reflectivity { specular, diffuse, absorbed });
+            let [normal, along] = radiation_force_n(1.0, 1.0, 0.0, &Reflectivity::opaque(specular, diffuse, absorbed));
             (normal + along) * SPEED_OF_LIGHT_M_S
         };
         assert!((of(1.0, 0.0, 0.0) - 2.0).abs() < 1e-14);

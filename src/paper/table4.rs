@@ -15,7 +15,7 @@ use crate::model::strip::Support;
 pub fn light_force_n(power_w: f64, distance_m: f64) -> f64 {
     let [specular, diffuse, absorbed] = OPTICS;
     let flux_w_m2 = Spotlight { power_w, distance_m, window: 1.0 }.flux_w_m2();
-    let surface = Reflectivity { specular, diffuse, absorbed };
+    let surface = Reflectivity::opaque(specular, diffuse, absorbed);
     radiation_force_n(flux_w_m2, WIDTH_M * LENGTH_M, 0.0, &surface).iter().sum()
 }
 
