@@ -7,7 +7,7 @@ use super::{AGREES, GRAVITY_M_S2, Quantity, Row, Section, Verdict, agrees};
 use crate::error::{Error, Result};
 use crate::experiment::{Experiment, Inertia, Model, Rig, Specimen};
 use crate::model::modes::{Linearised, Mode, Modes, beam_frequencies_hz};
-use crate::model::strip::{Strip, Support};
+use crate::model::strip::Strip;
 
 /// Eq. 29: K_eq = ω_n² M_tot (N/m, a translational constant).
 pub fn stiffness_n_m(omega_n_rad_s: f64, mass_kg: f64) -> f64 {
@@ -54,12 +54,8 @@ pub fn first_mode(material: &Material, inertia: Inertia) -> Result<Mode> {
 
 /// The strip as a beam.
 pub fn strip(material: &Material, gravity_m_s2: f64) -> Strip {
-    Strip {
-        length_m: LENGTH_M,
-        mass_per_length_kg_m: material.mass_kg() / LENGTH_M,
-        bending_stiffness_n_m2: material.young_modulus_pa * WIDTH_M * material.thickness_m.powi(3) / 12.0,
-        gravity_m_s2,
-    }
+    let bending_stiffness_n_m2 = material.young_modulus_pa * WIDTH_M * material.thickness_m.powi(3) / 12.0;
+    Strip::hung(LENGTH_M, material.mass_kg() / LENGTH_M, bending_stiffness_n_m2, gravity_m_s2)
 }
 
 /// Table 2.
@@ -139,7 +135,7 @@ fn constants(material: &Material) -> [Row; 3] {
 /// A11.
 fn clamped_and_weightless(material: &Material) -> Row {
     let implied_hz = implied_omega_n_rad_s(material) / TAU;
-    let beam_hz = beam_frequencies_hz(&strip(material, 0.0), Support::Clamped, 1)[0];
+    let beam_hz = beam_frequencies_hz(&strip(material, 0.0).clamped(), 1)[0];
     let verdict = if agrees(implied_hz, beam_hz, 1e-3) {
         Verdict::ReproducesIf("clamped and weightless (A11)".to_owned())
     } else {

@@ -8,7 +8,7 @@ use super::{AGREES, GRAVITY_M_S2, Quantity, Row, Section, Verdict, agrees, norma
 use crate::error::Result;
 use crate::experiment::Inertia;
 use crate::model::modes::{beam_frequencies_hz, limp_frequency_hz, rigid_frequency_hz};
-use crate::model::strip::{Strip, Support};
+use crate::model::strip::Strip;
 
 /// A number of Table 3 this near to a mode of another model is taken to be that mode.
 const RESEMBLES: f64 = 0.01;
@@ -61,7 +61,7 @@ fn ratios() -> String {
     let pairs = MATERIALS.iter().map(|Material { name, frequencies, .. }| {
         format!("{name} {:.3} and {:.3}", ratio(frequencies.theory_hz), ratio(frequencies.finite_element_hz))
     });
-    let weightless = beam_frequencies_hz(&strip(&MATERIALS[1], 0.0), Support::Clamped, 2);
+    let weightless = beam_frequencies_hz(&strip(&MATERIALS[1], 0.0).clamped(), 2);
     let [slow, fast] = normal_modes::rods(&MATERIALS[0]).modes().map(|m| m.omega_squared_rad2_s2.sqrt());
     let limp = [0, 1].map(|k| limp_frequency_hz(k, LENGTH_M, GRAVITY_M_S2));
     let above = |k: usize| 100.0 * (MATERIALS[1].frequencies.finite_element_hz[k] / weightless[k] - 1.0);
@@ -80,7 +80,7 @@ fn ratios() -> String {
 fn material_rows(material: &Material) -> Result<Vec<Row>> {
     let Material { name, frequencies, .. } = material;
     let beam = strip(material, GRAVITY_M_S2);
-    let hinged_hz = beam_frequencies_hz(&beam, Support::Hinged, 2);
+    let hinged_hz = beam_frequencies_hz(&beam, 2);
     let [slow, fast] = normal_modes::rods(material).modes().map(|m| m.frequency_hz.unwrap_or(f64::NAN));
     let candidates = candidates(&beam, [slow, fast]);
     let judged = |quantity: String, paper_hz: f64, computed_hz: f64| {
@@ -107,9 +107,9 @@ fn candidates(beam: &Strip, rods_hz: [f64; 2]) -> Vec<Candidate> {
         }
     };
     add("the two rods", &rods_hz);
-    add("a hinged beam", &beam_frequencies_hz(beam, Support::Hinged, 2));
-    add("a clamped beam", &beam_frequencies_hz(beam, Support::Clamped, 2));
-    add("a clamped beam without g", &beam_frequencies_hz(&weightless, Support::Clamped, 2));
+    add("a hinged beam", &beam_frequencies_hz(beam, 2));
+    add("a clamped beam", &beam_frequencies_hz(&beam.clamped(), 2));
+    add("a clamped beam without g", &beam_frequencies_hz(&weightless.clamped(), 2));
     candidates
 }
 

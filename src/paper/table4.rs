@@ -9,7 +9,8 @@ use crate::error::{Error, Result};
 use crate::experiment::{Experiment, Model, Reflectivity, Rig, Specimen};
 use crate::model::modes::Linearised;
 use crate::model::radiation::{Spotlight, radiation_force_n};
-use crate::model::strip::Support;
+use crate::model::strip::load::Dead;
+use crate::model::strip::{Mesh, Rest, Strip, Support};
 
 /// Force (N) of the spotlight on a whole strip that faces it.
 pub fn light_force_n(power_w: f64, distance_m: f64) -> f64 {
@@ -54,8 +55,9 @@ pub fn multibody_tip_m(material: &Material, force_n: f64) -> Result<f64> {
 /// # Errors
 /// [`Error::Simulation`].
 pub fn finite_element_tip_m(material: &Material, support: Support, force_n: f64) -> Result<f64> {
-    let none = || Error::Simulation { detail: "the strip does not hang".into() };
-    strip(material, GRAVITY_M_S2).tip_under_pressure_m(support, force_n / LENGTH_M).ok_or_else(none)
+    let strip = Strip { support, ..strip(material, GRAVITY_M_S2) };
+    let push = Dead { per_length_n_m: [force_n / LENGTH_M, 0.0], ..Dead::default() };
+    Ok(Rest::of(&strip, &Mesh::of(&strip, Mesh::ELEMENTS), &push)?.place_m(LENGTH_M)[0])
 }
 
 /// Eq. 40, 41, Fig. 20 and Table 4.
@@ -126,7 +128,7 @@ fn displacement(material: &Material, force_n: f64, distance_m: f64) -> Result<Ro
 }
 
 fn ratio_rows(material: &Material, force_n: f64) -> Result<Vec<Row>> {
-    let computed = multibody_tip_m(material, force_n)? / finite_element_tip_m(material, Support::Hinged, force_n)?;
+    let computed = multibody_tip_m(material, force_n)? / finite_element_tip_m(material, Support::HINGED, force_n)?;
     let errors = material.multibody_error.iter().zip(material.finite_element_error);
     let row = |(power_w, (multibody, finite_element)): (f64, (&f64, f64))| {
         let paper = (1.0 + multibody) / (1.0 + finite_element);

@@ -5,7 +5,7 @@ use serde::Serialize;
 use super::{Linearised, Modes, RodMode, TwoRods, beam_frequencies_hz, limp_frequency_hz, rigid_frequency_hz};
 use crate::error::Result;
 use crate::experiment::{Effects, Experiment, Inertia, Model, Specimen};
-use crate::model::strip::{Strip, Support};
+use crate::model::strip::Strip;
 
 /// Modes listed of a continuous strip.
 const STRIP_MODES: usize = 4;
@@ -168,9 +168,9 @@ impl BeamModes {
         Some(Self {
             bending_stiffness_n_m2: strip.bending_stiffness_n_m2,
             boundary_layer_m: strip.boundary_layer_m(),
-            hinged_hz: beam_frequencies_hz(&strip, Support::Hinged, STRIP_MODES),
-            clamped_hz: beam_frequencies_hz(&strip, Support::Clamped, STRIP_MODES),
-            clamped_weightless_hz: beam_frequencies_hz(&weightless, Support::Clamped, STRIP_MODES),
+            hinged_hz: beam_frequencies_hz(&strip, STRIP_MODES),
+            clamped_hz: beam_frequencies_hz(&strip.clamped(), STRIP_MODES),
+            clamped_weightless_hz: beam_frequencies_hz(&weightless.clamped(), STRIP_MODES),
         })
     }
 }
