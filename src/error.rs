@@ -92,6 +92,10 @@ pub enum Error {
     #[error("the motion cannot be simulated: {detail}")]
     Simulation { detail: String },
 
+    /// An experiment file that does not say what a command needs.
+    #[error("the experiment file: {detail}")]
+    Missing { detail: String },
+
     /// A folder below which there is no recording.
     #[error("{}: holds no recording and no table of angles; give the folder above them", path.display())]
     NothingToDo { path: PathBuf },

@@ -20,7 +20,8 @@
 //! | [`camera`] | what a camera makes of them |
 //! | [`modes`] | small vibrations: frequencies, damping ratios, shapes |
 //! | [`strip`] | the strip as a beam in gravity, by finite elements |
-//! | [`radiation`] | the pressure of light |
+//! | [`light`] | the pressure of light |
+//! | [`heat`] | what light warms, and how that curls a strip |
 
 pub mod balance;
 pub mod camera;
@@ -36,7 +37,8 @@ pub mod motion;
 pub mod observe;
 pub mod parameter;
 mod partials;
-pub mod radiation;
+pub mod heat;
+pub mod light;
 pub mod shapes;
 pub mod step;
 pub mod strip;

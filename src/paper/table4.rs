@@ -8,7 +8,7 @@ use super::{AGREES, GRAVITY_M_S2, Quantity, Row, Section, Verdict, agrees};
 use crate::error::{Error, Result};
 use crate::experiment::{Experiment, Model, Reflectivity, Rig, Specimen};
 use crate::model::modes::Linearised;
-use crate::model::radiation::{Spotlight, radiation_force_n};
+use crate::model::light::{Spotlight, radiation_force_n};
 use crate::model::strip::load::Dead;
 use crate::model::strip::{Mesh, Rest, Strip, Support};
 
