@@ -17,7 +17,7 @@
 //! | identify | [`identify`] | angles → frequencies, damping and their intervals, without the motion |
 //! | fit | [`fit`] | angles and model → parameters, residuals, verdict |
 //! | diagnose | [`diagnose`] | angles and model → what the model lacks, how probable, and the proof |
-//! | paper | [`paper`] | the published tables, recomputed |
+//! | X | the published tables, recomputed |
 //! | report | [`report`] | what a run left in a folder → one page, figures |
 //! | export | [`export`] | angles.csv → the file of another program |
 //! | batch | [`batch`] | a folder of recordings → a folder of results, and their summary |
@@ -49,6 +49,7 @@ pub mod model;
 pub mod identify;
 pub mod fit;
 pub mod diagnose;
+pub mod force;
 pub mod paper;
 pub mod report;
 pub mod synth;

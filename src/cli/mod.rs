@@ -7,6 +7,7 @@ mod diagnose;
 mod doctor;
 mod export;
 mod fit;
+mod force;
 mod identify;
 mod init;
 mod modes;
@@ -49,6 +50,7 @@ enum Command {
     Diagnose(diagnose::DiagnoseArgs),
     Simulate(simulate::SimulateArgs),
     Modes(modes::ModesArgs),
+    Force(force::ForceArgs),
     Render(render::RenderArgs),
     Report(report::ReportArgs),
     Paper(paper::PaperArgs),
@@ -89,6 +91,7 @@ impl Command {
             Self::Identify(args) => args.run(console),
             Self::Render(args) => args.run(console),
             Self::Modes(args) => args.run(console),
+            Self::Force(args) => args.run(console),
             Self::Paper(args) => args.run(console),
             Self::Report(args) => args.run(console),
             Self::Run(args) => args.run(console),

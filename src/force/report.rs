@@ -1,0 +1,200 @@
+//! What light does to a strip, power by power and distance by distance.
+
+use serde::Serialize;
+
+use super::chain::LitChain;
+use super::{Lit, Parts, Setup};
+use crate::error::Result;
+use crate::model::strip::load::Free;
+use crate::model::strip::{Mesh, Rest};
+
+/// How far each of what light does moves a point along x (m), alone; and all together.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Point {
+    /// Below the support.
+    pub s_m: f64,
+    /// By the push, of the chain of links; none for a clamp.
+    pub multibody_m: Option<f64>,
+    /// By the push, of the strip.
+    pub strip_m: f64,
+    /// By all that heat does: what both together move it less what the push does.
+    pub heat_m: Option<f64>,
+    /// By the curl of the gradient through the thickness.
+    pub gradient_m: Option<f64>,
+    /// By the curl of a layer.
+    pub coating_m: Option<f64>,
+    /// By what the warm faces radiate.
+    pub recoil_m: Option<f64>,
+    /// By everything.
+    pub total_m: f64,
+}
+
+/// A power and a distance.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Row {
+    /// P.
+    pub power_w: f64,
+    /// d.
+    pub distance_m: f64,
+    /// I at the strip.
+    pub flux_w_m2: f64,
+    /// Along x, on the strip as it hangs in the dark.
+    pub force_n: f64,
+    /// Of the hottest point.
+    pub temperature_k: Option<f64>,
+    /// At the sensor's point.
+    #[serde(flatten)]
+    pub point: Point,
+}
+
+/// What heat does in time.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Times {
+    /// Of the film's temperature, at the wall's.
+    pub time_constant_s: f64,
+    /// Of the gradient through the thickness.
+    pub through_thickness_s: f64,
+    /// Values that are typical ones of the film, not stated.
+    pub assumed: Vec<&'static str>,
+}
+
+/// What `freeswing force` tells.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Force {
+    schema: &'static str,
+    /// Name of the specimen.
+    pub specimen: String,
+    /// P of the points.
+    pub power_w: f64,
+    /// d of the points.
+    pub distance_m: f64,
+    /// I of the points.
+    pub flux_w_m2: f64,
+    /// Along x, on the whole strip.
+    pub force_n: f64,
+    /// Of the strip.
+    pub weight_n: f64,
+    /// Of the strip under its own weight.
+    pub first_mode_hz: f64,
+    /// At the sensor's point, the joints and the free end.
+    pub points: Vec<Point>,
+    /// In order of distance and power.
+    pub sweep: Vec<Row>,
+    /// None without `[heat]`.
+    pub heat: Option<Times>,
+}
+
+/// The strip at rest in the dark, and what it is held against.
+struct Dark<'s> {
+    setup: &'s Setup,
+    mesh: Mesh,
+    rest: Rest,
+    chain: Option<LitChain>,
+}
+
+impl Force {
+    /// Reckons an experiment.
+    ///
+    /// # Errors
+    /// [`crate::Error::Missing`], [`crate::Error::Simulation`].
+    pub fn of(setup: &Setup) -> Result<Self> {
+        let mesh = Mesh::of(&setup.strip, Mesh::ELEMENTS);
+        let rest = Rest::of(&setup.strip, &mesh, &Free)?;
+        let vibration = rest.vibration();
+        let dark = Dark { setup, mesh, rest, chain: LitChain::of(setup)? };
+        let (power_w, distance_m) = setup.main()?;
+        let mut places_m: Vec<f64> = vec![setup.sensor_m()];
+        let mut joint_m = 0.0;
+        for length_m in &setup.experiment.specimen.link_lengths_m {
+            joint_m += length_m;
+            let joint_m = joint_m.min(setup.strip.length_m);
+            if places_m.iter().all(|place| (place - joint_m).abs() > 1e-9) {
+                places_m.push(joint_m);
+            }
+        }
+        places_m.sort_by(f64::total_cmp);
+        let mut sweep = Vec::new();
+        for distance_m in setup.distances_m()? {
+            for power_w in setup.powers_w()? {
+                sweep.push(dark.row(power_w, distance_m)?);
+            }
+        }
+        let own = dark.row(power_w, distance_m)?;
+        Ok(Self {
+            schema: "freeswing.force/1",
+            specimen: setup.experiment.specimen.name.clone(),
+            power_w,
+            distance_m,
+            flux_w_m2: own.flux_w_m2,
+            force_n: own.force_n,
+            weight_n: setup.strip.mass_per_length_kg_m * setup.strip.length_m * setup.strip.gravity_m_s2,
+            first_mode_hz: vibration.map_or(f64::NAN, |v| v.frequencies_hz(1)[0]),
+            points: dark.points(power_w, distance_m, &places_m)?,
+            sweep,
+            heat: setup.film.map(|film| Times {
+                time_constant_s: film.time_constant_s(film.wall_k),
+                through_thickness_s: film.through_thickness_s(),
+                assumed: setup
+                    .experiment
+                    .heat
+                    .as_ref()
+                    .map(crate::model::heat::WarmFilm::assumed)
+                    .unwrap_or_default(),
+            }),
+        })
+    }
+}
+
+impl Dark<'_> {
+    fn row(&self, power_w: f64, distance_m: f64) -> Result<Row> {
+        let beam = self.setup.beam(power_w, distance_m);
+        let angles = self.mesh.angles(self.rest.freedoms.as_slice());
+        let push = |point: usize| {
+            self.mesh.weight_m(point) * beam.push(self.mesh.s_m(point), angles[point]).force_n_m[0]
+        };
+        let (_, lit) = Lit::rest(&self.setup.strip, &self.mesh, beam, self.setup.film, Parts::ALL)?;
+        Ok(Row {
+            power_w,
+            distance_m,
+            flux_w_m2: beam.flux_w_m2,
+            force_n: (0..self.mesh.points()).map(push).sum(),
+            temperature_k: lit.hottest_k(),
+            point: self.points(power_w, distance_m, &[self.setup.sensor_m()])?[0],
+        })
+    }
+
+    /// Each part alone, at some places.
+    fn points(&self, power_w: f64, distance_m: f64, places_m: &[f64]) -> Result<Vec<Point>> {
+        let beam = self.setup.beam(power_w, distance_m);
+        let rest = |parts: Parts| -> Result<Rest> {
+            Ok(Lit::rest(&self.setup.strip, &self.mesh, beam, self.setup.film, parts)?.0)
+        };
+        let pushed = rest(Parts::PUSH)?;
+        let warm = match self.setup.film {
+            None => None,
+            Some(_) => Some([
+                rest(Parts::ALL)?,
+                rest(Parts { gradient: true, ..Parts::NONE })?,
+                rest(Parts { coating: true, ..Parts::NONE })?,
+                rest(Parts { recoil: true, ..Parts::NONE })?,
+            ]),
+        };
+        let of = |s_m: f64| -> Result<Point> {
+            let moved = |rest: &Rest| rest.place_m(s_m)[0] - self.rest.place_m(s_m)[0];
+            let strip_m = moved(&pushed);
+            let alone = |k: usize| warm.as_ref().map(|rests| moved(&rests[k]));
+            let total_m = alone(0).unwrap_or(strip_m);
+            Ok(Point {
+                s_m,
+                multibody_m: self.chain.as_ref().map(|chain| chain.moved_m(&beam, s_m)).transpose()?,
+                strip_m,
+                heat_m: alone(0).map(|total_m| total_m - strip_m),
+                gradient_m: alone(1),
+                coating_m: alone(2),
+                recoil_m: alone(3),
+                total_m,
+            })
+        };
+        places_m.iter().map(|s_m| of(*s_m)).collect()
+    }
+}
