@@ -128,6 +128,18 @@ fn the_page_on_troubleshooting_runs() {
 }
 
 #[test]
+fn the_page_on_light_runs_and_its_numbers_are_true() {
+    let folder = run("docs/light.md");
+    let force = std::fs::read_to_string(folder.path().join("force.json")).unwrap();
+    let force: serde_json::Value = serde_json::from_str(&force).unwrap();
+    let tip = &force["points"][1];
+    let um = |key: &str| format!("{:.1} µm", 1e6 * tip[key].as_f64().unwrap());
+    let text = page("docs/light.md");
+    assert!(text.contains(&format!("{:.2} µm", 1e6 * tip["strip_m"].as_f64().unwrap())), "{tip}");
+    assert!(text.contains(&um("heat_m")), "{tip}");
+}
+
+#[test]
 fn the_page_on_folders_runs() {
     let folder = run("docs/folders.md");
     let summary = std::fs::read_to_string(folder.path().join("results/summary.csv")).unwrap();
@@ -238,7 +250,7 @@ fn every_option_that_a_page_names_exists() {
     };
     let commands = [
         "init", "track", "identify", "fit", "diagnose", "simulate", "render", "modes", "paper", "run", "batch",
-        "report", "export", "doctor",
+        "report", "export", "doctor", "force",
     ];
     let help: String = commands.iter().map(|command| help("freeswing", &[command])).collect();
     for name in pages() {
@@ -261,6 +273,7 @@ fn no_page_has_examples_that_are_not_run() {
         "folders",
         "troubleshooting",
         "diagnosis",
+        "light",
     ];
     for name in pages() {
         let has_examples = blocks(&page(&name)).iter().any(|(mark, _)| *mark == "sh");

@@ -49,7 +49,9 @@ impl Setup {
         let missing = |detail: &str| Error::Missing { detail: detail.to_owned() };
         let specimen = &experiment.specimen;
         if !specimen.links.is_empty() {
-            return Err(missing("[[specimen.links]] are rigid; light is reckoned on a strip: give length, mass, width, thickness and modulus instead"));
+            return Err(missing(
+                "[[specimen.links]] are rigid; light is reckoned on a strip: give length, mass, width, thickness and modulus instead",
+            ));
         }
         let light = experiment.light.clone().ok_or_else(|| {
             missing("[light] is missing; state the lamp, for example power_w = 2000.0 and distance_m = 1.0")
@@ -70,8 +72,14 @@ impl Setup {
     /// # Errors
     /// [`Error::Missing`].
     pub fn powers_w(&self) -> Result<Vec<f64>> {
-        let stated = if self.light.powers_w.is_empty() { self.light.power_w.into_iter().collect() } else { self.light.powers_w.clone() };
-        let none = || Error::Missing { detail: "light.power_w is missing (W, what leaves the lamp as light; for example power_w = 2000.0)".into() };
+        let stated = if self.light.powers_w.is_empty() {
+            self.light.power_w.into_iter().collect()
+        } else {
+            self.light.powers_w.clone()
+        };
+        let none = || Error::Missing {
+            detail: "light.power_w is missing (W, what leaves the lamp as light; for example power_w = 2000.0)".into(),
+        };
         if stated.is_empty() { Err(none()) } else { Ok(stated) }
     }
 
@@ -81,8 +89,11 @@ impl Setup {
     /// [`Error::Missing`], unless a spot states where the light goes.
     pub fn distances_m(&self) -> Result<Vec<f64>> {
         let one = self.light.distance_m.or(self.light.spot_diameter_m.map(|_| 1.0));
-        let stated = if self.light.distances_m.is_empty() { one.into_iter().collect() } else { self.light.distances_m.clone() };
-        let none = || Error::Missing { detail: "light.distance_m is missing (m, from the lamp to the strip; for example distance_m = 1.0)".into() };
+        let stated =
+            if self.light.distances_m.is_empty() { one.into_iter().collect() } else { self.light.distances_m.clone() };
+        let none = || Error::Missing {
+            detail: "light.distance_m is missing (m, from the lamp to the strip; for example distance_m = 1.0)".into(),
+        };
         if stated.is_empty() { Err(none()) } else { Ok(stated) }
     }
 

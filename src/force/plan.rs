@@ -91,7 +91,10 @@ impl Plan {
             ("--damping-ratio", wanted.damping_ratio),
         ] {
             if !(value.is_finite() && value > 0.0) {
-                return Err(Error::Option { option: option.to_owned(), message: format!("{value} is not above 0; give a positive number") });
+                return Err(Error::Option {
+                    option: option.to_owned(),
+                    message: format!("{value} is not above 0; give a positive number"),
+                });
             }
         }
         let (power_w, distance_m) = setup.main()?;

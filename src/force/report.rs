@@ -4,9 +4,12 @@ use serde::Serialize;
 
 use super::chain::LitChain;
 use super::{Lit, Parts, Setup};
-use crate::error::Result;
+use crate::error::{Error, Result};
 use crate::model::strip::load::Free;
 use crate::model::strip::{Mesh, Rest};
+
+/// Places nearer than this part of the length are one.
+const SAME_M: f64 = 1e-9;
 
 /// How far each of what light does moves a point along x (m), alone; and all together.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
@@ -93,26 +96,17 @@ struct Dark<'s> {
 }
 
 impl Force {
-    /// Reckons an experiment.
+    /// Reckons an experiment, at the sensor's point, the joints, the free end, and at further places.
     ///
     /// # Errors
-    /// [`crate::Error::Missing`], [`crate::Error::Simulation`].
-    pub fn of(setup: &Setup) -> Result<Self> {
+    /// [`crate::Error::Option`] for a place off the strip; [`crate::Error::Missing`], [`crate::Error::Simulation`].
+    pub fn of(setup: &Setup, further_m: &[f64]) -> Result<Self> {
         let mesh = Mesh::of(&setup.strip, Mesh::ELEMENTS);
         let rest = Rest::of(&setup.strip, &mesh, &Free)?;
         let vibration = rest.vibration();
         let dark = Dark { setup, mesh, rest, chain: LitChain::of(setup)? };
         let (power_w, distance_m) = setup.main()?;
-        let mut places_m: Vec<f64> = vec![setup.sensor_m()];
-        let mut joint_m = 0.0;
-        for length_m in &setup.experiment.specimen.link_lengths_m {
-            joint_m += length_m;
-            let joint_m = joint_m.min(setup.strip.length_m);
-            if places_m.iter().all(|place| (place - joint_m).abs() > 1e-9) {
-                places_m.push(joint_m);
-            }
-        }
-        places_m.sort_by(f64::total_cmp);
+        let places_m = places_m(setup, further_m)?;
         let mut sweep = Vec::new();
         for distance_m in setup.distances_m()? {
             for power_w in setup.powers_w()? {
@@ -134,24 +128,39 @@ impl Force {
             heat: setup.film.map(|film| Times {
                 time_constant_s: film.time_constant_s(film.wall_k),
                 through_thickness_s: film.through_thickness_s(),
-                assumed: setup
-                    .experiment
-                    .heat
-                    .as_ref()
-                    .map(crate::model::heat::WarmFilm::assumed)
-                    .unwrap_or_default(),
+                assumed: setup.experiment.heat.as_ref().map(crate::model::heat::WarmFilm::assumed).unwrap_or_default(),
             }),
         })
     }
+}
+
+/// Where displacements are told, from the top down.
+fn places_m(setup: &Setup, further_m: &[f64]) -> Result<Vec<f64>> {
+    let length_m = setup.strip.length_m;
+    if let Some(off_m) = further_m.iter().find(|s_m| !(0.0..=length_m).contains(*s_m)) {
+        let message = format!("{off_m} is not on the strip, which reaches from the hinge (0) down to {length_m} m");
+        return Err(Error::Option { option: "--at-m".into(), message });
+    }
+    let joints_m = setup.experiment.specimen.link_lengths_m.iter().scan(0.0, |end_m, link_m| {
+        *end_m += link_m;
+        Some(f64::min(*end_m, length_m))
+    });
+    let mut places_m: Vec<f64> = vec![setup.sensor_m()];
+    for place_m in joints_m.chain(further_m.iter().copied()) {
+        if places_m.iter().all(|known_m| (known_m - place_m).abs() > SAME_M * length_m) {
+            places_m.push(place_m);
+        }
+    }
+    places_m.sort_by(f64::total_cmp);
+    Ok(places_m)
 }
 
 impl Dark<'_> {
     fn row(&self, power_w: f64, distance_m: f64) -> Result<Row> {
         let beam = self.setup.beam(power_w, distance_m);
         let angles = self.mesh.angles(self.rest.freedoms.as_slice());
-        let push = |point: usize| {
-            self.mesh.weight_m(point) * beam.push(self.mesh.s_m(point), angles[point]).force_n_m[0]
-        };
+        let push =
+            |point: usize| self.mesh.weight_m(point) * beam.push(self.mesh.s_m(point), angles[point]).force_n_m[0];
         let (_, lit) = Lit::rest(&self.setup.strip, &self.mesh, beam, self.setup.film, Parts::ALL)?;
         Ok(Row {
             power_w,

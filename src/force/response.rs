@@ -149,11 +149,14 @@ impl Response {
                     film.advance(kelvin, t_s - h, t_s, |_| self.absorbed_w_m2 * mean);
                 }
                 let next = self.drives(light, kelvin);
-                for ((oscillators, omega), moved_m) in oscillators.iter_mut().zip(&self.omega_rad_s).zip(&self.at_rest_m) {
+                for ((oscillators, omega), moved_m) in
+                    oscillators.iter_mut().zip(&self.omega_rad_s).zip(&self.at_rest_m)
+                {
                     let of = |drive: &[f64; PARTS]| {
                         [moved_m[0] * drive[0], (1..PARTS).map(|part| moved_m[part] * drive[part]).sum()]
                     };
-                    for (oscillator, (from, until)) in oscillators.iter_mut().zip(of(&drive).into_iter().zip(of(&next))) {
+                    for (oscillator, (from, until)) in oscillators.iter_mut().zip(of(&drive).into_iter().zip(of(&next)))
+                    {
                         oscillator.advance(*omega, self.damping_ratio, h, from, until);
                     }
                 }
@@ -212,8 +215,7 @@ impl Response {
         };
         let gain = |omega_k: f64| {
             let square = omega_k * omega_k;
-            Complex::new(square, 0.0)
-                / Complex::new(square - omega * omega, 2.0 * self.damping_ratio * omega_k * omega)
+            Complex::new(square, 0.0) / Complex::new(square - omega * omega, 2.0 * self.damping_ratio * omega_k * omega)
         };
         let of = |part: usize| -> Complex<f64> {
             let answered: Complex<f64> =
@@ -229,9 +231,7 @@ fn along_freedoms(rest: &Rest, lit: &Lit, part: usize) -> DVector<f64> {
     let (mesh, strip) = (&rest.mesh, &rest.strip);
     let angles = mesh.angles(rest.freedoms.as_slice());
     let curl = |which: usize| {
-        let moment = |p: usize| {
-            mesh.weight_m(p) * strip.bending_stiffness_n_m2 * lit.curls_per_m(mesh.s_m(p))[which]
-        };
+        let moment = |p: usize| mesh.weight_m(p) * strip.bending_stiffness_n_m2 * lit.curls_per_m(mesh.s_m(p))[which];
         mesh.along_curvatures(&(0..mesh.points()).map(moment).collect::<Vec<_>>())
     };
     let force = |parts: Parts| {

@@ -18,8 +18,8 @@
 //! Timoshenko's bimetal (1925, Eq. 4), which grows with the temperature. Conduction along the strip is left out: it levels over millimetres. So is the curl across
 //! the strip, which stiffens a strip that curls much.
 
-use crate::experiment::{Coating, Experiment, Face, Film, Heat};
 use crate::error::{Error, Result};
+use crate::experiment::{Coating, Experiment, Face, Film, Heat};
 
 /// σ, of Stefan and Boltzmann (W/m²K⁴).
 pub const STEFAN_BOLTZMANN_W_M2_K4: f64 = 5.670_374_419e-8;
@@ -286,9 +286,11 @@ mod tests {
     /// ∫dT/(Tₛ⁴ − T⁴) in closed form.
     fn closed_time_s(film: &WarmFilm, from_k: f64, until_k: f64, steady_k: f64) -> f64 {
         let of = |t: f64| {
-            ((steady_k + t) / (steady_k - t)).ln() / (4.0 * steady_k.powi(3)) + (t / steady_k).atan() / (2.0 * steady_k.powi(3))
+            ((steady_k + t) / (steady_k - t)).ln() / (4.0 * steady_k.powi(3))
+                + (t / steady_k).atan() / (2.0 * steady_k.powi(3))
         };
-        film.capacity_j_m2_k / (film.emissivity.iter().sum::<f64>() * STEFAN_BOLTZMANN_W_M2_K4) * (of(until_k) - of(from_k))
+        film.capacity_j_m2_k / (film.emissivity.iter().sum::<f64>() * STEFAN_BOLTZMANN_W_M2_K4)
+            * (of(until_k) - of(from_k))
     }
 
     #[test]

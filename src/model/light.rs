@@ -75,7 +75,14 @@ impl Beam {
     ///
     /// Without a spot its flux is that of Eq. 40. A spot's diameter D is that at the stated distance d₀; all the light falls evenly into it, in a cone from
     /// the lamp: I = Pε/(¼π(Dd/d₀)²).
-    pub fn of(light: &Light, power_w: f64, distance_m: f64, width_m: f64, length_m: f64, faces: [Reflectivity; 2]) -> Self {
+    pub fn of(
+        light: &Light,
+        power_w: f64,
+        distance_m: f64,
+        width_m: f64,
+        length_m: f64,
+        faces: [Reflectivity; 2],
+    ) -> Self {
         let spot = light.spot_diameter_m.map(|stated_m| Spot {
             diameter_m: stated_m * distance_m / light.distance_m.unwrap_or(distance_m),
             height_m: light.spot_height_m.unwrap_or(0.5 * length_m),

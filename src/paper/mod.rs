@@ -11,6 +11,7 @@
 //! | [`normal_modes`] | Eq. 33 and 34 |
 //! | [`table3`] | the frequencies |
 //! | [`table4`] | light pressure and displacements |
+//! | [`warm`] | the same with heat allowed |
 //!
 //! The paper measures the damping of thin membranes and validates a model of flexible, high area-to-mass debris under solar radiation
 //! pressure. Gravity is taken as 9.81 m/s² throughout; the paper does not state it.
@@ -24,6 +25,7 @@ pub mod table1;
 pub mod table2;
 pub mod table3;
 pub mod table4;
+pub mod warm;
 
 use serde::Serialize;
 
@@ -114,6 +116,7 @@ impl Reproduction {
                 table2::section()?,
                 table3::section()?,
                 table4::section(distance_m)?,
+                warm::section()?,
             ],
         })
     }

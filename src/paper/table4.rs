@@ -7,8 +7,8 @@ use super::table2::strip;
 use super::{AGREES, GRAVITY_M_S2, Quantity, Row, Section, Verdict, agrees};
 use crate::error::{Error, Result};
 use crate::experiment::{Experiment, Model, Reflectivity, Rig, Specimen};
-use crate::model::modes::Linearised;
 use crate::model::light::{Spotlight, radiation_force_n};
+use crate::model::modes::Linearised;
 use crate::model::strip::load::Dead;
 use crate::model::strip::{Mesh, Rest, Strip, Support};
 
@@ -105,7 +105,7 @@ fn remarks(force_n: f64) -> Result<Vec<String>> {
         ),
         format!(
             "The text calls the finite elements' answer non-linear. The strip turns by {tilt_rad:.1e} rad at 2000 W, and what is not linear \
-             in that angle is of its square, {:.0e}. What is left is heat, which the paper itself suspects.",
+             in that angle is of its square, {:.0e}.",
             tilt_rad * tilt_rad
         ),
         format!(

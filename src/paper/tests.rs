@@ -277,3 +277,15 @@ fn a_distance_that_is_no_length_is_refused() {
         assert!(Reproduction::of(distance_m).unwrap_err().to_string().starts_with("--distance-m"));
     }
 }
+
+#[test]
+fn heat_makes_none_of_table_4s_errors_with_one_absorbed_share() {
+    let warm = reproduction().sections.iter().find(|s| s.title.contains("heat allowed")).unwrap();
+    assert_eq!(warm.rows.len(), 24);
+    assert!(warm.rows.iter().all(is_impossible));
+    // Kapton, 2000 W: push and curl are both linear in the flux, so every power has the same error
+    let kapton = &warm.rows[16..20];
+    assert!(kapton.iter().all(|row| (row.computed.value - kapton[0].computed.value).abs() < 1e-12));
+    assert!((-0.85..-0.70).contains(&kapton[0].computed.value), "{}", kapton[0].computed.value);
+    assert!(warm.remarks.iter().any(|r| r.contains("No single share")));
+}

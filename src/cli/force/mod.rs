@@ -11,12 +11,8 @@ use crate::error::{Error, Result};
 use crate::experiment::Experiment;
 use crate::force::plan::Wanted;
 use crate::force::{Force, Plan, Response, Schedule, Setup};
-use crate::model::modes::{Linearised, Modes};
 use crate::output::OutputFile;
 use crate::report::figure::svg;
-
-/// A damping ratio of the model below this is no damping that anyone measured.
-const LEAST_DAMPING: f64 = 1e-4;
 
 /// Compute how far the spotlight pushes a strip, and how far its heat curls it.
 #[derive(Debug, clap::Args)]
@@ -35,6 +31,9 @@ pub struct ForceArgs {
     /// The same as JSON, in full precision; `-` for standard output instead of the tables.
     #[arg(long, value_name = "FILE")]
     json: Option<PathBuf>,
+    /// Further points of the strip, below the hinge.
+    #[arg(long, value_name = "M,M,...", value_delimiter = ',')]
+    at_m: Vec<f64>,
     /// Displacement over power, as SVG.
     #[arg(long, value_name = "FILE.svg")]
     figure: Option<PathBuf>,
@@ -59,7 +58,7 @@ pub struct ForceArgs {
     /// Samples a second, of --plan and --trace.
     #[arg(long, value_name = "HZ", default_value_t = 100.0, allow_negative_numbers = true)]
     rate_hz: f64,
-    /// Damping ratio of the modes, of --plan and --trace, as `identify` measures it; the model's where it is absent.
+    /// Damping ratio of the modes, of --plan and --trace, as `identify` measures it.
     #[arg(long, value_name = "SHARE", allow_negative_numbers = true)]
     damping_ratio: Option<f64>,
 }
@@ -79,10 +78,10 @@ impl ForceArgs {
             return super::deliver(&page::plan_text(&plan), &plan, json, console);
         }
         let motion = match &trace {
-            Some(_) => Some(self.trace_csv(&setup, &experiment).map_err(|e| in_file(e, &self.config))?),
+            Some(_) => Some(self.trace_csv(&setup).map_err(|e| in_file(e, &self.config))?),
             None => None,
         };
-        let force = Force::of(&setup).map_err(|e| in_file(e, &self.config))?;
+        let force = Force::of(&setup, &self.at_m).map_err(|e| in_file(e, &self.config))?;
         if let Some(warning) = page::out_of_range(&setup, &force) {
             console.warning(warning);
         }
@@ -106,51 +105,44 @@ impl ForceArgs {
             noise_m,
             rate_hz: self.rate_hz,
             time_s: self.time_s,
-            damping_ratio: self.damping(experiment)?,
+            damping_ratio: self.damping()?,
         };
         Plan::of(setup, wanted)
     }
 
-    /// ξ: as stated, else the model's first mode's.
-    fn damping(&self, experiment: &Experiment) -> Result<f64> {
-        let of_model = || -> Result<f64> {
-            let modes = Modes::of(&Linearised::of(experiment)?)?;
-            let damping_ratio = modes.modes.first().map_or(0.0, |mode| mode.damping_ratio);
-            if damping_ratio >= LEAST_DAMPING {
-                return Ok(damping_ratio);
-            }
-            let message = format!(
-                "the model of this file loses next to nothing (ξ = {damping_ratio:.1e}); give the damping ratio that `freeswing identify` measured"
-            );
-            Err(Error::Option { option: "--damping-ratio".into(), message })
-        };
+    /// ξ.
+    fn damping(&self) -> Result<f64> {
+        let wrong = |message: String| Error::Option { option: "--damping-ratio".into(), message };
         match self.damping_ratio {
-            Some(value) if !(value > 0.0 && value < 1.0) => Err(Error::Option {
-                option: "--damping-ratio".into(),
-                message: format!("{value} is not between 0 and 1"),
-            }),
-            Some(value) => Ok(value),
-            None => of_model(),
+            Some(value) if value > 0.0 && value < 1.0 => Ok(value),
+            Some(value) => Err(wrong(format!("{value} is not between 0 and 1"))),
+            None => Err(wrong("is needed; give the one that `freeswing identify` measured, for example 0.02".into())),
         }
     }
 
-    fn trace_csv(&self, setup: &Setup, experiment: &Experiment) -> Result<String> {
+    fn trace_csv(&self, setup: &Setup) -> Result<String> {
         /// More rows than a record of a day at a kilohertz are a slip.
         const MOST_ROWS: f64 = 1e8;
         let rows = self.duration_s * self.rate_hz;
         for (option, value) in [("--duration-s", self.duration_s), ("--rate-hz", self.rate_hz)] {
             if !(value.is_finite() && value > 0.0) {
-                return Err(Error::Option { option: option.into(), message: format!("{value} is not above 0; give a positive number") });
+                return Err(Error::Option {
+                    option: option.into(),
+                    message: format!("{value} is not above 0; give a positive number"),
+                });
             }
         }
         if rows > MOST_ROWS {
-            return Err(Error::Option { option: "--duration-s".into(), message: format!("{rows:.0} rows are too many; shorten the time or lower --rate-hz") });
+            return Err(Error::Option {
+                option: "--duration-s".into(),
+                message: format!("{rows:.0} rows are too many; shorten the time or lower --rate-hz"),
+            });
         }
         let light = &setup.light;
         let edges_s = if light.on_s.is_empty() { vec![0.1 * self.duration_s] } else { light.on_s.clone() };
         let schedule = Schedule { edges_s, warm_up_s: light.warm_up_s, chop_hz: light.chop_hz };
         let (power_w, distance_m) = setup.main()?;
-        let response = Response::of(setup, power_w, distance_m, self.damping(experiment)?)?;
+        let response = Response::of(setup, power_w, distance_m, self.damping()?)?;
         let mut csv = String::from("t_s,light,temperature_k,push_um,heat_um,displacement_um\n");
         for instant in response.motion(&schedule, 1.0 / self.rate_hz, rows.round() as usize) {
             let kelvin = instant.kelvin.map_or(String::new(), |kelvin| format!("{kelvin:.4}"));

@@ -84,7 +84,8 @@ fn errors(force: &Force, text: &mut String) {
     if force.heat.is_none() {
         return;
     }
-    let _ = writeln!(text, "\nWhat a model without heat misses, % of all (the paper's Table 4 where it has the number)");
+    let _ =
+        writeln!(text, "\nWhat a model without heat misses, % of all (the paper's Table 4 where it has the number)");
     let mut table = Table::new(["power", "distance", "multibody", "strip", "paper, multibody", "paper, FE"]);
     for row in &force.sweep {
         let error = |model_m: f64| format!("{:+.2}", 100.0 * (model_m / row.point.total_m - 1.0));
@@ -138,7 +139,8 @@ fn statements(setup: &Setup, force: &Force) -> Vec<String> {
                 statements.push(format!("Typical of the film, not stated in the file: {}.", times.assumed.join(", ")));
             }
             statements.push(
-                "Left out: conduction along the strip, its curl across, and light that other things send back.".to_owned(),
+                "Left out: conduction along the strip, its curl across, and light that other things send back."
+                    .to_owned(),
             );
         }
         _ => statements.push("Heat is not reckoned: the file has no [heat].".to_owned()),
@@ -158,12 +160,17 @@ fn models(setup: &Setup, force: &Force, multibody_m: Option<f64>, strip_m: f64) 
     };
     let off = multibody_m / strip_m - 1.0;
     if off.abs() <= AGREE {
-        return format!("Multibody and strip agree on the push within {} %.", number(100.0 * off.abs().max(1e-6), 2));
+        let percent = if off.abs() < 1e-4 { "0.01".to_owned() } else { number(100.0 * off.abs(), 2) };
+        return format!("Multibody and strip agree on the push within {percent} %.");
     }
     let why = if setup.strip.curl_per_m != 0.0 {
         "the strip is curled at rest and the chain is straight".to_owned()
-    } else if setup.experiment.rig.support == Support::Hinged && setup.experiment.rig.support_stiffness_n_m_per_rad > 0.0 {
-        format!("the hinge's spring bends the strip over {layer_mm} mm below it, which the chain's first link cannot follow")
+    } else if setup.experiment.rig.support == Support::Hinged
+        && setup.experiment.rig.support_stiffness_n_m_per_rad > 0.0
+    {
+        format!(
+            "the hinge's spring bends the strip over {layer_mm} mm below it, which the chain's first link cannot follow"
+        )
     } else if setup.light.spot_diameter_m.is_some() {
         "a spot bends the strip, and the chain only at its joints".to_owned()
     } else {
@@ -171,7 +178,10 @@ fn models(setup: &Setup, force: &Force, multibody_m: Option<f64>, strip_m: f64) 
     };
     let more = if off > 0.0 { "more" } else { "less" };
     let percent = number(100.0 * off.abs(), 3);
-    format!("The multibody model moves by {percent} % {more} than the strip: {why} ({} N push).", number(force.force_n, 3))
+    format!(
+        "The multibody model moves by {percent} % {more} than the strip: {why} ({} N push).",
+        number(force.force_n, 3)
+    )
 }
 
 /// The sensor cannot tell a displacement of the sweep.
@@ -218,7 +228,7 @@ pub fn plan_text(plan: &Plan) -> String {
     text.push_str(&paragraph(
         "  – ",
         &format!(
-            "Chopping at the strip's own frequency raises signal over noise {} times in the same time; the swing needs {} s to build up to nine tenths.",
+            "Chopping at the strip's own frequency raises signal over noise {} times in the same time; the swing needs {} s more to build up to nine tenths.",
             number(plan.gain, 3),
             number(plan.chopped.settling_s, 3)
         ),
@@ -237,18 +247,16 @@ fn heat_words(plan: &Plan) -> String {
     if steps == 0.0 {
         return "Heat is not reckoned: the file has no [heat].".to_owned();
     }
+    let (long, short) = (number(steps, 3), number(chopped, 3));
     if chopped < 0.9 * steps {
         format!(
-            "Of heat, {} times the push when the lamp is long on, chopping leaves {} times: what follows the temperature cannot keep up. The rest is the curl \
-             of the gradient, which is there at once.",
-            number(steps, 3),
-            number(chopped, 3)
+            "Heat is {long} times the push when the lamp is long on, and {short} times when it is chopped: a curl hardly drives a mode that hardly bends, and what \
+             follows the temperature cannot keep up."
         )
     } else {
         format!(
-            "Chopping does not lessen heat ({} times the push, {} when the lamp is long on): it is the curl of the gradient, which is there at once.",
-            number(chopped, 3),
-            number(steps, 3)
+            "Chopping does not lessen heat ({short} times the push, {long} when the lamp is long on): the curl of the gradient is there at once, and this mode \
+             bends."
         )
     }
 }
