@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
-use freeswing::video::{Container, Decoded, Frame, decode_in_order, decode_one_by_one};
+use freeswing::video::{Container, Decoded, Frame, Recording, StillTimes, decode_in_order, decode_one_by_one};
 
 /// A moving test picture of 150 frames, coded by the `ffmpeg` program with `options`.
 fn clip(folder: &Path, name: &str, options: &[&str]) -> PathBuf {
@@ -119,6 +119,27 @@ fn every_codec_container_and_pixel_format_decodes_alike_in_parallel() {
         assert_eq!(decoded.frames, 150, "{name}");
         if splits {
             assert!(decoded.segments > 1, "{name}: {} segments", decoded.segments);
+        }
+    }
+}
+
+#[test]
+fn sampled_pictures_are_those_of_the_whole_recording_one_key_frame_or_many() {
+    let folder = tempfile::tempdir().unwrap();
+    for (name, gap) in [("one.mp4", "250"), ("many.mp4", "30")] {
+        let coded = ["-c:v", "libx264", "-pix_fmt", "yuv420p", "-bf", "2", "-sc_threshold", "0", "-g", gap];
+        let path = clip(folder.path(), name, &coded);
+        let whole = decode_whole(&path);
+        let mut sampled = Vec::new();
+        let recording = Recording::open(&path, &StillTimes::Beside).unwrap();
+        recording.sample(8, &mut |frame| sampled.push(fingerprint(*frame))).unwrap();
+        let places: Vec<usize> =
+            sampled.iter().map(|seen| whole.iter().position(|frame| frame == seen).expect(name)).collect();
+        assert_eq!(places.len(), 8, "{name}");
+        if gap == "250" {
+            assert_eq!(places, [1, 9, 17, 25, 33, 41, 49, 57]);
+        } else {
+            assert!(places.windows(2).all(|w| w[0] + 8 <= w[1]) && places[7] > 120, "{places:?}");
         }
     }
 }

@@ -1,7 +1,7 @@
 //! The runs of a batch: each a process of its own, as many at once as there are cores.
 //!
-//! The largest recordings come first, so that none is left over when the others are done. A run may use twice its share of the cores, and at least two: what one
-//! cannot use at the moment another does.
+//! The largest recordings come first, so that none is left over when the others are done. A run gets twice its share of the cores: of many small ones each has
+//! one, for a second thread costs a second decoder and finds no idle core.
 
 use std::collections::VecDeque;
 use std::fs;
@@ -70,7 +70,7 @@ impl Crew<'_> {
             while let Some(job) = next().filter(|_| !has_stopped()) {
                 let share = job.bytes as f64 / whole as f64;
                 let threads =
-                    ((2.0 * share * self.options.cores as f64).ceil() as usize).clamp(2, self.options.cores.max(2));
+                    ((2.0 * share * self.options.cores as f64).ceil() as usize).clamp(1, self.options.cores.max(1));
                 if let Err(error) = self.job(lane, &job, threads) {
                     // the first says what happened, the others follow from it
                     stopped.lock().unwrap_or_else(PoisonError::into_inner).get_or_insert(error);

@@ -65,9 +65,9 @@ pub(super) const LEAST_ROUNDNESS: f64 = 0.4;
 /// Blobs of one hue that are measured in a frame, the largest ones.
 const MOST_BLOBS: usize = 40;
 
-/// Samples around a hit block: a mark that ends in the next block is whole, and mending its outline does not meet
+/// Samples around a hit block, or around what is above the threshold: a mark that ends in the next block is whole, and mending its outline does not meet
 /// the region's edge.
-const MARGIN: usize = 6;
+pub(super) const MARGIN: usize = 6;
 
 /// Finds and measures the blobs of one hue.
 pub(super) fn find(
@@ -143,15 +143,15 @@ fn weighted(part: &Part, layout: &Layout, weight: &dyn Fn([usize; 2]) -> i16) ->
 fn parts(picture: &Picture<'_>, target: &Target, planes: &mut Planes) -> Result<(Vec<Part>, Option<Rc<Plane>>)> {
     let mut parts: Vec<Part> = Vec::new();
     let mut plane = None;
-    let accepted = |mask: Mask| -> Result<_> { Ok(mask.parts()?.into_iter().filter(|p| target.accepts(p))) };
+    let accepted = |mask: Mask| mask.parts().into_iter().filter(|p| target.accepts(p));
     if target.is_sought_everywhere() {
         let whole = planes.of(picture, target)?;
         let mask = Mask::of_plane(&whole, target.threshold, target.thin).bridged(target.axis.is_luma());
-        parts.extend(accepted(mask)?);
+        parts.extend(accepted(mask));
         plane = Some(whole);
     } else {
         for region in regions(picture, target.axis, target.threshold) {
-            parts.extend(accepted(Mask::of(picture, target.axis, target.threshold, target.thin, region))?);
+            parts.extend(accepted(Mask::of(picture, target.axis, target.threshold, target.thin, region)));
         }
     }
     if parts.len() > MOST_BLOBS {
@@ -191,12 +191,8 @@ pub(super) fn regions(picture: &Picture<'_>, axis: HueAxis, threshold: i16) -> V
     let (width, height) = picture.layout.chroma_size();
     let (columns, rows) = (width.div_ceil(BLOCK), height.div_ceil(BLOCK_ROWS));
     let mut hit = vec![false; columns * rows];
-    let mut maxima = vec![i16::MIN; columns];
     for y in (0..height).step_by(SCAN_STEP) {
-        axis.block_maxima(picture, y, &mut maxima);
-        for (h, m) in hit[y / BLOCK_ROWS * columns..].iter_mut().zip(&maxima) {
-            *h |= *m > threshold;
-        }
+        axis.mark_hits(picture, y, threshold, &mut hit[y / BLOCK_ROWS * columns..][..columns]);
     }
     let mut regions: Vec<Region> = Vec::new();
     for row in 0..rows {

@@ -119,7 +119,7 @@ impl Album {
             let scale = self.at_scale(HueAxis::at_angle(angle_rad), level)?;
             let mut widest = 0.0f64;
             for (best, marks) in best.iter_mut().zip(counts) {
-                let Some(mut trial) = scale.try_for(*marks, fixed)? else { continue };
+                let Some(mut trial) = scale.try_for(*marks, fixed) else { continue };
                 trial.angle_rad = Some(angle_rad);
                 widest = widest.max(trial.diameter_samples());
                 keep_better(best, trial);
@@ -140,7 +140,7 @@ impl Album {
         for level in 0..=LAST_LEVEL {
             let scale = self.at_scale(HueAxis::of_luma_sign(dark), level)?;
             for (best, marks) in best.iter_mut().zip(counts) {
-                if let Some(trial) = scale.try_for(*marks, fixed)? {
+                if let Some(trial) = scale.try_for(*marks, fixed) {
                     keep_better(best, trial);
                 }
             }
@@ -155,10 +155,10 @@ impl Album {
         let moved: Vec<Vec<bool>> = self.moved.iter().map(|m| self.coarse(m, level)).collect();
         let survey = |(n, picture): (usize, &Samples)| -> Result<(Plane, [Vec<Summit>; 2])> {
             let plane = self.plane(picture, axis, level)?;
-            let mut relief = Relief::new(&plane, moved.get(n).map(Vec::as_slice));
-            let with_lines = relief.summits(least, floor);
+            let mut relief = Relief::new(&plane, moved.get(n).map(Vec::as_slice), floor);
+            let with_lines = relief.summits(least);
             relief.open();
-            let without_lines = relief.summits(least, floor);
+            let without_lines = relief.summits(least);
             Ok((plane, [without_lines, with_lines]))
         };
         let surveys = self.pictures.par_iter().enumerate().map(survey).collect::<Result<Vec<_>>>()?;
@@ -260,23 +260,23 @@ struct Scale {
 }
 
 impl Scale {
-    fn try_for(&self, marks: usize, fixed: Option<f64>) -> Result<Option<Trial>> {
+    fn try_for(&self, marks: usize, fixed: Option<f64>) -> Option<Trial> {
         let chosen = [false, true].into_iter().find_map(|thin| {
             let threshold = threshold::choose(&self.summits[usize::from(thin)], marks, self.floor);
             threshold.map(|t| (fixed.unwrap_or(t), thin))
         });
-        let Some((threshold, thin)) = chosen else { return Ok(None) };
+        let (threshold, thin) = chosen?;
         let of_picture = |(n, plane): (usize, &Plane)| {
             let mask = Mask::of_plane(plane, from_255(threshold), thin).bridged(self.luma);
             spots_of(plane, &mask, self.least, self.moved.get(n).map(Vec::as_slice))
         };
-        let spots = self.planes.par_iter().enumerate().map(of_picture).collect::<Result<Vec<_>>>()?;
+        let spots: Vec<Vec<Spot>> = self.planes.par_iter().enumerate().map(of_picture).collect();
         let quality = quality(&spots, marks, self.moves, self.luma);
         let mut trial = Trial { angle_rad: None, level: self.level, threshold, thin, marks, spots, quality };
         // a spot of few samples is round by chance, and beside its surroundings by little
         let wide = trial.usual_samples().map_or(0.0, |n| (n * 4.0 / std::f64::consts::PI).sqrt());
         trial.quality *= (wide / WIDE_ENOUGH).min(1.0);
-        Ok(Some(trial))
+        Some(trial)
     }
 }
 
@@ -286,15 +286,15 @@ fn keep_better(best: &mut Option<Trial>, trial: Trial) {
     }
 }
 
-fn spots_of(plane: &Plane, mask: &Mask, least: usize, moved: Option<&[bool]>) -> Result<Vec<Spot>> {
-    let spots = mask.parts()?.into_iter().filter(|part| part.points.len() >= least).map(|part| {
+fn spots_of(plane: &Plane, mask: &Mask, least: usize, moved: Option<&[bool]>) -> Vec<Spot> {
+    let spots = mask.parts().into_iter().filter(|part| part.points.len() >= least).map(|part| {
         let at = |p: &[usize; 2]| p[1] * plane.width + p[0];
         let moving = moved.map_or(0, |m| part.points.iter().filter(|p| m[at(p)]).count());
         let top = part.points.iter().map(|p| plane.values[at(p)]).max().unwrap_or(0);
         let summit = Summit { top: 0.0, saddle: 0.0, samples: part.points.len(), moved: moving };
         Spot { roundness: part.roundness(), moves: summit.moves(), top: to_255(f64::from(top)), part }
     });
-    Ok(spots.collect())
+    spots.collect()
 }
 
 /// How well the spots of the pictures look like `marks` marks.

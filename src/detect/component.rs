@@ -65,7 +65,13 @@ impl HueAxis {
     #[inline]
     pub(super) fn of(self, cb: u8, cr: u8) -> i16 {
         let (b, r) = (i16::from(cb) - 128, i16::from(cr) - 128);
-        (self.u * b + self.v * r) - (self.u * r - self.v * b).abs()
+        self.along(cb, cr) - (self.u * r - self.v * b).abs()
+    }
+
+    /// Its first term, the projection on the hue's direction.
+    #[inline]
+    fn along(self, cb: u8, cr: u8) -> i16 {
+        self.u * (i16::from(cb) - 128) + self.v * (i16::from(cr) - 128)
     }
 
     /// The component of a luma code, for a mark without a hue.
@@ -89,7 +95,7 @@ impl HueAxis {
     /// The components of chroma row `y` in `columns`, added to `row`.
     pub(super) fn row(self, picture: &Picture<'_>, y: usize, columns: std::ops::Range<usize>, row: &mut Vec<i16>) {
         if self.is_luma() {
-            luma_row(picture, y, columns, |code| row.push(self.of_luma(code)));
+            luma_row(picture, y, columns, row, |code| self.of_luma(code));
             return;
         }
         if picture.wide() || picture.cb.step != 1 {
@@ -101,42 +107,53 @@ impl HueAxis {
         row.extend(cb.iter().zip(cr).map(|(b, r)| self.of(*b, *r)));
     }
 
-    /// Largest component in each run of [`BLOCK`] samples of chroma row `y`.
-    pub(super) fn block_maxima(self, picture: &Picture<'_>, y: usize, maxima: &mut [i16]) {
+    /// Marks each run of [`BLOCK`] samples of chroma row `y` in which a component is above `threshold`.
+    pub(super) fn mark_hits(self, picture: &Picture<'_>, y: usize, threshold: i16, hits: &mut [bool]) {
         let (width, _) = picture.layout.chroma_size();
         if self.is_luma() || picture.wide() || picture.cb.step != 1 {
-            for (block, max) in maxima.iter_mut().enumerate() {
-                let columns = block * BLOCK..((block + 1) * BLOCK).min(width);
-                *max = columns.map(|x| self.at(picture, x, y)).max().unwrap_or(i16::MIN);
+            for (block, hit) in hits.iter_mut().enumerate() {
+                let mut columns = block * BLOCK..((block + 1) * BLOCK).min(width);
+                *hit |= columns.any(|x| self.at(picture, x, y) > threshold);
             }
             return;
         }
         let cb = &picture.cb.bytes[y * picture.cb.stride..][..width];
         let cr = &picture.cr.bytes[y * picture.cr.stride..][..width];
-        for ((cb, cr), max) in cb.chunks(BLOCK).zip(cr.chunks(BLOCK)).zip(maxima) {
-            // a plain fold over bytes, which the compiler turns into vector instructions
-            *max = cb.iter().zip(cr).fold(i16::MIN, |m, (b, r)| m.max(self.of(*b, *r)));
+        for ((cb, cr), hit) in cb.chunks(BLOCK).zip(cr.chunks(BLOCK)).zip(hits) {
+            // plain folds over bytes, which the compiler turns into vector instructions; a component is never larger
+            // than its first term, and in most blocks that is enough to know
+            let may_hit = || cb.iter().zip(cr).fold(i16::MIN, |m, (b, r)| m.max(self.along(*b, *r))) > threshold;
+            let does_hit = || cb.iter().zip(cr).fold(i16::MIN, |m, (b, r)| m.max(self.of(*b, *r))) > threshold;
+            *hit = *hit || may_hit() && does_hit();
         }
     }
 }
 
-/// Mean luma of the pixels at every chroma sample of a row, 8-bit codes.
-pub(super) fn luma_row(picture: &Picture<'_>, y: usize, columns: std::ops::Range<usize>, mut take: impl FnMut(u8)) {
+/// Mean luma of the pixels at every chroma sample of a row, 8-bit codes; what is made of each is added to `row`.
+pub(super) fn luma_row<T>(
+    picture: &Picture<'_>,
+    y: usize,
+    columns: std::ops::Range<usize>,
+    row: &mut Vec<T>,
+    of: impl Fn(u8) -> T,
+) {
     let layout = &picture.layout;
     let plain = !picture.wide() && picture.luma.step == 1 && layout.low_bits == 0 && layout.bits == 8;
     let halved = (layout.chroma_shift_x, layout.chroma_shift_y) == (1, 1);
     let whole = 2 * y + 1 < layout.height_px && 2 * columns.end <= layout.width_px;
     if !(plain && halved && whole) {
-        columns.for_each(|x| take(luma_at(picture, x, y)));
+        row.extend(columns.map(|x| of(luma_at(picture, x, y))));
         return;
     }
     // the usual layout, pair by pair: this runs over whole pictures
-    let pairs =
-        |y: usize| picture.luma.bytes[y * picture.luma.stride..][2 * columns.start..2 * columns.end].chunks_exact(2);
-    for (upper, lower) in pairs(2 * y).zip(pairs(2 * y + 1)) {
-        let sum = [upper[0], upper[1], lower[0], lower[1]].into_iter().map(u16::from).sum::<u16>();
-        take((sum / 4) as u8);
-    }
+    let pairs = |y: usize| {
+        let bytes = &picture.luma.bytes[y * picture.luma.stride..][2 * columns.start..2 * columns.end];
+        bytes.as_chunks::<2>().0
+    };
+    row.extend(pairs(2 * y).iter().zip(pairs(2 * y + 1)).map(|(upper, lower)| {
+        let sum = upper.iter().chain(lower).map(|code| u16::from(*code)).sum::<u16>();
+        of((sum / 4) as u8)
+    }));
 }
 
 /// Mean luma of the pixels at chroma sample (x, y), 8-bit code.

@@ -212,7 +212,9 @@ impl View<'_> {
             for (y, row) in mask.rows() {
                 for j in (y << target.level)..((y + 1) << target.level).min(rows) {
                     let to = &mut samples[j * columns..(j + 1) * columns];
-                    to.iter_mut().enumerate().for_each(|(i, t)| *t |= row[(i >> target.level).min(row.len() - 1)]);
+                    let sample = |i: usize| (i >> target.level).min(plane.width - 1).checked_sub(mask.left());
+                    let at = |i: usize| sample(i).and_then(|x| row.get(x)).copied().unwrap_or_default();
+                    to.iter_mut().enumerate().for_each(|(i, t)| *t |= at(i));
                 }
             }
         }

@@ -2,15 +2,11 @@
 
 use std::ops::Range;
 
-use opencv::core::{CV_32S, Mat, MatTraitConstManual};
-use opencv::imgproc;
-
-use super::blobs::Region;
+use super::blobs::{MARGIN, Region};
 use super::centroid::Silhouette;
 use super::component::HueAxis;
 use super::morphology::{dilate, erode};
 use super::plane::Plane;
-use crate::error::{Error, Result};
 use crate::video::Picture;
 
 /// What is above the threshold.
@@ -33,8 +29,8 @@ impl Mask {
 
     /// Of a whole picture at its scale.
     pub fn of_plane(plane: &Plane, threshold: i16, thin: bool) -> Self {
-        let region = Region { left: 0, top: 0, right: plane.width, bottom: plane.height };
-        Self::of_component(&plane.values, threshold, thin, region)
+        let region = plane.extent(threshold, MARGIN);
+        Self::of_component(&plane.within(region), threshold, thin, region)
     }
 
     /// Takes parts up to two samples apart for one: the quadrants of a target touch at a point, in which neither is dark.
@@ -68,7 +64,7 @@ impl Mask {
     /// The mask, row by row, 255 inside.
     pub fn rows(&self) -> impl Iterator<Item = (usize, &[u8])> {
         let width = self.region.right - self.region.left;
-        self.bytes.chunks(width).enumerate().map(|(i, row)| (self.region.top + i, row))
+        self.bytes.chunks(width.max(1)).enumerate().map(|(i, row)| (self.region.top + i, row))
     }
 
     /// First column of [`Mask::rows`].
@@ -76,61 +72,93 @@ impl Mask {
         self.region.left
     }
 
-    /// The connected regions (8 neighbours).
-    pub fn parts(&self) -> Result<Vec<Part>> {
-        let failed = |error| Error::opencv("labelling the binary picture")(error);
-        let (labels, boxes) = self.labelled().map_err(failed)?;
-        let labels = labels.data_typed::<i32>().map_err(failed)?;
+    /// The connected regions (8 neighbours), from the top down, each with its samples row by row.
+    pub fn parts(&self) -> Vec<Part> {
         let width = self.region.right - self.region.left;
-        let mut parts = Vec::with_capacity(boxes.len());
-        for bounds in boxes {
-            let mut points = Vec::with_capacity(bounds.samples);
-            for y in bounds.rows.clone() {
-                let row = &labels[y * width..][..width];
-                let mask = &self.bytes[y * width..][..width];
-                let inside = bounds.columns.clone().filter(|x| row[*x] == bounds.label && mask[*x] > 0);
-                points.extend(inside.map(|x| [x + self.region.left, y + self.region.top]));
-            }
-            parts.push(Part { points });
+        let grown = self.bridged.then(|| {
+            let mut grown = self.bytes.clone();
+            dilate(&mut grown, width, 1);
+            grown
+        });
+        let runs = Runs::of(grown.as_ref().unwrap_or(&self.bytes), width);
+        let (labels, count) = runs.labels();
+        let mut parts = vec![Part { points: Vec::new() }; count];
+        for (run, label) in runs.runs.iter().zip(labels) {
+            let row = &self.bytes[run.row * width..][..width];
+            let inside = run.columns.clone().filter(|x| row[*x] > 0);
+            parts[label].points.extend(inside.map(|x| [x + self.region.left, run.row + self.region.top]));
         }
-        Ok(parts)
-    }
-
-    /// Labels the connected regions of the mask.
-    fn labelled(&self) -> opencv::Result<(Mat, Vec<Bounds>)> {
-        let (rows, columns) = (self.region.bottom - self.region.top, self.region.right - self.region.left);
-        let mut grown;
-        let mut bytes = &self.bytes;
-        if self.bridged {
-            grown = self.bytes.clone();
-            dilate(&mut grown, columns, 1);
-            bytes = &grown;
-        }
-        let mask = Mat::new_rows_cols_with_data(rows as i32, columns as i32, bytes)?;
-        let (mut labels, mut stats, mut centroids) = (Mat::default(), Mat::default(), Mat::default());
-        imgproc::connected_components_with_stats(&mask, &mut labels, &mut stats, &mut centroids, 8, CV_32S)?;
-        let of_label = |(label, stats): (usize, &[i32])| {
-            let stat = |column: i32| stats[column as usize] as usize;
-            let (left, top) = (stat(imgproc::CC_STAT_LEFT), stat(imgproc::CC_STAT_TOP));
-            Bounds {
-                label: label as i32,
-                samples: stat(imgproc::CC_STAT_AREA),
-                columns: left..left + stat(imgproc::CC_STAT_WIDTH),
-                rows: top..top + stat(imgproc::CC_STAT_HEIGHT),
-            }
-        };
-        // label 0 is the background
-        let stats = stats.data_typed::<i32>()?.chunks_exact(imgproc::CC_STAT_MAX as usize);
-        Ok((labels, stats.enumerate().skip(1).map(of_label).collect()))
+        parts
     }
 }
 
-/// Where a label is found.
-struct Bounds {
-    label: i32,
-    samples: usize,
+/// Samples side by side in a row of a mask.
+struct Run {
+    row: usize,
     columns: Range<usize>,
-    rows: Range<usize>,
+    /// A run of the same region, in the end the region's first.
+    parent: usize,
+}
+
+/// The runs of a mask from the top down, joined where they touch (Rosenfeld and Pfaltz, J. ACM 13 (1966) 471).
+struct Runs {
+    runs: Vec<Run>,
+}
+
+impl Runs {
+    fn of(bytes: &[u8], width: usize) -> Self {
+        let mut runs = Self { runs: Vec::new() };
+        // of the row above: the first run that may touch the next
+        let mut above = 0;
+        for (row, bytes) in bytes.chunks_exact(width.max(1)).enumerate() {
+            let first = runs.runs.len();
+            let mut from = 0;
+            while let Some(start) = bytes[from..].iter().position(|b| *b > 0).map(|at| from + at) {
+                let end = bytes[start..].iter().position(|b| *b == 0).map_or(width, |at| start + at);
+                let own = runs.runs.len();
+                runs.runs.push(Run { row, columns: start..end, parent: own });
+                while above < first && runs.runs[above].columns.end < start {
+                    above += 1;
+                }
+                for other in above..first {
+                    if runs.runs[other].columns.start > end {
+                        break;
+                    }
+                    runs.join(other, own);
+                }
+                from = end;
+            }
+            above = first;
+        }
+        runs
+    }
+
+    fn root(&mut self, mut run: usize) -> usize {
+        while self.runs[run].parent != run {
+            let up = self.runs[run].parent;
+            self.runs[run].parent = self.runs[up].parent;
+            run = up;
+        }
+        run
+    }
+
+    fn join(&mut self, a: usize, b: usize) {
+        let (a, b) = (self.root(a), self.root(b));
+        self.runs[a.max(b)].parent = a.min(b);
+    }
+
+    /// The region of every run, numbered by their first runs, and how many regions there are.
+    fn labels(&self) -> (Vec<usize>, usize) {
+        let mut labels: Vec<usize> = Vec::with_capacity(self.runs.len());
+        let mut count = 0;
+        for (index, run) in self.runs.iter().enumerate() {
+            // a parent comes before its runs
+            let label = if run.parent == index { count } else { labels[run.parent] };
+            count += usize::from(run.parent == index);
+            labels.push(label);
+        }
+        (labels, count)
+    }
 }
 
 /// One connected region: the columns and rows of its samples.
@@ -241,5 +269,26 @@ mod tests {
         // the two lines of samples on the axes belong to it as well
         assert!((quadrants - 0.5).abs() < 0.05, "{quadrants}");
         assert!(part(|x, y| x.abs() < 28.0 && y.abs() < 3.0).roundness() < 0.3);
+    }
+
+    fn parts_of(rows: &[&str]) -> Vec<Vec<[usize; 2]>> {
+        let bytes: Vec<u8> = rows.iter().flat_map(|row| row.bytes().map(|b| if b == b'#' { 255 } else { 0 })).collect();
+        let region = Region { left: 10, top: 20, right: 10 + rows[0].len(), bottom: 20 + rows.len() };
+        Mask { region, bytes, bridged: false }.parts().into_iter().map(|part| part.points).collect()
+    }
+
+    #[test]
+    fn arms_that_meet_below_are_one_part_and_corners_touch() {
+        let parts = parts_of(&["#..#..#", "#..#...", "####.#.", "......#"]);
+        assert_eq!(parts.len(), 3, "{parts:?}");
+        assert_eq!(parts[0].len(), 8);
+        assert_eq!(parts[0][..3], [[10, 20], [13, 20], [10, 21]]);
+        assert_eq!((&parts[1], &parts[2]), (&vec![[16, 20]], &vec![[15, 22], [16, 23]]));
+    }
+
+    #[test]
+    fn an_empty_mask_and_an_empty_region_have_no_part() {
+        assert!(parts_of(&["....", "...."]).is_empty());
+        assert!(parts_of(&[""]).is_empty());
     }
 }

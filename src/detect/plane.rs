@@ -15,6 +15,7 @@ use opencv::core::{
 };
 use opencv::imgproc;
 
+use super::blobs::Region;
 use super::component::HueAxis;
 use super::samples::Samples;
 use crate::error::{Error, Result};
@@ -69,6 +70,32 @@ impl Plane {
             values.extend(sums.iter().map(|sum| (sum >> (2 * level)) as i16));
         }
         Self { width: columns, height: rows, level, values }
+    }
+
+    /// The rectangle around all samples above `floor`, with a margin of some samples; empty where there is none.
+    pub(super) fn extent(&self, floor: i16, margin: usize) -> Region {
+        let is_above = |value: &i16| *value > floor;
+        let rows = || self.values.chunks_exact(self.width).enumerate();
+        let hit = |(y, row): (usize, &[i16])| (row.iter().fold(i16::MIN, |m, v| m.max(*v)) > floor).then_some(y);
+        let Some(top) = rows().find_map(hit) else { return Region { left: 0, top: 0, right: 0, bottom: 0 } };
+        let (mut left, mut right, mut bottom) = (self.width, 0, top + 1);
+        for (y, row) in rows().skip(top).filter(|row| hit(*row).is_some()) {
+            left = left.min(row[..left].iter().position(is_above).unwrap_or(left));
+            right = row[right..].iter().rposition(is_above).map_or(right, |at| right + at + 1);
+            bottom = y + 1;
+        }
+        Region {
+            left: left.saturating_sub(margin),
+            top: top.saturating_sub(margin),
+            right: (right + margin).min(self.width),
+            bottom: (bottom + margin).min(self.height),
+        }
+    }
+
+    /// The samples of a rectangle, row by row.
+    pub(super) fn within(&self, region: Region) -> Vec<i16> {
+        let rows = self.values.chunks_exact(self.width).take(region.bottom).skip(region.top);
+        rows.flat_map(|row| &row[region.left..region.right]).copied().collect()
     }
 
     fn against_surroundings(mut self, axis: HueAxis) -> Result<Self> {

@@ -1,5 +1,7 @@
 //! Pictures of a recording, kept at chroma resolution, and what moves between them.
 
+use std::ops::Range;
+
 use super::component::{HueAxis, luma_row};
 use crate::statistics::median;
 use crate::video::{Matrix, Picture};
@@ -19,11 +21,17 @@ impl Samples {
     pub fn of(picture: &Picture<'_>) -> Self {
         let (width, height) = picture.layout.chroma_size();
         let down = picture.layout.low_bits + picture.layout.bits - 8;
-        let mut samples = Self { width, height, luma: Vec::new(), cb: Vec::new(), cr: Vec::new() };
+        let empty = || Vec::with_capacity(width * height);
+        let mut samples = Self { width, height, luma: empty(), cb: empty(), cr: empty() };
         for y in 0..height {
-            luma_row(picture, y, 0..width, |code| samples.luma.push(code));
-            samples.cb.extend((0..width).map(|x| (picture.cb.code(picture.wide(), x, y) >> down) as u8));
-            samples.cr.extend((0..width).map(|x| (picture.cr.code(picture.wide(), x, y) >> down) as u8));
+            luma_row(picture, y, 0..width, &mut samples.luma, |code| code);
+            for (codes, plane) in [(&mut samples.cb, &picture.cb), (&mut samples.cr, &picture.cr)] {
+                if picture.wide() || plane.step != 1 {
+                    codes.extend((0..width).map(|x| (plane.code(picture.wide(), x, y) >> down) as u8));
+                } else {
+                    codes.extend_from_slice(&plane.bytes[y * plane.stride..][..width]);
+                }
+            }
         }
         samples
     }
@@ -110,19 +118,12 @@ impl Album {
         }
     }
 
-    /// The median picture: luma, C_b, C_r.
+    /// The median picture: luma, C_b, C_r; of an even number of pictures the upper one of the two in the middle.
     pub fn usual(&self) -> [Vec<u8>; 3] {
-        let middle = self.pictures.len() / 2;
         [0, 1, 2].map(|channel| {
             let planes: Vec<&[u8]> = self.pictures.iter().map(|p| p.channels()[channel]).collect();
-            let mut codes = vec![0u8; planes.len()];
-            (0..planes.first().map_or(0, |p| p.len()))
-                .map(|at| {
-                    codes.iter_mut().zip(&planes).for_each(|(code, plane)| *code = plane[at]);
-                    codes.sort_unstable();
-                    codes[middle]
-                })
-                .collect()
+            let length = planes.first().map_or(0, |p| p.len());
+            (0..length).step_by(STRETCH).flat_map(|at| medians(&planes, at..(at + STRETCH).min(length))).collect()
         })
     }
 
@@ -130,6 +131,24 @@ impl Album {
     pub fn sample_px2(&self) -> f64 {
         f64::from(1u32 << (self.shifts[0] + self.shifts[1]))
     }
+}
+
+/// Samples of a plane whose medians are found together.
+const STRETCH: usize = 4096;
+
+/// The median over the planes of every sample in a range.
+fn medians(planes: &[&[u8]], range: Range<usize>) -> Vec<u8> {
+    let mut sorted: Vec<Vec<u8>> = planes.iter().map(|plane| plane[range.clone()].to_vec()).collect();
+    // sorted by exchanging neighbours, all samples at once: plain loops over bytes, which the compiler turns into vector instructions
+    for last in (1..sorted.len()).rev() {
+        for at in 0..last {
+            let (lower, upper) = sorted.split_at_mut(at + 1);
+            for (a, b) in lower[at].iter_mut().zip(&mut upper[0]) {
+                (*a, *b) = ((*a).min(*b), (*a).max(*b));
+            }
+        }
+    }
+    sorted.swap_remove(planes.len() / 2)
 }
 
 /// A hue that things in the pictures have.
@@ -158,10 +177,11 @@ impl Album {
         for (n, picture) in self.pictures.iter().enumerate() {
             for at in 0..picture.cb.len() {
                 let [b, r] = picture.chroma(at);
-                let chroma = b.hypot(r);
-                if chroma < LEAST_CHROMA || !self.allows(at) {
+                // most samples are grey: they go before anything is asked of a root or an angle
+                if b * b + r * r < LEAST_CHROMA * LEAST_CHROMA || !self.allows(at) {
                     continue;
                 }
+                let chroma = b.hypot(r);
                 let off = turn(r.atan2(b) - centre_rad);
                 if off.abs() > half_width_rad {
                     continue;

@@ -4,6 +4,7 @@
 //! difference is its persistence. The marks are the most persistent summits, and the threshold lies between the
 //! saddle and the summit of the weakest of them, so an amber film or a bright background shifts it where it must be.
 
+use super::blobs::Region;
 use super::component::{from_255, to_255};
 use super::morphology::{dilate, erode};
 use super::plane::Plane;
@@ -47,38 +48,47 @@ impl Summit {
     }
 }
 
-/// The component as a landscape over the samples.
+/// The component as a landscape over the samples, as far as it rises above a floor.
 pub struct Relief<'a> {
-    width: usize,
+    region: Region,
     heights: Vec<i16>,
-    /// Where something moves, as far as that is known.
+    floor: i16,
+    /// Where something moves in the picture, as far as that is known.
     moved: Option<&'a [bool]>,
+    picture_width: usize,
 }
 
+/// Samples around what rises above the floor that [`Relief::open`] asks for.
+const REACH: usize = 2;
+
 impl<'a> Relief<'a> {
-    /// Of a picture's component.
-    pub fn new(plane: &Plane, moved: Option<&'a [bool]>) -> Self {
-        Self { width: plane.width, heights: plane.values.clone(), moved }
+    /// Of a picture's component above `floor` (0 to 255).
+    pub fn new(plane: &Plane, moved: Option<&'a [bool]>, floor: f64) -> Self {
+        let floor = from_255(floor);
+        let region = plane.extent(floor, REACH);
+        Self { region, heights: plane.within(region), floor, moved, picture_width: plane.width }
     }
 
     /// Grey opening over 3×3 samples: ridges of up to two samples, such as burnt-in lines, are worn away.
     pub fn open(&mut self) {
-        erode(&mut self.heights, self.width, 1);
-        dilate(&mut self.heights, self.width, 1);
+        let width = self.region.right - self.region.left;
+        erode(&mut self.heights, width, 1);
+        dilate(&mut self.heights, width, 1);
     }
 
-    /// The summits above `floor` (0 to 255) with at least `least_samples` samples, most persistent first.
-    pub fn summits(&self, least_samples: usize, floor: f64) -> Vec<Summit> {
-        let (width, height) = (self.width, self.heights.len() / self.width);
-        let floor = from_255(floor);
+    /// The summits above the floor with at least `least_samples` samples, most persistent first.
+    pub fn summits(&self, least_samples: usize) -> Vec<Summit> {
+        let (region, floor) = (self.region, self.floor);
+        let (width, height) = (region.right - region.left, region.bottom - region.top);
         let mut order: Vec<(i16, u32)> =
             self.heights.iter().enumerate().filter(|(_, h)| **h > floor).map(|(i, h)| (*h, i as u32)).collect();
         order.sort_unstable_by(|a, b| b.cmp(a));
         let mut forest = Forest::new(width * height, order.len());
         let mut found = Vec::new();
         for &(level, at) in &order {
-            let tree = forest.add(at, level, self.moved.is_some_and(|m| m[at as usize]));
             let (x, y) = (at as usize % width, at as usize / width);
+            let in_picture = (y + region.top) * self.picture_width + x + region.left;
+            let tree = forest.add(at, level, self.moved.is_some_and(|m| m[in_picture]));
             let neighbours = [
                 (x > 0).then(|| at - 1),
                 (x + 1 < width).then(|| at + 1),

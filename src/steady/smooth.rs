@@ -17,19 +17,21 @@ pub(super) struct Smooth {
 impl Smooth {
     pub fn of(luma: &Luma<'_>) -> Self {
         let (width, height, side) = (luma.width, luma.height, 2 * SMOOTH_HALF + 1);
+        // whole rows at a time, in loops that the compiler can turn into vector instructions
+        let add = |sums: &mut [f32], row: &[f32]| sums.iter_mut().zip(row).for_each(|(sum, value)| *sum += value);
         let mut across = vec![0.0f32; width * height];
-        for y in 0..height {
-            let row: Vec<f32> = (0..width).map(|x| luma.code(x as i64, y as i64)).collect();
-            for (x, run) in row.windows(side).enumerate() {
-                across[y * width + x + SMOOTH_HALF] = run.iter().sum();
-            }
+        let mut row = Vec::with_capacity(width);
+        for (y, sums) in across.chunks_exact_mut(width).enumerate() {
+            row.clear();
+            row.extend((0..width).map(|x| luma.code(x as i64, y as i64)));
+            let inside = &mut sums[SMOOTH_HALF..width - SMOOTH_HALF];
+            (0..side).for_each(|k| add(inside, &row[k..]));
         }
         let mut means = vec![0.0f32; width * height];
         for y in SMOOTH_HALF..height.saturating_sub(SMOOTH_HALF) {
-            for x in 0..width {
-                let column = y - SMOOTH_HALF..=y + SMOOTH_HALF;
-                means[y * width + x] = column.map(|j| across[j * width + x]).sum::<f32>() / (side * side) as f32;
-            }
+            let mean = &mut means[y * width..(y + 1) * width];
+            (y - SMOOTH_HALF..=y + SMOOTH_HALF).for_each(|j| add(mean, &across[j * width..(j + 1) * width]));
+            mean.iter_mut().for_each(|m| *m /= (side * side) as f32);
         }
         Self { width, height, means }
     }

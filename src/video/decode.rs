@@ -107,23 +107,37 @@ impl StreamDecoder {
         packets: &mut dyn FnMut() -> Option<Packet>,
         on_frame: &mut dyn FnMut(Frame<'_>) -> ControlFlow<()>,
     ) -> (Decoded, ControlFlow<()>) {
+        let decoded = self.go_on(packets, on_frame);
+        self.begin_anew();
+        decoded
+    }
+
+    /// As [`StreamDecoder::decode`], but where `on_frame` breaks off, the next call goes on with the frame after.
+    pub fn go_on(
+        &mut self,
+        packets: &mut dyn FnMut() -> Option<Packet>,
+        on_frame: &mut dyn FnMut(Frame<'_>) -> ControlFlow<()>,
+    ) -> (Decoded, ControlFlow<()>) {
         let mut decoded = Decoded::default();
-        let mut flow = ControlFlow::Continue(());
-        self.refused = false;
-        while let Some(packet) = packets() {
+        let mut flow = self.receive(&mut decoded, on_frame);
+        while flow.is_continue()
+            && let Some(packet) = packets()
+        {
             if self.video.send_packet(&packet).is_err() {
                 self.refuse(&mut decoded);
             }
             flow = self.receive(&mut decoded, on_frame);
-            if flow.is_break() {
-                break;
-            }
         }
         if flow.is_continue() && self.video.send_eof().is_ok() {
             flow = self.receive(&mut decoded, on_frame);
         }
-        self.video.flush();
         (decoded, flow)
+    }
+
+    /// Forgets every packet, for another stretch.
+    pub fn begin_anew(&mut self) {
+        self.video.flush();
+        self.refused = false;
     }
 
     fn receive(

@@ -167,23 +167,39 @@ fn sample_container(path: &Path, count: usize, see: &mut dyn FnMut(&Frame<'_>)) 
     let (mut container, mut decoder) = opened(path, 1)?;
     let duration_s = container.stated_duration_s().unwrap_or(0.0);
     let mut last_s = f64::NEG_INFINITY;
+    // the packet that the decoder began with, and how many it has had
+    let (mut began, mut sent) = (None, 0);
     for sample in 0..count {
         if sample > 0 && (duration_s <= 0.0 || container.seek(duration_s * sample as f64 / count as f64).is_err()) {
             break;
         }
-        let (mut last_of_sample, mut repeated) = (0, false);
-        let _ = decoder.decode(&mut || container.next_packet().ok().flatten(), &mut |frame| {
-            if frame.t_s > last_s {
-                last_of_sample += 1;
+        let mut next = || container.next_packet().ok().flatten();
+        let Some(first) = next() else { continue };
+        let place = Some((first.pts(), first.dts(), first.position(), first.size()));
+        // a seek that leads back to where the last one did: the decoder goes on from where it stands
+        let goes_on = began == place;
+        let mut waiting = Some(first).filter(|_| !goes_on);
+        if goes_on {
+            (1..sent).for_each(|_| drop(next()));
+        } else {
+            decoder.begin_anew();
+            (began, sent) = (place, 0);
+        }
+        let (mut later, mut repeated) = (0, goes_on && last_s > 0.0);
+        let mut packets = || {
+            let packet = waiting.take().or_else(&mut next);
+            sent += usize::from(packet.is_some());
+            packet
+        };
+        let _ = decoder.go_on(&mut packets, &mut |frame| {
+            later += usize::from(frame.t_s > last_s);
+            repeated |= last_s > 0.0 && later == 0;
+            if later < if repeated { FRAMES_BETWEEN } else { SAMPLE_FRAMES } {
+                return ControlFlow::Continue(());
             }
-            let seeks_lead_back = last_s > 0.0 && last_of_sample == 0;
-            repeated |= seeks_lead_back;
-            if last_of_sample == if repeated { FRAMES_BETWEEN } else { SAMPLE_FRAMES } {
-                last_s = frame.t_s;
-                see(&frame);
-                return ControlFlow::Break(());
-            }
-            ControlFlow::Continue(())
+            last_s = frame.t_s;
+            see(&frame);
+            ControlFlow::Break(())
         });
     }
     Ok(())

@@ -80,15 +80,9 @@ impl Outline {
     #[inline]
     pub fn zone(&self, sample: &Sample) -> Zone {
         let (depth, band) = (self.depth_px(sample), self.bands_px[usize::from(sample.sector)]);
-        if depth < -band {
-            Zone::Core
-        } else if depth <= band {
-            Zone::Band
-        } else if depth <= band + RING_PX {
-            Zone::Ring
-        } else {
-            Zone::Beyond
-        }
+        // counted rather than asked one by one: which zone comes next cannot be foretold
+        let boundaries = [depth >= -band, depth > band, depth > band + RING_PX];
+        [Zone::Core, Zone::Band, Zone::Ring, Zone::Beyond][boundaries.map(usize::from).iter().sum::<usize>()]
     }
 
     /// Number of sectors.

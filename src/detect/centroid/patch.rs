@@ -120,18 +120,18 @@ impl Patch {
         let column = |i: usize| (self.left + i).saturating_sub(2).min(layout.width_px - 1);
         let row = |j: usize| (self.top + j).saturating_sub(2).min(layout.height_px - 1);
         let (width, height) = (self.width + 4, self.height + 4);
-        let mut raw = Vec::with_capacity(width * height);
-        for j in 0..height {
-            raw.extend((0..width).map(|i| f32::from(picture.luma.code(wide, column(i), row(j))) * scale));
-        }
+        let columns: Vec<usize> = (0..width).map(column).collect();
         let (across, down) = (softening(layout.chroma_shift_x), softening(layout.chroma_shift_y));
-        let mut rows = Vec::with_capacity(self.width * height);
-        for line in raw.chunks_exact(width) {
-            rows.extend((0..self.width).map(|i| tapped(&across, |k| line[i + k])));
+        let mut raw = Vec::with_capacity(width);
+        let mut rows = vec![0.0; self.width * height];
+        for (j, out) in rows.chunks_exact_mut(self.width).enumerate() {
+            raw.clear();
+            raw.extend(columns.iter().map(|x| f32::from(picture.luma.code(wide, *x, row(j))) * scale));
+            (0..across.len()).for_each(|k| add(out, across[k], &raw[k..]));
         }
-        let mut soft = Vec::with_capacity(self.width * self.height);
-        for j in 0..self.height {
-            soft.extend((0..self.width).map(|i| tapped(&down, |k| rows[(j + k) * self.width + i])));
+        let mut soft = vec![0.0; self.width * self.height];
+        for (j, out) in soft.chunks_exact_mut(self.width).enumerate() {
+            (0..down.len()).for_each(|k| add(out, down[k], &rows[(j + k) * self.width..]));
         }
         soft
     }
@@ -158,15 +158,16 @@ impl Patch {
         };
         let across: Vec<_> =
             (0..self.width).map(|i| taps(layout.luma_to_chroma((self.left + i) as f64, 0.0).0, cx0, cx1)).collect();
+        // along the rows first: a coarse row lies between several fine ones
+        let mut rows = Vec::with_capacity(self.width * (cy1 - cy0));
+        for row in coarse.chunks_exact(columns) {
+            rows.extend(across.iter().map(|&(l, r, s)| row[l] + s * (row[r] - row[l])));
+        }
         let mut fine = Vec::with_capacity(self.width * self.height);
         for j in 0..self.height {
             let (a, b, t) = taps(layout.luma_to_chroma(0.0, (self.top + j) as f64).1, cy0, cy1);
-            let (upper, lower) = (&coarse[a * columns..(a + 1) * columns], &coarse[b * columns..(b + 1) * columns]);
-            for &(l, r, s) in &across {
-                let up = upper[l] + s * (upper[r] - upper[l]);
-                let down = lower[l] + s * (lower[r] - lower[l]);
-                fine.push(up + t * (down - up));
-            }
+            let [upper, lower] = [a, b].map(|row| &rows[row * self.width..][..self.width]);
+            fine.extend(upper.iter().zip(lower).map(|(up, down)| up + t * (down - up)));
         }
         fine
     }
@@ -183,7 +184,7 @@ fn softening(shift: u32) -> [f32; 5] {
     if shift == 0 { [0.0, 0.0, 1.0, 0.0, 0.0] } else { [0.0625, 0.25, 0.375, 0.25, 0.0625] }
 }
 
-#[inline]
-fn tapped(kernel: &[f32; 5], at: impl Fn(usize) -> f32) -> f32 {
-    kernel.iter().enumerate().map(|(k, w)| w * at(k)).sum()
+/// Adds a row, weighted.
+fn add(sums: &mut [f32], weight: f32, row: &[f32]) {
+    sums.iter_mut().zip(row).for_each(|(sum, value)| *sum += weight * value);
 }

@@ -53,7 +53,6 @@ const UNUSED: f32 = 1e6;
 impl Surroundings {
     /// Reads ring and core. `None` where most of the ring lies outside the picture.
     pub fn survey(zones: &Zones<'_>, outline: &Outline, channels: Channels) -> Option<Self> {
-        let ring: Vec<(u16, Levels)> = zones.ring.iter().map(|s| (s.sector, s.levels)).collect();
         // a mark narrower than its band has no core: its deepest pixel stands for it
         let mark = if zones.core.len() >= 4 {
             [0, 1, 2].map(|k| median(&mut zones.core.iter().map(|s| s.levels[k]).collect::<Vec<_>>()).unwrap_or(0.0))
@@ -61,7 +60,7 @@ impl Surroundings {
             let inside = zones.core.iter().chain(&zones.band);
             inside.min_by(|a, b| outline.depth_px(a).total_cmp(&outline.depth_px(b)))?.levels
         };
-        let scatter = vec![scatter_of(ring.iter().map(|(_, levels)| *levels)); outline.count()];
+        let scatter = vec![scatter_of(zones.ring.iter().map(|s| s.levels)); outline.count()];
         let mut surroundings = Self {
             sectors: vec![Sector::default(); outline.count()],
             mark,
@@ -71,24 +70,24 @@ impl Surroundings {
             channels,
             extrusion: None,
         };
-        surroundings.read_ring(ring, outline)?;
+        surroundings.read_ring(&zones.ring, outline)?;
         surroundings.slope = [0, 1, 2].map(|k| background_slope(&surroundings.sectors, k, surroundings.noise[k]));
         Some(surroundings)
     }
 
-    fn read_ring(&mut self, mut ring: Vec<(u16, Levels)>, outline: &Outline) -> Option<()> {
-        ring.sort_unstable_by_key(|(sector, _)| *sector);
-        let mut residuals: [Vec<f32>; CHANNELS] = Default::default();
-        let mut values = Vec::with_capacity(32);
-        for group in ring.chunk_by(|a, b| a.0 == b.0).filter(|g| g.len() >= 3) {
-            let sector = &mut self.sectors[usize::from(group[0].0)];
+    fn read_ring(&mut self, ring: &[&Sample], outline: &Outline) -> Option<()> {
+        let (levels, ends) = by_sector(ring, outline.count());
+        let mut residuals: [Vec<f32>; CHANNELS] = [0, 1, 2].map(|_| Vec::with_capacity(ring.len()));
+        let mut from = 0;
+        for (sector, end) in self.sectors.iter_mut().zip(ends) {
+            let group = &levels[std::mem::replace(&mut from, end)..end];
+            if group.len() < 3 {
+                continue;
+            }
             sector.known = true;
+            sector.background = medians(group);
             for (k, residual) in residuals.iter_mut().enumerate() {
-                values.clear();
-                values.extend(group.iter().map(|(_, levels)| levels[k]));
-                let level = median(&mut values).unwrap_or(0.0);
-                sector.background[k] = level;
-                residual.extend(values.iter().map(|v| (v - level).abs()));
+                residual.extend(group.iter().map(|levels| (levels[k] - sector.background[k]).abs()));
             }
         }
         fill_unknown(&mut self.sectors)?;
@@ -184,6 +183,48 @@ impl Surroundings {
             }
         }
     }
+}
+
+/// The levels of samples, those of the first sector first, and where in them each of `count` sectors ends.
+fn by_sector(samples: &[&Sample], count: usize) -> (Vec<Levels>, Vec<usize>) {
+    let mut ends = vec![0; count];
+    samples.iter().for_each(|s| ends[usize::from(s.sector)] += 1);
+    let mut before = 0;
+    for end in &mut ends {
+        // where the sector begins, until its samples are put there
+        before += std::mem::replace(end, before);
+    }
+    let mut levels = vec![Levels::default(); samples.len()];
+    for sample in samples {
+        let at = &mut ends[usize::from(sample.sector)];
+        levels[*at] = sample.levels;
+        *at += 1;
+    }
+    (levels, ends)
+}
+
+/// Samples of a sector's ring that are sorted all at once.
+const FEW: usize = 16;
+
+/// The median of every channel.
+fn medians(levels: &[Levels]) -> Levels {
+    if levels.len() > FEW {
+        return [0, 1, 2].map(|k| median(&mut levels.iter().map(|l| l[k]).collect::<Vec<_>>()).unwrap_or(0.0));
+    }
+    // sorted by exchanging neighbours, the channels side by side: no branch depends on a level
+    let mut sorted = [[0.0f32; CHANNELS + 1]; FEW];
+    let sorted = &mut sorted[..levels.len()];
+    sorted.iter_mut().zip(levels).for_each(|(to, from)| to[..CHANNELS].copy_from_slice(from));
+    for pass in 0..levels.len() {
+        for pair in sorted[pass % 2..].chunks_exact_mut(2) {
+            let (a, b) = (pair[0], pair[1]);
+            for k in 0..=CHANNELS {
+                (pair[0][k], pair[1][k]) = if b[k] < a[k] { (b[k], a[k]) } else { (a[k], b[k]) };
+            }
+        }
+    }
+    let (lower, upper) = (sorted[(levels.len() - 1) / 2], sorted[levels.len() / 2]);
+    [0, 1, 2].map(|k| if levels.len().is_multiple_of(2) { (lower[k] + upper[k]) / 2.0 } else { upper[k] })
 }
 
 /// Covariance of colours about their mean.

@@ -23,23 +23,16 @@ impl<'a> Zones<'a> {
     /// a chessboard, says all there is.
     pub fn of(patch: &'a Patch, outline: &Outline) -> Self {
         let every = !patch.is_soft();
-        let mut zones = Self {
-            core: Vec::with_capacity(patch.samples.len() / 2),
-            band: Vec::with_capacity(patch.samples.len() / 2),
-            ring: Vec::with_capacity(patch.samples.len() / 2),
-            beyond: Vec::new(),
-            pixels_each: if every { 1.0 } else { 2.0 },
-        };
+        let room = || Vec::with_capacity(patch.samples.len() / 2);
+        let mut zones = [room(), room(), room(), Vec::new()];
         for sample in &patch.samples {
-            match outline.zone(sample) {
-                Zone::Core if every || sample.is_white() => zones.core.push(sample),
-                Zone::Band if every || sample.is_white() => zones.band.push(sample),
-                Zone::Core | Zone::Band => {}
-                Zone::Ring => zones.ring.push(sample),
-                Zone::Beyond => zones.beyond.push(sample),
+            let zone = outline.zone(sample);
+            if every || sample.is_white() || matches!(zone, Zone::Ring | Zone::Beyond) {
+                zones[zone as usize].push(sample);
             }
         }
-        zones
+        let [core, band, ring, beyond] = zones;
+        Self { core, band, ring, beyond, pixels_each: if every { 1.0 } else { 2.0 } }
     }
 
     /// The boundary band reaches over the picture's edge.
