@@ -119,6 +119,10 @@ pub enum Error {
     /// Stopped by the user.
     #[error("interrupted; nothing was written")]
     Interrupted,
+
+    /// A batch stopped by the user.
+    #[error("interrupted; what was finished is kept, and the same command goes on from there")]
+    Stopped,
 }
 
 impl Error {

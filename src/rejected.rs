@@ -97,7 +97,9 @@ impl Rejected<'_> {
 
     fn refusal(&self, hue: &Hue, found: String) -> Result<Error> {
         let remedy = match self.proposal(hue)? {
-            Some(colour) => format!("what moves here is {colour}: try --color '{colour}'"),
+            Some(colour) => format!(
+                "what moves here is {colour}: try --color '{colour}', or marks = [\"{colour}\", …] in the experiment file"
+            ),
             None => {
                 "name the marks' colour with --color, or lower --threshold; --debug-frames DIR shows each step".into()
             }

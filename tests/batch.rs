@@ -363,6 +363,32 @@ fn nothing_that_can_be_run_is_one_clear_line() {
 }
 
 #[test]
+fn a_pattern_that_matches_nothing_is_refused() {
+    let lab = Laboratory::new().with_tables(2);
+    for more in [&["--only", "none/**"][..], &["--only", "none/**", "--dry-run"]] {
+        let (code, said) = lab.batch("out", more);
+        assert!(code == Some(2) && said.contains("'none/**' matches none of the 2 recordings"), "{said}");
+        assert!(!lab.path("out/summary.csv").exists());
+    }
+}
+
+#[cfg(unix)]
+#[test]
+fn who_stops_a_batch_is_told_that_it_goes_on() {
+    let lab = Laboratory::new().with_tables(40);
+    let batch = lab.command("out").args(["--jobs", "1"]).spawn().unwrap();
+    while lab.finished("out").is_empty() {
+        std::thread::sleep(Duration::from_millis(5));
+    }
+    // SAFETY: a signal to a process of this test
+    assert_eq!(unsafe { libc::kill(batch.id().cast_signed(), libc::SIGINT) }, 0);
+    let output = batch.wait_with_output().unwrap();
+    let said = said(&output);
+    assert!(output.status.code() == Some(2) && said.contains("what was finished is kept"), "{said}");
+    assert!(!lab.finished("out").is_empty() && !said.contains("nothing was written"), "{said}");
+}
+
+#[test]
 fn results_that_cannot_be_written_end_the_batch_with_one_line_and_lose_nothing() {
     let lab = Laboratory::new().with_tables(6);
     lab.film("in/day 0/film.mp4");

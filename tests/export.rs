@@ -52,6 +52,50 @@ fn what_cannot_be_exported_is_said_in_one_line_and_nothing_is_written() {
     assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 2);
 }
 
+/// `cargo test --features hdf5 --test export`
+#[cfg(feature = "hdf5")]
+#[test]
+fn an_hdf5_file_has_every_column_and_missing_values() {
+    use hdf5_metno::types::VarLenUnicode;
+    let folder = folder_with_table();
+    let output = freeswing(folder.path(), &["export", "angles.csv", "--out", "a.h5"]);
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    let file = hdf5_metno::File::open(folder.path().join("a.h5")).unwrap();
+    let mut names = file.member_names().unwrap();
+    names.sort();
+    assert_eq!(names, ["flags", "t_s", "theta1_rad"]);
+    let numbers = |name: &str| file.dataset(name).unwrap().read_raw::<f64>().unwrap();
+    assert_eq!(numbers("t_s"), [0.0, 0.1, 0.2]);
+    let angles = numbers("theta1_rad");
+    assert!(angles[0] == 0.25 && angles[1].is_nan() && angles[2] == -0.25, "{angles:?}");
+    let flags = file.dataset("flags").unwrap().read_raw::<VarLenUnicode>().unwrap();
+    assert_eq!(flags.iter().map(VarLenUnicode::as_str).collect::<Vec<_>>(), ["", "lost:m2", ""]);
+}
+
+#[test]
+fn the_account_beside_the_table_is_not_replaced() {
+    let folder = folder_with_table();
+    fs::write(folder.path().join("angles.json"), "the account").unwrap();
+    let own = folder.path().join("angles.json");
+    for out in ["angles.json", "./angles.json", own.to_str().unwrap()] {
+        let output = freeswing(folder.path(), &["export", "angles.csv", "--out", out]);
+        let told = String::from_utf8(output.stderr).unwrap();
+        assert!(
+            output.status.code() == Some(2) && told.contains("account") && told.contains("series.json"),
+            "{out}: {told}"
+        );
+        assert_eq!(fs::read_to_string(&own).unwrap(), "the account");
+    }
+    // nor is its name taken before it is there
+    fs::remove_file(&own).unwrap();
+    assert_eq!(freeswing(folder.path(), &["export", "angles.csv", "--out", "angles.json"]).status.code(), Some(2));
+    assert!(!own.exists());
+    fs::create_dir(folder.path().join("other")).unwrap();
+    for out in ["series.json", "other/angles.json"] {
+        assert!(freeswing(folder.path(), &["export", "angles.csv", "--out", out]).status.success(), "{out}");
+    }
+}
+
 #[test]
 fn shells_and_manuals_know_every_command() {
     let folder = tempfile::tempdir().unwrap();

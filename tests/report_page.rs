@@ -212,6 +212,23 @@ fn what_a_run_did_not_reach_is_left_out_with_the_reason() {
 }
 
 #[test]
+fn figures_that_are_no_longer_made_go_and_others_stay() {
+    let folder = copy();
+    freeswing("report").arg(folder.path()).assert().success();
+    let figures = folder.path().join("figures");
+    assert!(figures.join("model-1.svg").exists() && figures.join("left-1.png").exists());
+    fs::write(figures.join("mine.svg"), "my own").unwrap();
+    fs::remove_file(folder.path().join("fit.json")).unwrap();
+    freeswing("report").arg(folder.path()).assert().success();
+    for extension in ["svg", "png", "csv"] {
+        assert!(!figures.join(format!("model-1.{extension}")).exists(), "{extension}");
+        assert!(figures.join(format!("left-1.{extension}")).exists(), "{extension}");
+    }
+    // neither what a person put there nor what another command left
+    assert!(figures.join("mine.svg").exists() && figures.join("fit.csv").exists());
+}
+
+#[test]
 fn a_table_alone_makes_a_page() {
     let folder = tempfile::tempdir().unwrap();
     fs::copy(finished().join("angles.csv"), folder.path().join("angles.csv")).unwrap();
@@ -305,6 +322,11 @@ fn in_a_browser_every_plot_is_drawn_and_nothing_is_fetched() {
     let opened = browser.open(&finished().join("report.html"));
     println!("opened in {opened:.2?}, drawn after {} ms", browser.value("document.documentElement.dataset.readyMs"));
     assert!(opened < Duration::from_secs(4), "{opened:?}");
+    // what is in sight is drawn before all of the page is read, everything else without being scrolled to
+    let first = browser.value("Number(document.documentElement.dataset.firstMs)").as_f64().unwrap();
+    let ready = browser.value("Number(document.documentElement.dataset.readyMs)").as_f64().unwrap();
+    assert!(first <= 1e3 * opened.as_secs_f64() && first < ready, "{first} ms, {opened:?}, {ready} ms");
+    assert_eq!(browser.value("scrollY"), json!(0));
     assert_eq!(browser.complaints(), [""; 0]);
     for request in browser.requests() {
         assert!(

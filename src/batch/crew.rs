@@ -57,7 +57,7 @@ impl Crew<'_> {
     /// Runs all jobs.
     ///
     /// # Errors
-    /// [`Error::Interrupted`]; what keeps any result from being written. A recording that fails is none.
+    /// [`Error::Stopped`]; what keeps any result from being written. A recording that fails is none.
     pub fn run(&self, mut jobs: Vec<Job<'_>>) -> Result<()> {
         let whole = jobs.iter().map(|job| job.bytes).sum::<u64>().max(1);
         jobs.sort_by(|a, b| b.bytes.cmp(&a.bytes).then_with(|| a.found.name.cmp(&b.found.name)));
@@ -87,7 +87,7 @@ impl Crew<'_> {
     /// One run, to its end and its `run.json`.
     fn job(&self, lane: usize, job: &Job<'_>, threads: usize) -> Result<()> {
         if self.watch.is_cancelled() {
-            return Err(Error::Interrupted);
+            return Err(Error::Stopped);
         }
         self.watch.begun(lane, &job.found.name);
         let began = Instant::now();
@@ -164,7 +164,7 @@ impl Crew<'_> {
     fn unless_of_all(&self, line: &str, folder: &Path) -> Result<()> {
         let told = line.trim_start_matches("error: ");
         if self.watch.is_cancelled() || told == Error::Interrupted.to_string() {
-            return Err(Error::Interrupted);
+            return Err(Error::Stopped);
         }
         let is_result = told.starts_with(&folder.display().to_string());
         if is_result && told.contains(": cannot be written: ") {

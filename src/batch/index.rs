@@ -8,7 +8,7 @@ use super::summary::Row;
 use crate::digits;
 use crate::error::Result;
 use crate::output::OutputFile;
-use crate::report::html::escaped;
+use crate::report::html::{escaped, plus_minus};
 use crate::series::AngleSeries;
 
 /// Beyond so many rows the page has no pictures: with them it would take a browser longer than a person waits.
@@ -37,33 +37,35 @@ struct Column {
     sorted_by: fn(&Row) -> Option<f64>,
 }
 
+/// So many columns come from `freeswing identify`, which takes one recording.
+const OF_ONE_RECORDING: usize = 3;
 const COLUMNS: [Column; 8] = [
     Column {
-        heading: "f₁ Hz",
-        explained: "frequency of the slowest mode and its standard deviation",
-        shown: |row| with_sd(row.f1_hz, row.f1_sd_hz),
+        heading: "f₁ (Hz)",
+        explained: "frequency of the slowest mode ± half of its 95 % interval",
+        shown: |row| with_half(row.f1_hz, row.f1_half_hz),
         sorted_by: |row| row.f1_hz,
     },
     Column {
-        heading: "ζ₁",
-        explained: "its damping ratio and its standard deviation",
-        shown: |row| with_sd(row.zeta1, row.zeta1_sd),
+        heading: "ξ₁",
+        explained: "its damping ratio ± half of its 95 % interval",
+        shown: |row| with_half(row.zeta1, row.zeta1_half),
         sorted_by: |row| row.zeta1,
     },
     Column {
-        heading: "f₂ Hz",
-        explained: "frequency of the next mode",
+        heading: "f₂ (Hz)",
+        explained: "frequency of the strongest other mode",
         shown: |row| plain(row.f2_hz),
         sorted_by: |row| row.f2_hz,
     },
     Column {
-        heading: "k N·m/rad",
+        heading: "k (N·m/rad)",
         explained: "the joint's spring, as fitted",
         shown: |row| plain(row.k_n_m_per_rad),
         sorted_by: |row| row.k_n_m_per_rad,
     },
     Column {
-        heading: "c N·m·s/rad",
+        heading: "c (N·m·s/rad)",
         explained: "the joint's damper, as fitted",
         shown: |row| plain(row.c_n_m_s_per_rad),
         sorted_by: |row| row.c_n_m_s_per_rad,
@@ -73,20 +75,24 @@ const COLUMNS: [Column; 8] = [
         explained: "what the diagnosis says the base model lacks",
         shown: |row| match (&row.verdict, &row.effects) {
             (Some(_), Some(effects)) => effects.replace('+', " + "),
-            (Some(verdict), None) => verdict.clone(),
+            (Some(verdict), None) => match verdict.as_str() {
+                "adequate" => "nothing".to_owned(),
+                "unknown" => "not in the table of effects".to_owned(),
+                other => other.to_owned(),
+            },
             _ => String::new(),
         },
         sorted_by: |_| None,
     },
     Column {
         heading: "probability",
-        explained: "of these effects",
+        explained: "of this answer",
         shown: |row| plain(row.probability),
         sorted_by: |row| row.probability,
     },
     Column {
-        heading: "held out, mrad",
-        explained: "what the base model leaves of what was not fitted → what the whole answer leaves",
+        heading: "prediction (mrad)",
+        explained: "what the base model leaves of the part that was not fitted → what the whole answer leaves, root mean square",
         shown: |row| match (row.heldout_before_rad, row.heldout_after_rad) {
             (Some(before), Some(after)) => {
                 format!("{} → {}", digits::number(1e3 * before, 3), digits::number(1e3 * after, 3))
@@ -101,9 +107,9 @@ fn plain(value: Option<f64>) -> String {
     value.map_or(String::new(), |value| digits::number(value, 4))
 }
 
-fn with_sd(value: Option<f64>, sd: Option<f64>) -> String {
-    match (value, sd) {
-        (Some(value), Some(sd)) => format!("{} ± {}", digits::number(value, 5), digits::number(sd, 2)),
+fn with_half(value: Option<f64>, half: Option<f64>) -> String {
+    match (value, half) {
+        (Some(value), Some(half)) if half > 0.0 => plus_minus(value, half),
         (value, _) => plain(value),
     }
 }
@@ -120,36 +126,39 @@ fn page(folder: &Path, rows: &[Row], specimens: &[Row]) -> String {
     let _ = write!(
         text,
         "<h1>{} recordings</h1>\n<p>{done} done, {failed} failed, {skipped} left out. All of it as <a href=\"summary.csv\">CSV</a> and \
-         <a href=\"summary.parquet\">Parquet</a>. A click on a heading sorts.</p>\n",
+         <a href=\"summary.parquet\">Parquet</a>. A click on a heading sorts. Behind ± stands half of the 95 % interval; prediction: what the base model leaves of the part that was not fitted → \
+         what the whole answer leaves.</p>\n",
         rows.len()
     );
-    table(&mut text, folder, rows, rows.len() <= MOST_PICTURES);
+    table(&mut text, folder, rows, &COLUMNS, rows.len() <= MOST_PICTURES);
     if !specimens.is_empty() {
         text.push_str("<h2>Recordings of one specimen, fitted and diagnosed together</h2>\n");
-        table(&mut text, folder, specimens, false);
+        table(&mut text, folder, specimens, &COLUMNS[OF_ONE_RECORDING..], false);
     }
     let _ = write!(text, "<script>\n{SCRIPT}</script>\n</body>\n</html>\n");
     text
 }
 
 /// A sortable table.
-fn table(text: &mut String, folder: &Path, rows: &[Row], with_pictures: bool) {
-    text.push_str("<table>\n<thead><tr>");
+fn table(text: &mut String, folder: &Path, rows: &[Row], columns: &[Column], with_pictures: bool) {
+    text.push_str("<div class=\"wide\"><table>\n<thead><tr>");
     let heading = |text: &mut String, heading: &str, explained: &str| {
         let _ = write!(text, "<th aria-sort=\"none\"><button title=\"{explained}\">{heading}</button></th>");
     };
     heading(text, "recording", "path below the input folder");
     heading(text, "status", "done, failed or left out");
-    text.push_str("<th>θ₁</th>");
-    COLUMNS.iter().for_each(|column| heading(text, column.heading, column.explained));
+    if with_pictures {
+        text.push_str("<th>θ₁</th>");
+    }
+    columns.iter().for_each(|column| heading(text, column.heading, column.explained));
     text.push_str("</tr></thead>\n<tbody>\n");
     for row in rows {
-        self::row(text, folder, row, with_pictures);
+        self::row(text, folder, row, columns, with_pictures);
     }
-    text.push_str("</tbody>\n</table>\n");
+    text.push_str("</tbody>\n</table></div>\n");
 }
 
-fn row(text: &mut String, folder: &Path, row: &Row, with_picture: bool) {
+fn row(text: &mut String, folder: &Path, row: &Row, columns: &[Column], with_picture: bool) {
     let name = escaped(&row.recording);
     let own = folder.join(&row.recording);
     let link = ["report.html", "log.txt"].into_iter().find(|file| own.join(file).exists());
@@ -157,17 +166,18 @@ fn row(text: &mut String, folder: &Path, row: &Row, with_picture: bool) {
         Some(file) => format!("<a href=\"{}/{file}\">{name}</a>", address(&row.recording)),
         None => name,
     };
-    let picture = if with_picture { swing(&own.join("angles.csv"), &row.recording) } else { String::new() };
-    let _ =
-        write!(text, "<tr class=\"{0}\"><th scope=\"row\">{first}</th><td>{0}</td><td>{picture}</td>", row.status.id());
+    let _ = write!(text, "<tr class=\"{0}\"><th scope=\"row\">{first}</th><td>{0}</td>", row.status.id());
+    if with_picture {
+        let _ = write!(text, "<td>{}</td>", swing(&own.join("angles.csv"), &row.recording));
+    }
     if row.status == Status::Done {
-        for column in &COLUMNS {
+        for column in columns {
             let by = (column.sorted_by)(row).map_or(String::new(), |by| format!(" data-by=\"{by:e}\""));
             let _ = write!(text, "<td{by}>{}</td>", escaped(&(column.shown)(row)));
         }
     } else {
         let reason = escaped(row.reason.trim_start_matches("error: "));
-        let _ = write!(text, "<td class=\"reason\" colspan=\"{}\">{reason}</td>", COLUMNS.len());
+        let _ = write!(text, "<td class=\"reason\" colspan=\"{}\">{reason}</td>", columns.len());
     }
     text.push_str("</tr>\n");
 }
@@ -214,6 +224,24 @@ fn address(path: &str) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn numbers_and_verdicts_are_shown_as_on_the_page_of_a_run() {
+        let row = Row {
+            recording: "a.mp4".into(),
+            status: Status::Done,
+            f1_hz: Some(1.359_63),
+            f1_sd_hz: Some(0.000_85),
+            f1_half_hz: Some(0.001_67),
+            verdict: Some("adequate".into()),
+            ..Row::default()
+        };
+        let text = page(Path::new("."), std::slice::from_ref(&row), std::slice::from_ref(&row));
+        let [recordings, together] = text.split("<h2>").collect::<Vec<_>>()[..] else { panic!("{text}") };
+        assert!(recordings.contains(">1.3596 ± 0.0017</td>") && recordings.contains("<td>nothing</td>"), "{text}");
+        // several recordings have no frequencies of their own
+        assert!(recordings.contains("ξ₁") && !together.contains("ξ₁") && !together.contains("1.3596"), "{together}");
+    }
 
     #[test]
     fn names_are_text_and_addresses_are_quoted() {

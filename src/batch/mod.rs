@@ -102,11 +102,21 @@ pub struct Tally {
 /// Every recording below the input folder, sorted by path, with what is to be done.
 ///
 /// # Errors
-/// [`Error::Unreadable`] for the input folder, [`Error::NothingToDo`] where it holds no recording.
+/// [`Error::Unreadable`] for the input folder, [`Error::NothingToDo`] where it holds no recording, [`Error::Option`] where none matches.
 pub fn plan(options: &Options) -> Result<Vec<Planned>> {
     let found = find::recordings(&options.input, &options.output)?;
     if found.is_empty() {
         return Err(Error::NothingToDo { path: options.input.clone() });
+    }
+    if let Some(only) = options.only.as_ref().filter(|only| !found.iter().any(|found| only.is_match(&found.name))) {
+        let message = format!(
+            "'{}' matches none of the {} recordings below {}; their paths begin there, such as {}",
+            only.glob(),
+            found.len(),
+            options.input.display(),
+            found[0].name
+        );
+        return Err(Error::Option { option: "--only".to_owned(), message });
     }
     let names: Vec<PathBuf> = found.iter().map(|found| found.path().to_owned()).collect();
     let planned = |(index, found): (usize, Found)| {
@@ -188,7 +198,7 @@ impl From<&[Planned]> for Intentions {
 /// Runs what is to be run, and writes the summary of all: `summary.csv`, `summary.parquet`, `index.html`. A part of several writes none.
 ///
 /// # Errors
-/// [`Error::Busy`] where another batch works in the output folder, [`Error::Unwritable`] where it cannot be written, [`Error::Interrupted`].
+/// [`Error::Busy`] where another batch works in the output folder, [`Error::Unwritable`] where it cannot be written, [`Error::Stopped`].
 pub fn run(options: &Options, watch: &dyn Watch) -> Result<Tally> {
     std::fs::create_dir_all(&options.output).map_err(|e| Error::unwritable(&options.output, e))?;
     let _lock = Lock::take(&options.output, options.shard)?;

@@ -32,10 +32,14 @@ pub struct Row {
     pub f1_hz: Option<f64>,
     /// … its standard deviation…
     pub f1_sd_hz: Option<f64>,
+    /// … half of its 95 % interval, for the page alone…
+    pub f1_half_hz: Option<f64>,
     /// … damping ratio…
     pub zeta1: Option<f64>,
-    /// … and its standard deviation.
+    /// … its standard deviation…
     pub zeta1_sd: Option<f64>,
+    /// … and half of its 95 % interval, for the page alone.
+    pub zeta1_half: Option<f64>,
     /// Of the next mode.
     pub f2_hz: Option<f64>,
     /// Of the next mode.
@@ -115,8 +119,10 @@ impl Row {
             duration_s: identified.record.duration_s,
             f1_hz: frequency(first).and_then(|own| own.value),
             f1_sd_hz: frequency(first).and_then(|own| own.sd),
+            f1_half_hz: frequency(first).and_then(|own| own.half()),
             zeta1: damping(first).and_then(|own| own.value),
             zeta1_sd: damping(first).and_then(|own| own.sd),
+            zeta1_half: damping(first).and_then(|own| own.half()),
             f2_hz: frequency(second).and_then(|own| own.value),
             zeta2: damping(second).and_then(|own| own.value),
             k_eq_n_per_m: equivalents.k_eq_n_per_m.value,

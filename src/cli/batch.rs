@@ -125,6 +125,7 @@ impl BatchArgs {
 
     fn result(&self, tally: Tally) -> String {
         let Tally { done, failed, skipped } = tally;
+        let again = if failed > 0 && !self.retry_failed { " (--retry-failed does them again)" } else { "" };
         let left_out = if skipped > 0 { format!(", {skipped} left out") } else { String::new() };
         let at = match self.shard {
             Some(shard) => {
@@ -132,7 +133,7 @@ impl BatchArgs {
             }
             None => format!("see {}", self.out.join("index.html").display()),
         };
-        format!("{done} done, {failed} failed{left_out}; {at}")
+        format!("{done} done, {failed} failed{again}{left_out}; {at}")
     }
 }
 
@@ -211,6 +212,7 @@ impl Watch for Display {
                 before.finish_and_clear();
             }
         } else if !self.quiet && all > 0 {
+            let what = if all == 1 { what.trim_end_matches('s') } else { what };
             eprintln!("{all} {what}, {to_run} to run, {finished} finished before or left out");
         }
     }

@@ -136,18 +136,20 @@ fn self_test() -> Result<SelfTest> {
 
 impl Findings {
     fn text(&self) -> String {
-        let list = |names: &[&str]| if names.is_empty() { "none".to_owned() } else { names.join(", ") };
+        let list = |does: &str, names: &[&str]| {
+            if names.is_empty() { String::new() } else { format!("; {does} {}", names.join(", ")) }
+        };
         let test = &self.self_test;
         format!(
-            "freeswing {}, {} cores\nlibavcodec {}: reads {}; does not read {}; writes {}; does not write {}\nOpenCV {}\nHDF5 {}\n\
+            "freeswing {}, {} cores\nlibavcodec {}{}{}{}{}\nOpenCV {}\nHDF5 {}\n\
              self-test: {} frames rendered in {} s, tracked in {} s, median error of the angles {} mrad: {}\n",
             self.version,
             self.cores,
             self.libavcodec,
-            list(&self.decoders),
-            list(&self.decoders_missing),
-            list(&self.encoders),
-            list(&self.encoders_missing),
+            list("reads", &self.decoders),
+            list("does not read", &self.decoders_missing),
+            list("writes", &self.encoders),
+            list("does not write", &self.encoders_missing),
             self.opencv,
             if self.hdf5 { "built in" } else { "not built in (--features hdf5)" },
             test.frames,

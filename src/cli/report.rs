@@ -14,7 +14,8 @@ Examples:
   freeswing report .
 
 Reads angles.csv, angles.json, identify.json, fit.json, diagnosis.json, experiment.toml, figures/fit.csv, figures/diagnosis.csv, figures/where.csv,
-overlay.mp4 and log.txt, as far as they are there. Writes report.html, one file to send or to keep, and each of its figures in figures/ as SVG, PNG and CSV.")]
+overlay.mp4 and log.txt, as far as they are there. Writes report.html, one file to send or to keep, and each of its figures in figures/ as SVG, PNG and CSV.
+Figures of the page that stood there before and are no longer made are removed.")]
 pub struct ReportArgs {
     /// The folder of a run.
     #[arg(value_name = "DIR")]

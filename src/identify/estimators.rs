@@ -230,7 +230,7 @@ fn half_power(whole: &Whole, alone: &Signal, mode: usize) -> Estimator {
         frequency_hz: found.as_ref().ok().map(|h| h.frequency_hz),
         damping_ratio: found.as_ref().ok().map(|h| h.damping_ratio),
         note: Some(match found {
-            Ok(h) => format!("Eq. 28 to the letter: ξ = {:.5}", h.damping_ratio_literal),
+            Ok(h) => format!("the paper's Eq. 28 as printed gives ξ = {:.5}", h.damping_ratio_literal),
             Err(reason) => reason,
         }),
     }

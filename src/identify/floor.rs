@@ -13,7 +13,7 @@ const BESSEL_ZERO: f64 = 2.404_825_557_695_773;
 /// How far below the floor a frequency must lie, relative to it, before anything is called wrong: a length stated to 1 %.
 const TOLERANCE: f64 = 0.005;
 
-/// The lowest frequency that a specimen can have, and whether the measured one respects it.
+/// The lowest frequency that a specimen can have, and whether the measured one is below it.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Floor {
     /// What swings at it.
@@ -70,7 +70,7 @@ impl Floor {
                 100.0 * (1.0 - ratio),
                 100.0 * (ratio.powi(-2) - 1.0)
             ),
-            None => format!("{:.4} Hz respects the floor of {floor_hz:.4} Hz ({body})", frequency_hz.value),
+            None => format!("{:.4} Hz is not below the floor of {floor_hz:.4} Hz ({body})", frequency_hz.value),
         };
         Self { body, floor_hz, rigid_hz, below, remedy, statement }
     }

@@ -84,8 +84,7 @@ pub fn milli(values: &[Option<f64>], link: usize, unit: &str) -> String {
 
 /// A value and half the width of its 95 % interval.
 pub fn interval(of: &Interval, unit: &str) -> String {
-    let half = of.high.zip(of.low).map(|(high, low)| 0.5 * (high - low));
-    with_half(of.value, half, unit)
+    with_half(of.value, of.half(), unit)
 }
 
 /// A value and what stands behind ±, to two digits of that.
@@ -95,7 +94,8 @@ pub fn with_half(value: Option<f64>, half: Option<f64>, unit: &str) -> String {
     copyable(&plus_minus(value, half), unit)
 }
 
-fn plus_minus(value: f64, half: f64) -> String {
+/// `value ± half`, to two digits of the half.
+pub fn plus_minus(value: f64, half: f64) -> String {
     let magnitude = |v: f64| if v == 0.0 { 0 } else { v.abs().log10().floor() as i32 };
     let first = magnitude(value).max(magnitude(half));
     let last = magnitude(half) - 1;

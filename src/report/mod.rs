@@ -33,7 +33,11 @@ use chapters::Part;
 use left::Left;
 use page::Drawn;
 
+/// A figure's files.
+const EXTENSIONS: [&str; 3] = ["svg", "png", "csv"];
+
 /// Writes `report.html` and, for every plot on it, `figures/*.svg`, `*.png` and `*.csv`, from what a run left in the folder; all of them or none.
+/// Figures of an earlier page that are no longer made are removed.
 ///
 /// # Errors
 /// [`Error::Left`] of a folder that holds nothing of a run, or a JSON file that is none; [`Error::Unreadable`], [`Error::Unwritable`].
@@ -72,6 +76,21 @@ pub fn write(folder: &Path) -> Result<()> {
         keep(&named("png"), png)?;
         keep(&named("csv"), figure.csv.as_bytes())?;
     }
+    let gone = no_longer_made(&folder.join("report.html"), &drawn);
     keep(&folder.join("report.html"), page.as_bytes())?;
-    files.into_iter().try_for_each(OutputFile::appear)
+    files.into_iter().try_for_each(OutputFile::appear)?;
+    for path in gone.iter().flat_map(|id| EXTENSIONS.map(|extension| figures.join(format!("{id}.{extension}")))) {
+        match std::fs::remove_file(&path) {
+            Err(error) if error.kind() != std::io::ErrorKind::NotFound => return Err(Error::unwritable(&path, error)),
+            _ => {}
+        }
+    }
+    Ok(())
+}
+
+/// Figures that stand on an earlier page and are not among those drawn now: what this program made, and nothing else.
+fn no_longer_made(page: &Path, drawn: &[(Drawn, Vec<u8>)]) -> Vec<String> {
+    let Ok(earlier) = std::fs::read_to_string(page) else { return Vec::new() };
+    let ids = page::plots_of(&earlier).filter(|id| drawn.iter().all(|(own, _)| own.id != *id));
+    ids.map(str::to_owned).collect()
 }

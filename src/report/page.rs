@@ -122,7 +122,10 @@ fn about(left: &Left) -> String {
             if a.links() == 1 { "" } else { "s" }
         )
     });
-    let parts: Vec<String> = [source, length].into_iter().flatten().collect();
+    let together = left.together();
+    let together =
+        (!together.is_empty()).then(|| format!("{} recordings together: {}", together.len(), together.join(", ")));
+    let parts: Vec<String> = [source, length, together].into_iter().flatten().collect();
     escaped(&parts.join(" · "))
 }
 
@@ -176,9 +179,21 @@ fn film(left: &Left, room: usize) -> Result<[String; 2]> {
     Ok([place, data])
 }
 
+/// The plots that stand on a page which [`page`] wrote. What comes from files is escaped on it and cannot look like one.
+pub fn plots_of(page: &str) -> impl Iterator<Item = &str> {
+    let ids = page.split(" data-plot=\"").skip(1).filter_map(|rest| rest.split('"').next());
+    ids.filter(|id| !id.is_empty() && id.bytes().all(|b| b.is_ascii_alphanumeric() || b == b'-'))
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn only_names_of_figures_are_read_off_a_page() {
+        let page = r#"<figure class="plot" data-plot="decay"> data-plot="../angles" data-plot="" data-plot="left-1">"#;
+        assert_eq!(plots_of(page).collect::<Vec<_>>(), ["decay", "left-1"]);
+    }
 
     #[test]
     fn what_looks_like_a_field_in_a_name_stays_as_it_is() {

@@ -56,7 +56,7 @@ pub(super) fn page(diagnosis: &Diagnosis) -> String {
 fn proof(diagnosis: &Diagnosis, text: &mut String) {
     let Some(held_out) = &diagnosis.heldout else { return };
     let noise_rad = &held_out.noise_rad;
-    let _ = writeln!(text, "\nFitted before {:.2} s, predicted from there on:", held_out.from_s);
+    let _ = writeln!(text, "\n{}:", held_out.words());
     let learnt = diagnosis.verdict.law.as_ref();
     let last = if learnt.is_some() { "with the law that was learnt" } else { "" };
     let mut table = Table::new(["", "noise mrad", "base model leaves", "with the effects named", last]);

@@ -387,21 +387,36 @@
     const lives = data.plots.map((plot) => document.querySelector(`#plot-${CSS.escape(plot.id)} .live`));
     // room first, so that nothing moves while they are drawn
     lives.forEach((live, k) => { live.style.minHeight = `${height(data.plots[k], live.clientWidth >= 560) + (data.plots[k].y.rows.length ? 0 : 24)}px`; });
-    const round = ++rounds, rest = [...data.plots];
-    (function some() {
+    const round = ++rounds, rest = new Map(lives.map((live, k) => [live, data.plots[k]]));
+    const one = (live) => {
+      const plot = rest.get(live);
+      if (!plot) return;
+      rest.delete(live);
+      nearby.unobserve(live);
+      build(plot);
+    };
+    // what comes near is drawn at once, all else while nobody waits
+    nearby?.disconnect();
+    nearby = new IntersectionObserver((seen) => seen.filter((s) => s.isIntersecting).forEach((s) => one(s.target)), { rootMargin: "50% 0px" });
+    lives.forEach((live) => nearby.observe(live));
+    lives.filter((live) => live.getBoundingClientRect().top < innerHeight).forEach(one);
+    root.dataset.firstMs = performance.now().toFixed(0);
+    whenLoaded(function some() {
       if (round !== rounds) return;
-      const until = performance.now() + 30;
-      while (rest.length && performance.now() < until) build(rest.shift());
-      if (rest.length) return setTimeout(some);
+      const until = performance.now() + 20;
+      while (rest.size && performance.now() < until) one(rest.keys().next().value);
+      if (rest.size) return idle(some);
       root.dataset.ready = String(drawn.size);
       root.dataset.readyMs = performance.now().toFixed(0);
-    })();
+    });
   }
-  let rounds = 0;
+  const idle = (work) => ("requestIdleCallback" in window ? requestIdleCallback(work, { timeout: 200 }) : setTimeout(work));
+  const whenLoaded = (work) => (document.readyState === "complete" ? idle(work) : addEventListener("load", () => idle(work), { once: true }));
+  let rounds = 0, nearby = null;
   draw();
   if (now != null) show(now);
-  // the recording is the last and the largest part of the page
-  addEventListener("DOMContentLoaded", () => {
+  // the recording is the last and the largest part of the page: it is decoded when all else can be seen
+  whenLoaded(() => {
     const film = document.getElementById("film-data");
     if (video && film) video.src = film.textContent;
   });

@@ -18,7 +18,7 @@ pub fn chapter(left: &Left) -> Chapter {
     }
     if let Some(log) = left.log.as_ref().filter(|log| !log.text.trim().is_empty()) {
         chapter.words(format!(
-            "<details><summary>Everything that was said: <code>log.txt</code></summary>\n{}</details>\n",
+            "<details><summary>Log: <code>log.txt</code></summary>\n{}</details>\n",
             verbatim(&log.text)
         ));
     }

@@ -13,11 +13,24 @@ use crate::series::AngleSeries;
 pub fn chapter(left: &Left) -> Chapter {
     let mut chapter = Chapter::new("model", "Model against measurement");
     let Some(fit) = &left.fit else { return chapter };
-    let Some(recording) = fit.recordings.first() else { return chapter };
-    let side = &recording.fitted;
-    chapter.words(paragraph(&capitalised(&side.statement)));
+    let Some(first) = fit.recordings.first() else { return chapter };
+    let several = fit.recordings.len() > 1;
+    if !several {
+        chapter.words(paragraph(&capitalised(&first.fitted.statement)));
+    }
     chapter.words(parameters(fit));
-    chapter.words(residuals(side));
+    for recording in &fit.recordings {
+        if several {
+            let file = escaped(&recording.file);
+            let said = paragraph(&capitalised(&recording.fitted.statement));
+            chapter.words(format!("<h3><code>{file}</code></h3>\n{said}"));
+        }
+        chapter.words(residuals(&recording.fitted));
+    }
+    if several {
+        chapter.words(paragraph(&format!("The figures show the first recording, {}.", first.file)));
+    }
+    let side = &first.fitted;
     let Some(curves) = left.fit_curves.as_ref().map(|curves| curves.only("recording", 1.0)) else { return chapter };
     for link in 1..=curves.links() {
         chapter.plot(swing(&curves, link));

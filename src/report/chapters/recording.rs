@@ -110,17 +110,15 @@ fn audit(track: &Track) -> String {
         ("scatter of the steps (1 sd)", milli(if stamps.jitter_sd_s < ROUNDING_S { 0.0 } else { stamps.jitter_sd_s })),
         (
             "picture",
-            escaped(&format!(
-                "{} × {} px, {}, {}",
-                track.video.width_px, track.video.height_px, track.video.codec, track.video.container
-            )),
+            escaped(&format!("{} × {} px, {}", track.video.width_px, track.video.height_px, track.video.codec)),
         ),
     ];
-    let noise = track
-        .angles
-        .iter()
-        .enumerate()
-        .map(|(k, a)| vec![format!("noise of θ{} (1 sd)", k + 1), value(a.noise_rad.map(|n| 1e3 * n), 3, "mrad")]);
+    let noise = track.angles.iter().enumerate().map(|(k, a)| {
+        vec![
+            format!("standard deviation of θ{}, median of all frames", k + 1),
+            value(a.noise_rad.map(|n| 1e3 * n), 3, "mrad"),
+        ]
+    });
     let rows = rows.into_iter().map(|(what, number)| vec![what.to_owned(), number]).chain(noise);
     format!("<h3>Time stamps</h3>\n{}{}", paragraph(&format!("{found} {rate}")), table(&["quantity", "value"], rows))
 }

@@ -128,6 +128,8 @@ pub struct Alternative {
 #[serde(default)]
 pub struct HeldOut {
     pub from_s: Option<f64>,
+    pub recording: String,
+    pub whole_recording: bool,
     pub baseline_rmse_rad: Vec<Option<f64>>,
     pub named_rmse_rad: Vec<Option<f64>>,
     pub augmented_rmse_rad: Vec<Option<f64>>,

@@ -32,6 +32,7 @@ pub struct FittedParameter {
 #[derive(Debug, Default, Deserialize)]
 #[serde(default)]
 pub struct FittedRecording {
+    pub file: String,
     pub fitted: FitSide,
     pub pace: Option<PaceFound>,
 }

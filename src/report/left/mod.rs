@@ -17,10 +17,15 @@ use crate::digest;
 use crate::error::{Error, Result};
 use crate::series::AngleSeries;
 
-pub use diagnosed::{Candidate, Diagnosed, Law, Remainder, Verdict};
-pub use fitted::{FitSide, Fitted};
+pub use diagnosed::{Candidate, Diagnosed, HeldOut, Law, Remainder, Verdict};
+pub use fitted::{FitSide, Fitted, FittedRecording};
 pub use identified::{Estimator, Identified, Mode, Step};
 pub use tracked::Track;
+
+/// Why most parts are missing.
+const NOT_HELD: &str = "the folder does not hold it";
+/// What a run of several recordings together does not leave.
+const OF_ONE_RECORDING: [&str; 4] = ["angles.csv", "angles.json", "identify.json", "overlay.mp4"];
 
 /// A report of a stage from a folder, of which single values are wanted; nothing where there is none, or none that can be read.
 pub fn report_of<T: DeserializeOwned>(path: &Path) -> Option<T> {
@@ -81,6 +86,13 @@ pub struct Interval {
     pub high: Option<f64>,
 }
 
+impl Interval {
+    /// Half of its width.
+    pub fn half(&self) -> Option<f64> {
+        Some(0.5 * (self.high? - self.low?))
+    }
+}
+
 /// `log.txt`: what was called, and what was said.
 #[derive(Debug, Default)]
 pub struct Log {
@@ -136,12 +148,18 @@ impl Left {
         left.configuration = left.text("experiment.toml")?;
         left.overlay_bytes = std::fs::metadata(left.path("overlay.mp4")).ok().filter(|m| m.is_file()).map(|m| m.len());
         if left.overlay_bytes.is_none() {
-            left.miss("overlay.mp4", "the recording with the marks drawn in", None);
+            // where there are angles, no error kept it from being drawn
+            let why = left.angles.as_ref().map(|_| NOT_HELD.to_owned());
+            left.miss("overlay.mp4", "the recording with the marks drawn in", why);
+        }
+        if !left.together().is_empty() {
+            // each has its own page
+            left.missing.retain(|part| !OF_ONE_RECORDING.contains(&part.file));
         }
         let known = left.angles.is_some() || left.track.is_some() || left.identified.is_some();
         if !(known || left.fit.is_some() || left.diagnosis.is_some() || left.log.is_some()) {
             let message = "holds nothing that a run leaves (angles.csv, identify.json, fit.json, diagnosis.json, log.txt); give the folder \
-                           of `freeswing run --out`";
+                           of `freeswing run --out`, or that of one recording of a batch";
             return Err(Error::Left { path: folder.to_owned(), line: None, message: message.to_owned() });
         }
         Ok(left)
@@ -178,9 +196,20 @@ impl Left {
         self.folder.join(name)
     }
 
+    /// The error that stopped the run.
+    pub fn stopped(&self) -> Option<&str> {
+        self.log.as_ref()?.error.as_deref()
+    }
+
+    /// The tables of several recordings that were fitted together; none of a run of one.
+    pub fn together(&self) -> Vec<&str> {
+        let files: Vec<&str> = self.fit.iter().flat_map(|fit| &fit.recordings).map(|own| own.file.as_str()).collect();
+        if files.len() > 1 { files } else { Vec::new() }
+    }
+
     fn miss(&mut self, file: &'static str, holds: &'static str, why: Option<String>) {
-        let stopped = self.log.as_ref().and_then(|log| log.error.clone());
-        let why = why.or(stopped).unwrap_or_else(|| "the folder does not hold it".to_owned());
+        let stopped = self.stopped().map(|_| "the run stopped before it".to_owned());
+        let why = why.or(stopped).unwrap_or_else(|| NOT_HELD.to_owned());
         self.missing.push(Missing { file, holds, why });
     }
 
