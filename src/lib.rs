@@ -51,6 +51,7 @@ pub mod fit;
 pub mod diagnose;
 pub mod paper;
 pub mod report;
+pub mod laser;
 pub mod synth;
 pub mod export;
 pub mod batch;

@@ -9,6 +9,7 @@ mod export;
 mod fit;
 mod identify;
 mod init;
+mod laser;
 mod modes;
 mod paper;
 mod render;
@@ -49,6 +50,7 @@ enum Command {
     Diagnose(diagnose::DiagnoseArgs),
     Simulate(simulate::SimulateArgs),
     Modes(modes::ModesArgs),
+    Laser(laser::LaserArgs),
     Render(render::RenderArgs),
     Report(report::ReportArgs),
     Paper(paper::PaperArgs),
@@ -89,6 +91,7 @@ impl Command {
             Self::Identify(args) => args.run(console),
             Self::Render(args) => args.run(console),
             Self::Modes(args) => args.run(console),
+            Self::Laser(args) => args.run(console),
             Self::Paper(args) => args.run(console),
             Self::Report(args) => args.run(console),
             Self::Run(args) => args.run(console),

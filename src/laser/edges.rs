@@ -3,15 +3,16 @@
 use super::filter::{Filter, Noise};
 use super::grid::Grid;
 use super::lamp::Lamp;
-use super::learn::{Acting, lamp_columns};
+use super::filter::Swing;
+use super::learn::Acting;
 use super::solve::solve;
 
 /// What a jump of the level with its swing must take from the sum of squares to be seen: three numbers anywhere among ten thousand cells, at 0.1 %.
 const SEEN: f64 = 40.0;
 /// Most jumps that are looked for.
 const MOST_JUMPS: usize = 40;
-/// Jumps of the lamp differ in size by less than this part.
-const ALIKE: f64 = 0.4;
+/// Jumps of the lamp differ in size by less than this part; and once their size is known from most of them.
+const ALIKE: [f64; 2] = [0.4, 0.65];
 /// How far a stated edge may be from the true one, and a found one (s).
 pub const STATED_S: f64 = 0.1;
 const FOUND_S: f64 = 0.2;
@@ -68,10 +69,10 @@ pub fn jumps(acting: &Acting<'_>, noise: &Noise, bands_hz: &[[f64; 2]], most: us
 
 /// The jumps that are the lamp's: alike in size, to and fro in turn, the most of them.
 pub fn lamp_of(jumps: &[Jump]) -> Option<Lamp> {
-    let in_turn = |size_m: f64| {
-        let alike = |jump: &&Jump| (jump.size_m.abs() - size_m).abs() < ALIKE * size_m + 2.0 * jump.sd_m && jump.size_m.abs() > 3.0 * jump.sd_m;
+    let in_turn = |size_m: f64, differs: f64| {
+        let is_alike = |jump: &&Jump| (jump.size_m.abs() - size_m).abs() < differs * size_m + 2.0 * jump.sd_m && jump.size_m.abs() > 3.0 * jump.sd_m;
         let mut chain: Vec<Jump> = Vec::new();
-        for jump in jumps.iter().filter(alike) {
+        for jump in jumps.iter().filter(is_alike) {
             match chain.last_mut() {
                 // two to the same side: the likelier in size stays
                 Some(last) if last.size_m.signum() == jump.size_m.signum() => {
@@ -84,20 +85,31 @@ pub fn lamp_of(jumps: &[Jump]) -> Option<Lamp> {
         }
         chain
     };
-    let chains = jumps.iter().map(|jump| (in_turn(jump.size_m.abs()), jump.size_m.abs()));
+    let chains = jumps.iter().map(|jump| (in_turn(jump.size_m.abs(), ALIKE[0]), jump.size_m.abs()));
     let best = chains.max_by(|a, b| a.0.len().cmp(&b.0.len()).then(a.1.total_cmp(&b.1)))?.0;
+    // once the size is known from many, those that noise or heat has changed more count as well
+    let size_m = crate::statistics::median(&mut best.iter().map(|jump| jump.size_m.abs()).collect::<Vec<f64>>())?;
+    let wider = in_turn(size_m, ALIKE[1]);
+    let best = if wider.len() > best.len() { wider } else { best };
+    // the first time may be larger, with the gas of the first light
+    let first = best.first()?;
+    let earlier = jumps.iter().rfind(|jump| {
+        jump.at_s < first.at_s && jump.size_m.signum() != first.size_m.signum() && jump.size_m.abs() > ALIKE[1] * size_m
+    });
+    let best: Vec<Jump> = earlier.filter(|_| best.len() % 2 == 1).into_iter().chain(&best).copied().collect();
     (best.len() >= 2).then(|| Lamp { edges_s: best.iter().map(|jump| jump.at_s).collect() })
 }
 
 /// The edges where the record has them, as far as it tells, by Gauss and Newton; a stated edge is known to a tenth of a second.
-pub fn refined(acting: &Acting<'_>, noise: &Noise, lamp: &Lamp, is_stated: bool) -> Lamp {
-    let (grid, known_s) = (acting.grid, if is_stated { STATED_S } else { FOUND_S });
+///
+/// `beside` is what acts on the strip beside light and its swings.
+pub fn refined(grid: &Grid, beside: &[Vec<f64>], noise: &Noise, lamp: &Lamp, is_stated: bool) -> Lamp {
+    let known_s = if is_stated { STATED_S } else { FOUND_S };
     let mut edges = lamp.edges_s.clone();
     let filter = Filter::of(noise, grid);
-    let beside = acting.beside(&noise.swings);
     for _ in 0..4 {
         let now = Lamp { edges_s: edges.clone() };
-        let Some(shift) = shifts(&Shifting { grid, filter: &filter, noise, beside: &beside }, &now, &lamp.edges_s, known_s) else { break };
+        let Some(shift) = shifts(&Shifting { grid, filter: &filter, noise, beside }, &now, &lamp.edges_s, known_s) else { break };
         for (edge, shift) in edges.iter_mut().zip(&shift) {
             *edge += shift.clamp(-0.5 * known_s, 0.5 * known_s);
         }
@@ -118,13 +130,13 @@ struct Shifting<'a> {
 
 fn shifts(with: &Shifting<'_>, lamp: &Lamp, stated_s: &[f64], known_s: f64) -> Option<Vec<f64>> {
     let Shifting { grid, filter, noise, beside } = *with;
-    let raw = lamp_columns(lamp, grid, &noise.swings);
+    let raw = sharp(lamp, grid, &noise.swings);
     let white: Vec<Vec<f64>> = raw.iter().chain(beside).map(|c| filter.whiten(c)).collect();
     let y = filter.whiten(&grid.y_m);
     let columns: Vec<&[f64]> = white.iter().map(Vec::as_slice).collect();
     let base = solve(&columns, &y, &[])?;
     let of = |lamp: &Lamp| {
-        let moved = lamp_columns(lamp, grid, &noise.swings);
+        let moved = sharp(lamp, grid, &noise.swings);
         let mut sum = vec![0.0; grid.len()];
         for (column, amplitude) in moved.iter().zip(&base.amplitude) {
             sum.iter_mut().zip(column).for_each(|(s, c)| *s += amplitude * c);
@@ -155,4 +167,21 @@ fn shifts(with: &Shifting<'_>, lamp: &Lamp, stated_s: &[f64], known_s: f64) -> O
     let columns: Vec<&[f64]> = all.iter().map(Vec::as_slice).collect();
     let solution = solve(&columns, &y_all, &[])?;
     Some(solution.amplitude[white.len()..].to_vec())
+}
+
+/// Light that switches at once and the swings that it then excites: 1 − cos ωt after each edge. Their phase tells an edge to a hundredth of a second.
+fn sharp(lamp: &Lamp, grid: &Grid, swings: &[Swing]) -> Vec<Vec<f64>> {
+    let to_and_fro: Vec<f64> = (0..lamp.edges_s.len()).map(|k| if k % 2 == 0 { 1.0 } else { -1.0 }).collect();
+    let rings = swings.iter().map(|swing| {
+        let [cos, _] = lamp.rings_of(grid, swing, &to_and_fro);
+        cos
+    });
+    std::iter::once(lamp.light(grid)).chain(rings).collect()
+}
+
+/// What may follow the lamp slowly, richly enough that none of it is taken for a late edge.
+pub fn slow_answers(lamp: &Lamp, grid: &Grid, swing: &Swing) -> Vec<Vec<f64>> {
+    let heat = [0.5, 1.0, 2.0, 4.0, 8.0, 16.0, 40.0].map(|tau_s| lamp.swung_low_pass(grid, tau_s, swing));
+    let lag = [1.0, 4.0, 16.0].map(|tau_s| lamp.warm_up(grid, tau_s));
+    heat.into_iter().chain(lag).collect()
 }

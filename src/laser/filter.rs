@@ -4,6 +4,7 @@
 //! y = level + Σ aₖ + white;   level' = level + walk;   (a, b)ₖ' = ρₖ R(ωₖ h) (a, b)ₖ + drive
 //! ```
 //!
+//! with b = −ȧ/ω: what keeps a swing up is a force, so it drives b alone and a moves smoothly.
 //! The Kalman filter turns it into independent innovations of variance 1. It depends on no datum, so the same filter whitens the record and
 //! every column of a model, and least squares of the whitened are generalised least squares. Level and swings start anywhere.
 
@@ -16,6 +17,9 @@ pub const MOST_STATES: usize = 7;
 /// Standard deviation of the states' start, of the record's spread.
 const START_SPREAD: f64 = 100.0;
 
+/// Parts of a step over which a drive is integrated.
+const DRIVEN_PARTS: usize = 16;
+
 type State = [f64; MOST_STATES];
 type Matrix = [State; MOST_STATES];
 
@@ -26,7 +30,7 @@ pub struct Swing {
     pub hz: f64,
     /// Damping ratio.
     pub damping: f64,
-    /// Variance that each of its two states gains (m²/s).
+    /// Variance that its speed over ω gains, kept up by a random force (m²/s).
     pub drive_m2_s: f64,
 }
 
@@ -35,6 +39,31 @@ impl Swing {
     pub fn pole(&self) -> [f64; 2] {
         let damped = TAU * self.hz;
         [self.damping / (1.0 - self.damping * self.damping).sqrt() * damped, damped]
+    }
+
+    /// The part κ by which an oscillator follows a drive of exp(−t/τ), over that by which it follows a constant one: 1/(1 − 2ζ/ωτ + 1/(ωτ)²).
+    pub fn carried(&self, tau_s: f64) -> f64 {
+        let turns = self.pole()[1] * tau_s;
+        1.0 / (1.0 - 2.0 * self.damping / turns + 1.0 / (turns * turns))
+    }
+
+    /// Root mean square at which the force keeps the swing: √(q/4δ).
+    pub fn kept_up_m(&self) -> f64 {
+        (self.drive_m2_s / (4.0 * self.pole()[0])).sqrt()
+    }
+
+    /// Variances of both states and their covariance that the force adds in a time: ∫ exp(Aτ) (0, 1) (0, 1)ᵀ exp(Aᵀτ) dτ.
+    fn driven(&self, step_s: f64) -> [f64; 3] {
+        let [decay, turn] = self.pole();
+        let part_s = step_s / DRIVEN_PARTS as f64;
+        let mut sum = [0.0; 3];
+        for k in 0..DRIVEN_PARTS {
+            let since = (k as f64 + 0.5) * part_s;
+            let size = self.drive_m2_s * part_s * (-2.0 * decay * since).exp();
+            let (s, c) = (turn * since).sin_cos();
+            sum = [sum[0] + size * s * s, sum[1] + size * c * c, sum[2] - size * s * c];
+        }
+        sum
     }
 }
 
@@ -92,6 +121,7 @@ impl Filter {
             p[k][k] = start;
         }
         let mut filter = Self { states, turns, cells: Vec::with_capacity(grid.len()), ln_determinant: 0.0 };
+        let driven: Vec<[f64; 3]> = noise.swings.iter().map(|swing| swing.driven(grid.step_s)).collect();
         for count in &grid.count {
             let seen = |row: &State| row[0] + row[1..states].iter().step_by(2).sum::<f64>();
             let mut gain = [0.0; MOST_STATES];
@@ -112,13 +142,13 @@ impl Filter {
                 filter.ln_determinant += variance.ln();
             }
             filter.cells.push((gain, scale));
-            filter.advance_covariance(&mut p, noise, grid.step_s);
+            filter.advance_covariance(&mut p, noise.walk_m2_s * grid.step_s, &driven);
         }
         filter
     }
 
     /// P ← T P Tᵀ + Q.
-    fn advance_covariance(&self, p: &mut Matrix, noise: &Noise, step_s: f64) {
+    fn advance_covariance(&self, p: &mut Matrix, walked_m2: f64, driven: &[[f64; 3]]) {
         for row in &mut p[..self.states] {
             self.turn(row);
         }
@@ -129,10 +159,13 @@ impl Filter {
                 p[2 + 2 * k][column] = s * a + c * b;
             }
         }
-        p[0][0] += noise.walk_m2_s * step_s;
-        for (k, swing) in noise.swings.iter().enumerate() {
-            p[1 + 2 * k][1 + 2 * k] += swing.drive_m2_s * step_s;
-            p[2 + 2 * k][2 + 2 * k] += swing.drive_m2_s * step_s;
+        p[0][0] += walked_m2;
+        for (k, [own, speed, both]) in driven.iter().enumerate() {
+            let (a, b) = (1 + 2 * k, 2 + 2 * k);
+            p[a][a] += own;
+            p[b][b] += speed;
+            p[a][b] += both;
+            p[b][a] += both;
         }
     }
 

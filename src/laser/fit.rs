@@ -15,6 +15,9 @@ const CONVERGED: f64 = 0.02;
 const EFOLDINGS: f64 = 9.2;
 /// ln of the prior's width over that of a walk's likelihood.
 const WALK_COST: f64 = 2.5;
+/// How well an edge is known (s), and the part of a curl that is in higher modes than the first.
+const EDGE_S: f64 = 0.01;
+const HIGHER_MODES: f64 = 0.2;
 /// Most that a size which cannot be costs.
 const IMPOSSIBLE: f64 = 30.0;
 
@@ -44,12 +47,14 @@ pub struct Fit {
     pub ln_evidence: f64,
     /// Innovations that are left.
     pub left: Vec<f64>,
+    /// Variance of the push for what is not known of how heat begins.
+    pub heat_m2: f64,
 }
 
 impl Fit {
-    /// The push and its standard deviation.
+    /// The push and its standard deviation, with what an edge a hundredth of a second off and the higher modes' part in a curl make of heat.
     pub fn push(&self) -> [f64; 2] {
-        [self.amplitude[0], self.covariance[(0, 0)].max(0.0).sqrt()]
+        [self.amplitude[0], (self.covariance[(0, 0)].max(0.0) + self.heat_m2).sqrt()]
     }
 
     /// The effects of its members.
@@ -260,10 +265,28 @@ impl State {
             ln_evidence: -0.5 * (plain.chi2 + stage.filter.ln_determinant + joint.ln_fisher),
             left: plain.left,
             members: self.members,
+            heat_m2: 0.0,
         };
+        fit.heat_m2 = heat_m2(&fit, bench);
         fit.ln_evidence += ln_prior(&fit, bench) - if walks { WALK_COST } else { 0.0 };
         Some(fit)
     }
+}
+
+/// exp(−t/τ) a time δ later is that by exp(δ/τ): an error of the edge, or of the part κ that the strip's inertia carries, changes the amplitude of warmth's
+/// beginning and so the push.
+fn heat_m2(fit: &Fit, bench: &Bench<'_>) -> f64 {
+    let mut place = bench.base.len();
+    let mut sum = 0.0;
+    for member in &fit.members {
+        if member.form == Form::Warmth {
+            let tau_s = member.shape[0].exp();
+            let inertia = HIGHER_MODES * (1.0 - bench.with.swings[0].carried(tau_s)).abs();
+            sum += fit.amplitude[place].powi(2) * ((EDGE_S / tau_s).powi(2) + inertia.powi(2));
+        }
+        place += member.form.columns(&member.shape, &bench.with).len();
+    }
+    sum
 }
 
 fn columns<'c>(stage: &'c Stage, white: &'c [Vec<f64>], slopes: &'c [Vec<f64>]) -> Vec<&'c [f64]> {
@@ -293,7 +316,7 @@ fn ln_prior(fit: &Fit, bench: &Bench<'_>) -> f64 {
             let beyond = (size.abs() - push.abs()).max(0.0);
             let wrong = match member.form {
                 Form::Lag => against.max(beyond),
-                Form::Pulse => against,
+                Form::Pulse | Form::Train => against,
                 _ => 0.0,
             };
             sum -= (0.5 * (wrong / sd(place).max(f64::MIN_POSITIVE)).powi(2)).min(IMPOSSIBLE);

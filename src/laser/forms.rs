@@ -4,7 +4,7 @@
 //! |---|---|---|
 //! | `heat` | warmth | curl in proportion to the film's warmth, which follows the lamp within 0.4 to 50 s and loses heat by T⁴ |
 //! | `lamp_warm_up` | lag | the push lacks exp(−t/τ) after each switch-on, nothing after a switch-off |
-//! | `gas` | pulse | a push only while lit, that dies away within a cycle and from cycle to cycle |
+//! | `gas` | pulse, train | a push only while lit, that dies away within a cycle, and from cycle to cycle by the time lit before or by their number |
 //! | `sensor_drift` | line, curve, warming, walk | in no step with the lamp: t; t and t²; 1 − exp(−t/τ) from the record's start; a random walk |
 //! | `tilt` | step, slow, creep | the support or the sensor moves: at once, not at an edge of the lamp, with a swing of its own; or warmed by the lamp within minutes; or creeping from an instant on |
 
@@ -70,6 +70,7 @@ pub enum Form {
     Warmth,
     Lag,
     Pulse,
+    Train,
     Line,
     Curve,
     Warming,
@@ -128,8 +129,8 @@ pub struct Setting<'a> {
 
 impl Form {
     /// All.
-    pub const ALL: [Self; 10] = [
-        Self::Warmth, Self::Lag, Self::Pulse, Self::Line, Self::Curve, Self::Warming, Self::Walk, Self::Step, Self::Slow, Self::Creep,
+    pub const ALL: [Self; 11] = [
+        Self::Warmth, Self::Lag, Self::Pulse, Self::Train, Self::Line, Self::Curve, Self::Warming, Self::Walk, Self::Step, Self::Slow, Self::Creep,
     ];
 
     /// Of which effect.
@@ -137,7 +138,7 @@ impl Form {
         match self {
             Self::Warmth => Effect::Heat,
             Self::Lag => Effect::LampWarmUp,
-            Self::Pulse => Effect::Gas,
+            Self::Pulse | Self::Train => Effect::Gas,
             Self::Line | Self::Curve | Self::Warming | Self::Walk => Effect::SensorDrift,
             Self::Step | Self::Slow | Self::Creep => Effect::Tilt,
         }
@@ -149,6 +150,7 @@ impl Form {
             Self::Warmth => "warmth",
             Self::Lag => "lag",
             Self::Pulse => "pulse",
+            Self::Train => "train",
             Self::Line => "line",
             Self::Curve => "curve",
             Self::Warming => "warming",
@@ -178,6 +180,10 @@ impl Form {
                 Shape::logarithm("time_constant_s", 0.5, (0.5 * lit_s).max(10.0)),
                 Shape::logarithm("store_s", 2.0, (20.0 * lit_s).max(40.0)),
             ],
+            Self::Train => vec![
+                Shape::logarithm("time_constant_s", 0.5, 120.0),
+                Shape { key: "ln_loss_a_cycle", unit: "1", is_logarithm: false, bounds: [0.0, 3.0] },
+            ],
             Self::Line | Self::Curve | Self::Walk => Vec::new(),
             Self::Warming => vec![Shape::logarithm("time_constant_s", 0.02 * lasts_s, lasts_s)],
             Self::Step => vec![Shape {
@@ -202,9 +208,9 @@ impl Form {
         let shapes = self.shapes(with);
         match self {
             Self::Warmth => between(&shapes[0], 10).into_iter().map(|tau| vec![tau, 0.05]).collect(),
-            Self::Pulse => between(&shapes[0], 7)
+            Self::Pulse | Self::Train => between(&shapes[0], 7)
                 .into_iter()
-                .flat_map(|tau| between(&shapes[1], 5).into_iter().map(move |store| vec![tau, store]))
+                .flat_map(|tau| between(&shapes[1], 4).into_iter().map(move |store| vec![tau, store]))
                 .collect(),
             Self::Creep => between(&shapes[0], 10)
                 .into_iter()
@@ -220,6 +226,14 @@ impl Form {
     /// Whether an amplitude beyond the first bears a size of its own, not a swing.
     pub fn is_size(self, amplitude: usize) -> bool {
         amplitude == 0 || self == Self::Curve
+    }
+
+    /// Its columns with the swings that they excite and the lamp's own columns hold otherwise.
+    pub fn swung_columns(self, shape: &[f64], with: &Setting<'_>) -> Vec<Vec<f64>> {
+        match self {
+            Self::Warmth => vec![with.lamp.swung_low_pass(with.grid, shape[0].exp(), &with.swings[0])],
+            _ => self.columns(shape, with),
+        }
     }
 
     /// Its columns, the first of which bears its size.
@@ -238,7 +252,7 @@ impl Form {
             Self::Warmth => {
                 let tau_s = shape[0].exp();
                 let mut warmth = lamp.warmth(grid, tau_s, shape[1]);
-                let carried = inertia(tau_s, swing);
+                let carried = swing.carried(tau_s);
                 // of a warmth as fast as the swing the strip follows exp(−t/τ) by another part
                 if carried != 1.0 {
                     let light = lamp.light(grid);
@@ -250,6 +264,10 @@ impl Form {
             Self::Pulse => {
                 let [tau_s, store_s] = [shape[0].exp(), shape[1].exp()];
                 ringing(lamp.gas(grid, tau_s, store_s), lamp.gas_jumps(tau_s, store_s))
+            }
+            Self::Train => {
+                let (tau_s, loss) = (shape[0].exp(), shape[1]);
+                ringing(lamp.gas_train(grid, tau_s, loss), lamp.gas_train_jumps(tau_s, loss))
             }
             Self::Line => vec![over_time(&|x| x)],
             Self::Curve => vec![over_time(&|x| x), over_time(&|x| x * x)],
@@ -269,10 +287,4 @@ impl Form {
             }
         }
     }
-}
-
-/// The part by which an oscillator follows a drive of exp(−t/τ), over that by which it follows a constant one: 1/(1 − 2ζ/ωτ + 1/(ωτ)²).
-fn inertia(tau_s: f64, swing: &Swing) -> f64 {
-    let turns = swing.pole()[1] * tau_s;
-    1.0 / (1.0 - 2.0 * swing.damping / turns + 1.0 / (turns * turns))
 }

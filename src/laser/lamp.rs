@@ -127,6 +127,18 @@ impl Lamp {
         all
     }
 
+    /// What an oscillator makes of a first-order answer, its swings included: u − κ exp(−t/τ) − (1−κ) cos ωt − κ/(ωτ) sin ωt after each edge.
+    pub fn swung_low_pass(&self, grid: &Grid, tau_s: f64, swing: &Swing) -> Vec<f64> {
+        let carried = swing.carried(tau_s);
+        let to_and_fro: Vec<f64> = (0..self.edges_s.len()).map(|k| if k % 2 == 0 { 1.0 } else { -1.0 }).collect();
+        let [cos, sin] = self.rings_of(grid, swing, &to_and_fro);
+        let quarter = carried / (swing.pole()[1] * tau_s);
+        let slow = self.low_pass(grid, tau_s).into_iter().zip(self.light(grid));
+        slow.zip(cos.into_iter().zip(sin))
+            .map(|((w, u), (c, s))| u + carried * (w - u) - (1.0 - carried) * c - quarter * s)
+            .collect()
+    }
+
     /// What a lamp that warms up lacks: −exp(−t/τ) since it went on, 0 in the dark.
     pub fn warm_up(&self, grid: &Grid, tau_s: f64) -> Vec<f64> {
         self.course(grid, |_, i| if i.is_lit { -(-i.since_s / tau_s).exp() } else { 0.0 })
@@ -139,6 +151,23 @@ impl Lamp {
             true => (-i.since_s / tau_s - before[i.edges - 1] / store_s).exp(),
             false => 0.0,
         })
+    }
+
+    /// A push that dies away within each lit time, and is smaller by exp(−loss) each time than the time before.
+    pub fn gas_train(&self, grid: &Grid, tau_s: f64, loss: f64) -> Vec<f64> {
+        self.course(grid, |_, i| match i.is_lit {
+            true => (-i.since_s / tau_s - loss * ((i.edges - 1) / 2) as f64).exp(),
+            false => 0.0,
+        })
+    }
+
+    /// The jumps of `gas_train` at each edge.
+    pub fn gas_train_jumps(&self, tau_s: f64, loss: f64) -> Vec<f64> {
+        let jump = |k: usize| match k % 2 {
+            0 => (-loss * (k / 2) as f64).exp(),
+            _ => -(-(self.edges_s[k] - self.edges_s[k - 1]) / tau_s - loss * (k / 2) as f64).exp(),
+        };
+        (0..self.edges_s.len()).map(jump).collect()
     }
 
     /// The light of each cycle alone.

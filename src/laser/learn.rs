@@ -14,8 +14,14 @@ const FEWER: usize = 50;
 const FURTHER_SWING: f64 = 16.3;
 /// Bounds of damping ratios.
 const DAMPING: [f64; 2] = [2e-4, 0.15];
-/// The white noise is that of neighbouring samples within this factor.
-const WHITE_FACTOR: f64 = 1.3;
+/// The white noise of means is not less than that of neighbouring samples tells, but may be more where a sensor's noise is not quite white.
+const WHITE_FACTORS: [f64; 2] = [0.97, 2.0];
+/// First step of its logarithm, and sweeps over all numbers that end a descent.
+const WHITE_STEP: f64 = 0.05;
+const SWEEPS: usize = 3;
+/// The first swing's frequency is looked for at so many places to each side, and with these damping ratios.
+const FREQUENCIES: i32 = 7;
+const DAMPINGS: [f64; 3] = [0.0015, 0.006, 0.025];
 /// Time constants of what may follow the lamp slowly while the noise is learnt (s).
 const SLOW_ANSWERS_S: [f64; 3] = [1.0, 4.0, 20.0];
 
@@ -63,10 +69,9 @@ impl Acting<'_> {
         self.slow.len() + self.lamp.as_ref().map_or(0, |_| 4 * swings)
     }
 
-    /// What acts beside light and its swings.
-    pub fn beside(&self, swings: &[Swing]) -> Vec<Vec<f64>> {
-        let jumps = Acting { lamp: None, ..self.clone() }.quick(swings);
-        self.slow.iter().skip(1).cloned().chain(jumps).collect()
+    /// The jumps with their swings.
+    pub fn jump_columns(&self, swings: &[Swing]) -> Vec<Vec<f64>> {
+        Acting { lamp: None, ..self.clone() }.quick(swings)
     }
 
     /// The columns' amplitudes under a noise.
@@ -97,7 +102,18 @@ impl Acting<'_> {
 
     /// The likeliest noise, from a first guess.
     pub fn learnt(&self, from: &Noise, bands_hz: &[[f64; 2]]) -> Noise {
-        self.descended(from, bands_hz, EVALUATIONS, 1.0)
+        // the likelihood has a summit at every turn missed, so the first swing's frequency is looked for before it is led on
+        let band = bands_hz[0];
+        let of = |hz: f64, damping: f64| {
+            let mut noise = from.clone();
+            noise.swings[0] = Swing { hz: hz.clamp(band[0], band[1]), damping, ..noise.swings[0] };
+            noise
+        };
+        let spacing_hz = 0.4 / self.grid.duration_s();
+        let around = (-FREQUENCIES..=FREQUENCIES).map(|k| from.swings[0].hz + k as f64 * spacing_hz);
+        let tried = around.flat_map(|hz| DAMPINGS.map(|damping| of(hz, damping)));
+        let best = tried.map(|noise| (self.minus_two_ln(&noise), noise)).min_by(|a, b| a.0.total_cmp(&b.0));
+        self.descended(&best.map_or_else(|| from.clone(), |best| best.1), bands_hz, EVALUATIONS, 1.0)
     }
 
     /// The likeliest noise, from one that was the likeliest with something else at work.
@@ -106,14 +122,35 @@ impl Acting<'_> {
     }
 
     fn descended(&self, from: &Noise, bands_hz: &[[f64; 2]], most: usize, stride: f64) -> Noise {
+        // white noise by itself: it trades with nothing, and a descent in fewer directions is surer
         let coded = code(from);
-        let mut step = vec![0.15 * stride, 1.5 * stride];
+        let white = coded[0];
+        let mut step = vec![1.5 * stride];
         for _ in &from.swings {
             step.extend([0.3 / self.grid.duration_s() * stride, 0.6 * stride, 1.5 * stride]);
         }
         let sample_m = self.sample_m;
-        let (best, _) = descend(&coded, &step, most, |x| self.minus_two_ln(&decode(x, bands_hz, sample_m)));
-        decode(&best, bands_hz, sample_m)
+        let with_white = |white: f64, x: &[f64]| {
+            let all: Vec<f64> = std::iter::once(white).chain(x.iter().copied()).collect();
+            decode(&all, bands_hz, sample_m)
+        };
+        let (best, mut least) = descend(&coded[1..], &step, most, |x| self.minus_two_ln(&with_white(white, x)));
+        let mut all: Vec<f64> = std::iter::once(white).chain(best).collect();
+        let mut step: Vec<f64> = std::iter::once(WHITE_STEP).chain(step.iter().map(|s| 0.3 * s)).collect();
+        for _ in 0..SWEEPS {
+            for k in 0..all.len() {
+                let tried = [step[k], -step[k]].map(|shift| {
+                    let mut moved = all.clone();
+                    moved[k] += shift;
+                    (self.minus_two_ln(&with_white(moved[0], &moved[1..])), moved)
+                });
+                match tried.into_iter().min_by(|a, b| a.0.total_cmp(&b.0)) {
+                    Some((lower, moved)) if lower < least => (least, all) = (lower, moved),
+                    _ => step[k] *= 0.3,
+                }
+            }
+        }
+        with_white(all[0], &all[1..])
     }
 
     /// The noise with those further swings of the bands that the record shows.
@@ -173,7 +210,7 @@ fn decode(x: &[f64], bands_hz: &[[f64; 2]], sample_m: f64) -> Noise {
         }
     };
     Noise {
-        white_m: x[0].exp().clamp(sample_m / WHITE_FACTOR, sample_m * WHITE_FACTOR),
+        white_m: x[0].exp().clamp(sample_m * WHITE_FACTORS[0], sample_m * WHITE_FACTORS[1]),
         walk_m2_s: x[1].exp(),
         swings: x[2..].chunks(3).enumerate().map(swing).collect(),
     }

@@ -18,6 +18,7 @@
 //! | [`verdict`] | candidates and tests → what the record holds |
 //! | [`reflectivity`] | push → momentum taken from the light |
 //! | [`report`] | all of it, for files and people |
+//! | [`plot`](mod@plot) | the same as a figure |
 //!
 //! The model of a record is linear but for a few shapes:
 //!
@@ -40,6 +41,7 @@ pub mod heldout;
 pub mod lamp;
 pub mod learn;
 mod numbers;
+pub mod plot;
 pub mod record;
 pub mod reflectivity;
 pub mod report;
@@ -48,5 +50,6 @@ pub mod solve;
 pub mod verdict;
 
 pub use analysis::{Analysis, analyse};
+pub use plot::plot;
 pub use record::LaserRecord;
 pub use report::Report;

@@ -189,8 +189,7 @@ impl Report {
         let swing_report = |swing: &super::filter::Swing| SwingReport {
             hz: swing.hz,
             damping_ratio: swing.damping,
-            // of a state that gains q a second and decays with δ: q/2δ
-            kept_up_m: (swing.drive_m2_s / (2.0 * swing.pole()[0])).sqrt(),
+            kept_up_m: swing.kept_up_m(),
         };
         let best = &analysis.candidates[0].fit;
         let metres = |(k, [value, sd]): (usize, &[f64; 2])| Quantity { key: k.to_string(), value: *value, sd: *sd, unit: "m" };

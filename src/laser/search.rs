@@ -11,7 +11,7 @@ const PRIOR_ODDS: f64 = 0.1;
 /// How near to an edge of the lamp no other jump is sought (s).
 pub const BESIDE_EDGE_S: f64 = 1.0;
 /// Pairs are those of the likeliest single forms with every other.
-const LEADING: usize = 5;
+const LEADING: usize = 4;
 /// A pair is led down from so many of the likeliest starts.
 const STARTS: usize = 2;
 
