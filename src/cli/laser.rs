@@ -129,15 +129,17 @@ fn surroundings(report: &Report, analysis: &Analysis) -> String {
     let each: Vec<String> =
         report.lamp.push_of_each_m.iter().map(|q| format!("{} ± {}", um(q.value, 3), um(q.sd, 2))).collect();
     text.push_str(&paragraph("Push of each cycle: ", &format!("{} µm.", each.join(", "))));
-    let swings: Vec<String> = report
-        .swings
-        .iter()
-        .map(|s| format!("{:.4} Hz, damping ratio {}", s.hz, number(s.damping_ratio, 2)))
-        .collect();
+    let swings: Vec<String> =
+        report.swings.iter().map(|s| format!("{:.4} Hz, damping ratio {}", s.hz, number(s.damping_ratio, 2))).collect();
     text.push_str(&paragraph("Swings: ", &format!("{}.", swings.join("; "))));
     text.push_str(&paragraph(
         "Noise of a sample: ",
-        &format!("{} µm; {} samples over {:.1} s.", um(report.noise.sample_m, 2), report.samples, analysis.grid.duration_s()),
+        &format!(
+            "{} µm; {} samples over {:.1} s.",
+            um(report.noise.sample_m, 2),
+            report.samples,
+            analysis.grid.duration_s()
+        ),
     ));
     if let Some(proof) = &report.heldout {
         text.push_str(&paragraph(
@@ -169,11 +171,7 @@ fn surface(report: &Report) -> String {
     if let Some(stated) = figure.stated {
         let _ = write!(words, "; the stated shares give {}", number(stated, 4));
     }
-    words.push_str(if figure.can_be {
-        "."
-    } else {
-        "; that cannot be reflectivity alone, which gives"
-    });
+    words.push_str(if figure.can_be { "." } else { "; that cannot be reflectivity alone, which gives" });
     if !figure.can_be {
         let _ = write!(words, " {black} (black) to {mirror} (mirror): check power, distance, window and mass.");
     }

@@ -115,7 +115,8 @@ fn variance(left: &[f64]) -> Test {
 fn jump(bench: &Bench<'_>, stage: &Stage, fit: &Fit) -> Test {
     let grid = bench.with.grid;
     let scan = stage.filter.jumps(&fit.left, 1);
-    let steps = fit.members.iter().filter(|m| m.form == super::forms::Form::Step).map(|m| m.shape[0]).collect::<Vec<_>>();
+    let steps =
+        fit.members.iter().filter(|m| m.form == super::forms::Form::Step).map(|m| m.shape[0]).collect::<Vec<_>>();
     let is_free = |t_s: f64| {
         bench.with.lamp.nearest_s(t_s) > BESIDE_EDGE_S && steps.iter().all(|s| (s - t_s).abs() > BESIDE_EDGE_S)
     };

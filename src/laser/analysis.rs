@@ -102,11 +102,13 @@ pub fn analyse(record: &LaserRecord, experiment: &Experiment) -> Result<Analysis
     noise = acting.with_further_swings(learnt, &bands_hz);
     let first = lamp;
     let is_stated = !stated.is_empty();
-    let beside: Vec<Vec<f64>> =
-        edges::slow_answers(&first, &grid, &noise.swings[0]).into_iter().chain(acting.jump_columns(&noise.swings)).collect();
+    let beside: Vec<Vec<f64>> = edges::slow_answers(&first, &grid, &noise.swings[0])
+        .into_iter()
+        .chain(acting.jump_columns(&noise.swings))
+        .collect();
     let lamp = edges::refined(&grid, &beside, &noise, &first, is_stated);
     acting = acting.with_lamp(lamp.clone());
-    noise = acting.learnt_again(&noise, &bands_hz);
+    noise = acting.learnt(&noise, &bands_hz);
     let no_fit = || refuse("no fit of it converges; check laser.column and its unit".to_owned());
     let (lamp, found) = searched(&grid, &noise, lamp, &first, is_stated).ok_or_else(no_fit)?;
     judged(&grid, &noise, &lamp, found, !is_stated).ok_or_else(no_fit)
@@ -118,8 +120,7 @@ fn searched(grid: &Grid, noise: &Noise, lamp: Lamp, first: &Lamp, is_stated: boo
     let bench = Bench::of(setting(&lamp), noise);
     let found = candidates(&bench);
     let best = &found.first()?.fit;
-    let beside: Vec<Vec<f64>> =
-        best.members.iter().flat_map(|m| m.form.swung_columns(&m.shape, &bench.with)).collect();
+    let beside: Vec<Vec<f64>> = best.members.iter().flat_map(|m| m.form.swung_columns(&m.shape, &bench.with)).collect();
     let moved = edges::refined(grid, &beside, &noise.with_walk(best.walk_m2_s), first, is_stated);
     let by_s = moved.edges_s.iter().zip(&lamp.edges_s).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
     if by_s < MOVED_S {
@@ -141,7 +142,20 @@ fn judged(grid: &Grid, noise: &Noise, lamp: &Lamp, candidates: Vec<Candidate>, l
     let heldout = heldout(&bench, best);
     let detectable = super::verdict::detectable(&bench, best);
     let curves = curves(&bench, best);
-    Some(Analysis { candidates, adequacy, push_m, cycles_m, detectable, heldout, verdict, curves, lamp: lamp.clone(), noise: noise.clone(), lamp_found, grid: grid.clone() })
+    Some(Analysis {
+        candidates,
+        adequacy,
+        push_m,
+        cycles_m,
+        detectable,
+        heldout,
+        verdict,
+        curves,
+        lamp: lamp.clone(),
+        noise: noise.clone(),
+        lamp_found,
+        grid: grid.clone(),
+    })
 }
 
 /// Standard deviation of a sample's noise from fourth differences, which no swing below a tenth of the rate survives.

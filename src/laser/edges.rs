@@ -1,9 +1,9 @@
 //! The lamp's edges: found in a record, or led to where the record has them.
 
+use super::filter::Swing;
 use super::filter::{Filter, Noise};
 use super::grid::Grid;
 use super::lamp::Lamp;
-use super::filter::Swing;
 use super::learn::Acting;
 use super::solve::solve;
 
@@ -70,7 +70,10 @@ pub fn jumps(acting: &Acting<'_>, noise: &Noise, bands_hz: &[[f64; 2]], most: us
 /// The jumps that are the lamp's: alike in size, to and fro in turn, the most of them.
 pub fn lamp_of(jumps: &[Jump]) -> Option<Lamp> {
     let in_turn = |size_m: f64, differs: f64| {
-        let is_alike = |jump: &&Jump| (jump.size_m.abs() - size_m).abs() < differs * size_m + 2.0 * jump.sd_m && jump.size_m.abs() > 3.0 * jump.sd_m;
+        let is_alike = |jump: &&Jump| {
+            (jump.size_m.abs() - size_m).abs() < differs * size_m + 2.0 * jump.sd_m
+                && jump.size_m.abs() > 3.0 * jump.sd_m
+        };
         let mut chain: Vec<Jump> = Vec::new();
         for jump in jumps.iter().filter(is_alike) {
             match chain.last_mut() {
@@ -109,7 +112,10 @@ pub fn refined(grid: &Grid, beside: &[Vec<f64>], noise: &Noise, lamp: &Lamp, is_
     let filter = Filter::of(noise, grid);
     for _ in 0..4 {
         let now = Lamp { edges_s: edges.clone() };
-        let Some(shift) = shifts(&Shifting { grid, filter: &filter, noise, beside }, &now, &lamp.edges_s, known_s) else { break };
+        let Some(shift) = shifts(&Shifting { grid, filter: &filter, noise, beside }, &now, &lamp.edges_s, known_s)
+        else {
+            break;
+        };
         for (edge, shift) in edges.iter_mut().zip(&shift) {
             *edge += shift.clamp(-0.5 * known_s, 0.5 * known_s);
         }

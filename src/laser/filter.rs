@@ -196,27 +196,39 @@ impl Filter {
     }
 
     /// The states that a column leads to, after each cell, beside the innovations.
-    fn states_of(&self, column: &[f64], mut after: impl FnMut(usize, &State)) -> Vec<f64> {
-        let mut state = [0.0; MOST_STATES];
+    fn states_of(&self, column: &[f64], after: impl FnMut(usize, f64)) -> Vec<f64> {
+        match self.turns.len() {
+            1 => self.followed::<1>(column, after),
+            2 => self.followed::<2>(column, after),
+            _ => self.followed::<3>(column, after),
+        }
+    }
+
+    /// The same with so many swings, known when this is compiled: nothing takes more time than this loop.
+    fn followed<const SWINGS: usize>(&self, column: &[f64], mut after: impl FnMut(usize, f64)) -> Vec<f64> {
+        let turns: [[f64; 2]; SWINGS] = std::array::from_fn(|k| self.turns.get(k).copied().unwrap_or([0.0; 2]));
+        let (mut level, mut a, mut b) = (0.0, [0.0; SWINGS], [0.0; SWINGS]);
         let mut white = Vec::with_capacity(column.len());
         for (cell, ((gain, scale), y)) in self.cells.iter().zip(column).enumerate() {
-            let foreseen = state[0] + state[1..self.states].iter().step_by(2).sum::<f64>();
+            let foreseen = level + a.iter().sum::<f64>();
             let off = if *scale > 0.0 { y - foreseen } else { 0.0 };
-            for k in 0..self.states {
-                state[k] += gain[k] * off;
+            level += gain[0] * off;
+            for k in 0..SWINGS {
+                let (x, y) = (a[k] + gain[1 + 2 * k] * off, b[k] + gain[2 + 2 * k] * off);
+                let [c, s] = turns[k];
+                (a[k], b[k]) = (c * x - s * y, s * x + c * y);
             }
             white.push(off * scale);
-            after(cell, &state);
-            self.turn(&mut state);
+            after(cell, level);
         }
         white
     }
 
     /// The level after each cell, from what came before and the cell itself.
     pub fn level(&self, column: &[f64]) -> Vec<f64> {
-        let mut level = Vec::with_capacity(column.len());
-        self.states_of(column, |_, state| level.push(state[0]));
-        level
+        let mut all = Vec::with_capacity(column.len());
+        self.states_of(column, |_, level| all.push(level));
+        all
     }
 
     /// How much a jump of the level at each cell (`free` = 1), or of the level and the first swing (3), would take from the sum of squares: rᵀN⁻¹r of the disturbance smoother
@@ -258,7 +270,10 @@ impl Filter {
                 _ => {
                     let block = nalgebra::Matrix3::from_fn(|i, j| n[i][j]);
                     let score = nalgebra::Vector3::from_fn(|i, _| r[i]);
-                    block.cholesky().map(|c| c.solve(&score)).map_or((0.0, 0.0), |solved| (solved.dot(&score), solved[0]))
+                    block
+                        .cholesky()
+                        .map(|c| c.solve(&score))
+                        .map_or((0.0, 0.0), |solved| (solved.dot(&score), solved[0]))
                 }
             };
         }

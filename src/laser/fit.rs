@@ -10,7 +10,7 @@ use super::solve::solve;
 /// Most steps of a descent.
 const STEPS: usize = 14;
 /// χ² by which the last step of a descent may still have come down.
-const CONVERGED: f64 = 0.02;
+const CONVERGED: f64 = 0.05;
 /// Amplitudes are as likely in each of so many e-foldings: four decades, from the noise to what a sensor's range holds.
 const EFOLDINGS: f64 = 9.2;
 /// ln of the prior's width over that of a walk's likelihood.
@@ -102,7 +102,8 @@ impl<'a> Bench<'a> {
         let period = ((1.0 / with.swings[0].hz) / with.grid.step_s).round().max(1.0) as usize;
         let calm = super::analysis::smoothed(&with.grid.y_m, period);
         let mean = calm.iter().sum::<f64>() / calm.len() as f64;
-        let reach_m = (calm.iter().map(|v| (v - mean).powi(2)).sum::<f64>() / calm.len() as f64).sqrt().max(noise.white_m);
+        let reach_m =
+            (calm.iter().map(|v| (v - mean).powi(2)).sum::<f64>() / calm.len() as f64).sqrt().max(noise.white_m);
         Self { with, noise, base, still, reach_m }
     }
 
@@ -120,7 +121,8 @@ impl<'a> Bench<'a> {
         // the shapes hardly hang on the walk: its size is sought with them held
         let value = |ln_walk: f64| {
             let stage = self.stage(ln_walk.exp());
-            State::of(self, &stage, first.members.clone()).map_or(f64::INFINITY, |s| s.chi2 + stage.filter.ln_determinant)
+            State::of(self, &stage, first.members.clone())
+                .map_or(f64::INFINITY, |s| s.chi2 + stage.filter.ln_determinant)
         };
         let (mut at, mut step) = (first.walk_m2_s.max(f64::MIN_POSITIVE).ln(), 1.6);
         let mut here = value(at);

@@ -130,7 +130,17 @@ pub struct Setting<'a> {
 impl Form {
     /// All.
     pub const ALL: [Self; 11] = [
-        Self::Warmth, Self::Lag, Self::Pulse, Self::Train, Self::Line, Self::Curve, Self::Warming, Self::Walk, Self::Step, Self::Slow, Self::Creep,
+        Self::Warmth,
+        Self::Lag,
+        Self::Pulse,
+        Self::Train,
+        Self::Line,
+        Self::Curve,
+        Self::Warming,
+        Self::Walk,
+        Self::Step,
+        Self::Slow,
+        Self::Creep,
     ];
 
     /// Of which effect.
@@ -169,7 +179,8 @@ impl Form {
     /// The numbers of its shape.
     pub fn shapes(self, with: &Setting<'_>) -> Vec<Shape> {
         let lasts_s = with.lasts_s;
-        let lit_s: f64 = with.lamp.edges_s.chunks(2).map(|c| c.get(1).copied().unwrap_or(with.grid.end_s()) - c[0]).sum();
+        let lit_s: f64 =
+            with.lamp.edges_s.chunks(2).map(|c| c.get(1).copied().unwrap_or(with.grid.end_s()) - c[0]).sum();
         match self {
             Self::Warmth => vec![
                 Shape::logarithm("time_constant_s", 0.4, SLOWEST_FILM_S),

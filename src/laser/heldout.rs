@@ -29,11 +29,7 @@ pub fn heldout(bench: &Bench<'_>, fit: &Fit) -> Option<Heldout> {
     let kept = (cycles - cycles.div_ceil(3)).max(1);
     // a second before the lamp goes on again
     let border = grid.cell(*lamp.edges_s.get(2 * kept)? - 1.0);
-    let first = Grid {
-        y_m: grid.y_m[..border].to_vec(),
-        count: grid.count[..border].to_vec(),
-        ..grid.clone()
-    };
+    let first = Grid { y_m: grid.y_m[..border].to_vec(), count: grid.count[..border].to_vec(), ..grid.clone() };
     let noise: &Noise = bench.noise;
     let early = Bench::of(Setting { grid: &first, lamp, swings, lasts_s }, noise);
     let rmse = |members: Vec<super::fit::Member>| -> Option<f64> {

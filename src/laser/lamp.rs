@@ -1,7 +1,7 @@
 //! The lamp's course, and what answers it: light, warmth, gas, the swings that it excites.
 
-use super::grid::Grid;
 use super::filter::Swing;
+use super::grid::Grid;
 
 /// Instants of a cell at which a course is evaluated; their mean is that of the cell.
 const PARTS: usize = 4;

@@ -7,9 +7,9 @@ use super::lamp::{Lamp, rings_from, step_at};
 use super::solve::{Solution, solve};
 
 /// Evaluations of the likelihood: with the first swing alone, with each further swing, and again after the lamp's edges are known.
-const EVALUATIONS: usize = 90;
+const EVALUATIONS: usize = 80;
 /// The same from a noise that was learnt already.
-const FEWER: usize = 50;
+const FEWER: usize = 40;
 /// −2 ln likelihood that a further swing has to gain: three numbers at 0.1 %.
 const FURTHER_SWING: f64 = 16.3;
 /// Bounds of damping ratios.
@@ -19,8 +19,11 @@ const WHITE_FACTORS: [f64; 2] = [0.97, 2.0];
 /// First step of its logarithm, and sweeps over all numbers that end a descent.
 const WHITE_STEP: f64 = 0.05;
 const SWEEPS: usize = 3;
+/// Where the first swing's frequency stands among the numbers, and turns over the record by which it is tried beside where a descent has ended.
+const FIRST_HZ: usize = 2;
+const NEARBY_TURNS: [f64; 8] = [-0.6, -0.4, -0.25, -0.12, 0.12, 0.25, 0.4, 0.6];
 /// The first swing's frequency is looked for at so many places to each side, and with these damping ratios.
-const FREQUENCIES: i32 = 7;
+const FREQUENCIES: i32 = 6;
 const DAMPINGS: [f64; 3] = [0.0015, 0.006, 0.025];
 /// Time constants of what may follow the lamp slowly while the noise is learnt (s).
 const SLOW_ANSWERS_S: [f64; 3] = [1.0, 4.0, 20.0];
@@ -106,7 +109,9 @@ impl Acting<'_> {
         let band = bands_hz[0];
         let of = |hz: f64, damping: f64| {
             let mut noise = from.clone();
-            noise.swings[0] = Swing { hz: hz.clamp(band[0], band[1]), damping, ..noise.swings[0] };
+            // kept up by next to nothing, for what is kept up at random has no frequency to be missed
+            let drive_m2_s = 1e-4 * from.white_m * from.white_m;
+            noise.swings[0] = Swing { hz: hz.clamp(band[0], band[1]), damping, drive_m2_s };
             noise
         };
         let spacing_hz = 0.4 / self.grid.duration_s();
@@ -136,6 +141,15 @@ impl Acting<'_> {
         };
         let (best, mut least) = descend(&coded[1..], &step, most, |x| self.minus_two_ln(&with_white(white, x)));
         let mut all: Vec<f64> = std::iter::once(white).chain(best).collect();
+        let first_hz = all[FIRST_HZ];
+        for turns in NEARBY_TURNS {
+            let mut moved = all.clone();
+            moved[FIRST_HZ] = first_hz + turns / self.grid.duration_s();
+            let lower = self.minus_two_ln(&with_white(moved[0], &moved[1..]));
+            if lower < least {
+                (least, all) = (lower, moved);
+            }
+        }
         let mut step: Vec<f64> = std::iter::once(WHITE_STEP).chain(step.iter().map(|s| 0.3 * s)).collect();
         for _ in 0..SWEEPS {
             for k in 0..all.len() {

@@ -83,7 +83,10 @@ impl LaserRecord {
             }
         }
         let Some(columns) = columns else {
-            return Err(refuse(None, "holds no row of numbers; export the record as CSV, a row a sample: time, displacement".to_owned()));
+            return Err(refuse(
+                None,
+                "holds no row of numbers; export the record as CSV, a row a sample: time, displacement".to_owned(),
+            ));
         };
         rows.finish(columns.name, laser)
     }
@@ -136,34 +139,49 @@ impl Columns {
         let list = names.join(", ");
         let is_time = |name: &str| {
             let name = name.to_lowercase();
-            name == "t" || name == "s" || name == "ms" || name.starts_with("t_") || name.starts_with("time") || name.starts_with("zeit") || name.starts_with("t ") || name.starts_with("t[") || name.starts_with("t(")
+            name == "t"
+                || name == "s"
+                || name == "ms"
+                || name.starts_with("t_")
+                || name.starts_with("time")
+                || name.starts_with("zeit")
+                || name.starts_with("t ")
+                || name.starts_with("t[")
+                || name.starts_with("t(")
         };
         let t = names.iter().position(|name| is_time(name));
         let t = t.ok_or_else(|| format!("names no column of time; the columns are {list}; name it t_s or t_ms"))?;
         let t_scale_s = if words(names[t]).any(|w| w == "ms") { 1e-3 } else { 1.0 };
         let y = match &laser.column {
             Some(wanted) => names.iter().position(|name| name == wanted).ok_or_else(|| {
-                let near = names.iter().max_by(|a, b| {
-                    strsim::jaro_winkler(a, wanted).total_cmp(&strsim::jaro_winkler(b, wanted))
-                });
+                let near = names
+                    .iter()
+                    .max_by(|a, b| strsim::jaro_winkler(a, wanted).total_cmp(&strsim::jaro_winkler(b, wanted)));
                 format!(
                     "has no column `{wanted}`; the columns are {list}; set laser.column = \"{}\"",
                     near.unwrap_or(&"")
                 )
             })?,
             None => {
-                let known: Vec<usize> =
-                    (0..names.len()).filter(|k| *k != t && unit_m(names[*k], laser).is_ok_and(|u| u.is_some())).collect();
+                let known: Vec<usize> = (0..names.len())
+                    .filter(|k| *k != t && unit_m(names[*k], laser).is_ok_and(|u| u.is_some()))
+                    .collect();
                 match (&known[..], names.len()) {
                     ([only], _) => *only,
                     ([], 2) => 1 - t,
-                    _ => return Err(format!("does not say which column is the displacement; the columns are {list}; set laser.column")),
+                    _ => {
+                        return Err(format!(
+                            "does not say which column is the displacement; the columns are {list}; set laser.column"
+                        ));
+                    }
                 }
             }
         };
         let name = names[y];
         let y_scale_m = unit_m(name, laser)?.ok_or_else(|| {
-            format!("column `{name}` has no unit in its name; end it in _um, _mm or _m, or in _v with laser.scale_m_per_v")
+            format!(
+                "column `{name}` has no unit in its name; end it in _um, _mm or _m, or in _v with laser.scale_m_per_v"
+            )
         })?;
         Ok(Self { t, t_scale_s, y, y_scale_m, name: name.to_owned() })
     }
@@ -181,7 +199,13 @@ impl Columns {
         if fields > 2 {
             return Err(format!("has {fields} columns and no header; keep time and displacement, or add a header"));
         }
-        Ok(Self { t: 0, t_scale_s: 1.0, y: 1, y_scale_m, name: laser.column.clone().unwrap_or_else(|| "column 2".to_owned()) })
+        Ok(Self {
+            t: 0,
+            t_scale_s: 1.0,
+            y: 1,
+            y_scale_m,
+            name: laser.column.clone().unwrap_or_else(|| "column 2".to_owned()),
+        })
     }
 }
 
@@ -203,7 +227,12 @@ fn unit_m(name: &str, laser: &Laser) -> std::result::Result<Option<f64>, String>
                 format!("column `{name}` is in volts; set laser.scale_m_per_v, the displacement a volt stands for")
             });
         }
-        "mv" => return laser.scale_m_per_v.map(|s| Some(1e-3 * s)).ok_or_else(|| format!("column `{name}` is in millivolts; set laser.scale_m_per_v")),
+        "mv" => {
+            return laser
+                .scale_m_per_v
+                .map(|s| Some(1e-3 * s))
+                .ok_or_else(|| format!("column `{name}` is in millivolts; set laser.scale_m_per_v"));
+        }
         _ => return Ok(None),
     };
     Ok(Some(unit_m))
@@ -234,7 +263,9 @@ impl Rows<'_> {
         };
         let t_s = t * columns.t_scale_s;
         if let Some(before) = self.t_s.last().filter(|before| **before >= t_s) {
-            return Err(refuse(format!("time {t_s} s follows {before} s; times must rise: sort the rows, one an instant")));
+            return Err(refuse(format!(
+                "time {t_s} s follows {before} s; times must rise: sort the rows, one an instant"
+            )));
         }
         self.t_s.push(t_s);
         self.y_m.push(y * columns.y_scale_m);

@@ -56,7 +56,10 @@ pub fn figure(experiment: &Experiment, [push_m, sd_m]: [f64; 2]) -> Result<Figur
     let flux_w_m2 = Spotlight { power_w, distance_m, window: light.window }.flux_w_m2();
     let (lever_m3_n, area_m2) = lever(experiment);
     if !(area_m2 > 0.0 && lever_m3_n > 0.0) {
-        return Err("the lit spot misses the strip above the sensor's point (light.spot_diameter_m, light.spot_height_m)".to_owned());
+        return Err(
+            "the lit spot misses the strip above the sensor's point (light.spot_diameter_m, light.spot_height_m)"
+                .to_owned(),
+        );
     }
     let cos = incidence_rad.cos();
     let per_push = area_m2 / lever_m3_n * SPEED_OF_LIGHT_M_S / (flux_w_m2 * area_m2 * cos);

@@ -192,7 +192,8 @@ impl Report {
             kept_up_m: swing.kept_up_m(),
         };
         let best = &analysis.candidates[0].fit;
-        let metres = |(k, [value, sd]): (usize, &[f64; 2])| Quantity { key: k.to_string(), value: *value, sd: *sd, unit: "m" };
+        let metres =
+            |(k, [value, sd]): (usize, &[f64; 2])| Quantity { key: k.to_string(), value: *value, sd: *sd, unit: "m" };
         let mut report = Self {
             schema: "freeswing.laser/1",
             specimen: experiment.specimen.name.clone(),
@@ -296,11 +297,11 @@ impl Analysis {
     /// Every effect with the numbers of the likeliest candidate that holds it.
     fn found(&self) -> Vec<Found> {
         let of = |effect: Effect| {
-            let probability =
-                self.verdict.inclusion.iter().find(|(e, _)| *e == effect).map_or(0.0, |(_, p)| *p);
+            let probability = self.verdict.inclusion.iter().find(|(e, _)| *e == effect).map_or(0.0, |(_, p)| *p);
             let holder = self.candidates.iter().find(|c| c.fit.effects().contains(&effect));
             let parameters = holder.map_or_else(Vec::new, |c| self.parameters(&c.fit, effect));
-            let form = holder.and_then(|c| c.fit.members.iter().find(|m| m.form.effect() == effect)).map(|m| m.form.id());
+            let form =
+                holder.and_then(|c| c.fit.members.iter().find(|m| m.form.effect() == effect)).map(|m| m.form.id());
             Found { effect: Some(effect), probability, form, parameters }
         };
         Effect::ALL.into_iter().map(of).collect()

@@ -12,6 +12,8 @@ const PRIOR_ODDS: f64 = 0.1;
 pub const BESIDE_EDGE_S: f64 = 1.0;
 /// Pairs are those of the likeliest single forms with every other.
 const LEADING: usize = 4;
+/// A form whose best start takes less than this from the sum of squares cannot pay for its prior, size and shape.
+const WORTH: f64 = 5.0;
 /// A pair is led down from so many of the likeliest starts.
 const STARTS: usize = 2;
 
@@ -85,13 +87,13 @@ fn with_one_more(bench: &Bench<'_>, fit: &Fit, form: Form) -> Option<Fit> {
 }
 
 fn starts(bench: &Bench<'_>, fit: &Fit, form: Form, stage: &Stage) -> Vec<Vec<f64>> {
+    if form == Form::Walk {
+        return vec![Vec::new()];
+    }
     if form == Form::Step {
         return jumps_of(bench, fit, stage).into_iter().map(|at_s| vec![at_s]).collect();
     }
     let all = form.starts(&bench.with);
-    if all.len() <= 1 {
-        return all;
-    }
     let members: Vec<Vec<f64>> = fit
         .members
         .iter()
@@ -107,6 +109,7 @@ fn starts(bench: &Bench<'_>, fit: &Fit, form: Form, stage: &Stage) -> Vec<Vec<f6
     };
     let mut ranked: Vec<(f64, Vec<f64>)> = all.into_iter().map(|shape| (gain(&shape), shape)).collect();
     ranked.sort_by(|a, b| b.0.total_cmp(&a.0));
+    ranked.truncate(if ranked.first().is_some_and(|best| best.0 > WORTH) { ranked.len() } else { 0 });
     let mut kept: Vec<Vec<f64>> = Vec::new();
     for (_, shape) in ranked {
         // neighbours of a start lead to the same place
@@ -137,8 +140,9 @@ fn jumps_of(bench: &Bench<'_>, fit: &Fit, stage: &Stage) -> Vec<f64> {
     let columns: Vec<&[f64]> = stage.base.iter().chain(&members).map(Vec::as_slice).collect();
     let left = left_on(&columns, stage, fit);
     let scan = stage.filter.jumps(&left, 3);
-    let mut cells: Vec<usize> =
-        (3..grid.len()).filter(|cell| bench.with.lamp.nearest_s(grid.time_s(*cell)) > BESIDE_EDGE_S).collect();
+    let mut cells: Vec<usize> = (3..grid.len())
+        .filter(|cell| scan[*cell].0 > WORTH && bench.with.lamp.nearest_s(grid.time_s(*cell)) > BESIDE_EDGE_S)
+        .collect();
     cells.sort_by(|a, b| scan[*b].0.total_cmp(&scan[*a].0));
     let mut found: Vec<f64> = Vec::new();
     for cell in cells {

@@ -26,7 +26,13 @@ pub fn solve(columns: &[&[f64]], y: &[f64], known: &[f64]) -> Option<Solution> {
     let y_vector = DVector::from_column_slice(y);
     if count == 0 {
         let covariance = DMatrix::zeros(0, 0);
-        return Some(Solution { amplitude: Vec::new(), covariance, chi2: y_vector.norm_squared(), ln_fisher: 0.0, left: y.to_vec() });
+        return Some(Solution {
+            amplitude: Vec::new(),
+            covariance,
+            chi2: y_vector.norm_squared(),
+            ln_fisher: 0.0,
+            left: y.to_vec(),
+        });
     }
     let mut x = DMatrix::zeros(rows, count);
     for (k, column) in columns.iter().enumerate() {
