@@ -52,6 +52,7 @@ pub mod diagnose;
 pub mod force;
 pub mod paper;
 pub mod report;
+pub mod laser;
 pub mod synth;
 pub mod export;
 pub mod batch;

@@ -160,6 +160,16 @@ fn the_page_on_diagnosis_runs() {
 }
 
 #[test]
+fn the_page_on_the_push_of_light_runs() {
+    let folder = run("docs/laser.md");
+    let report = std::fs::read_to_string(folder.path().join("laser.json")).unwrap();
+    let report: serde_json::Value = serde_json::from_str(&report).unwrap();
+    assert_eq!(report["verdict"]["effects"], serde_json::json!(["heat"]));
+    let end = |k: usize| 1e6 * report["push_m"]["interval"][k].as_f64().unwrap();
+    assert!(end(0) < 1.011 && 1.011 < end(1), "{}", report["push_m"]);
+}
+
+#[test]
 fn the_page_on_outputs_names_what_is_in_them() {
     let folder = run("docs/outputs.md");
     let text = page("docs/outputs.md");
@@ -250,7 +260,7 @@ fn every_option_that_a_page_names_exists() {
     };
     let commands = [
         "init", "track", "identify", "fit", "diagnose", "simulate", "render", "modes", "paper", "run", "batch",
-        "report", "export", "doctor", "force",
+        "report", "export", "doctor", "force", "laser",
     ];
     let help: String = commands.iter().map(|command| help("freeswing", &[command])).collect();
     for name in pages() {
@@ -274,6 +284,7 @@ fn no_page_has_examples_that_are_not_run() {
         "troubleshooting",
         "diagnosis",
         "light",
+        "laser",
     ];
     for name in pages() {
         let has_examples = blocks(&page(&name)).iter().any(|(mark, _)| *mark == "sh");

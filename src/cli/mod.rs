@@ -10,6 +10,7 @@ mod fit;
 mod force;
 mod identify;
 mod init;
+mod laser;
 mod modes;
 mod paper;
 mod render;
@@ -51,6 +52,7 @@ enum Command {
     Simulate(simulate::SimulateArgs),
     Modes(modes::ModesArgs),
     Force(force::ForceArgs),
+    Laser(laser::LaserArgs),
     Render(render::RenderArgs),
     Report(report::ReportArgs),
     Paper(paper::PaperArgs),
@@ -92,6 +94,7 @@ impl Command {
             Self::Render(args) => args.run(console),
             Self::Modes(args) => args.run(console),
             Self::Force(args) => args.run(console),
+            Self::Laser(args) => args.run(console),
             Self::Paper(args) => args.run(console),
             Self::Report(args) => args.run(console),
             Self::Run(args) => args.run(console),

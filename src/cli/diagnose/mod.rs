@@ -147,7 +147,7 @@ impl DiagnoseArgs {
 }
 
 /// A figure is SVG, which its name must say.
-fn check_figure(path: &Path) -> Result<()> {
+pub(super) fn check_figure(path: &Path) -> Result<()> {
     let is_svg = path.extension().is_some_and(|e| e.eq_ignore_ascii_case("svg"));
     // standard output and devices have no extension
     if is_svg || path.as_os_str() == "-" || (path.exists() && !path.is_file()) {

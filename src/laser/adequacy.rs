@@ -1,0 +1,174 @@
+//! Whether a candidate leaves only noise: its innovations must be white, even, without jumps, and say nothing in step with the lamp.
+
+use rustfft::{FftPlanner, num_complex::Complex};
+use serde::Serialize;
+use statrs::distribution::{ChiSquared, ContinuousCDF};
+
+use super::fit::{Bench, Fit, Stage};
+use super::search::BESIDE_EDGE_S;
+use super::solve::solve;
+
+/// A record that leaves only noise fails one of the tests this often. Rare, for forms and modes are not exact to the last digit, and what is not in the table
+/// is beyond it by many powers of ten.
+const FALSE_ALARM: f64 = 1e-5;
+/// Bands of the spectrum: from the slowest line, each so many times as wide as the one before.
+const BAND_RATIO: usize = 3;
+/// Stretches of which the variance is compared.
+const STRETCHES: usize = 12;
+/// Ends of the stretches of time after an edge of the lamp, each of which may have a level of its own (s).
+const AFTER_EDGE_S: [f64; 5] = [1.5, 4.0, 10.0, 25.0, 60.0];
+
+/// One test of what is left.
+#[derive(Debug, Clone, Serialize)]
+pub struct Test {
+    /// What it looks for.
+    pub looks_for: &'static str,
+    /// The probability that noise alone fares worse.
+    pub p_value: f64,
+    /// Where: Hz of a line, s of a jump.
+    pub at: Option<f64>,
+}
+
+/// All tests of a fit.
+#[derive(Debug, Clone, Serialize)]
+pub struct Adequacy {
+    /// Whether only noise is left.
+    pub adequate: bool,
+    /// The least probability, made up for the number of tests.
+    pub p_value: f64,
+    /// Each.
+    pub tests: Vec<Test>,
+}
+
+/// Tests what a fit leaves.
+pub fn adequacy(bench: &Bench<'_>, fit: &Fit) -> Adequacy {
+    let own;
+    let stage = if fit.walk_m2_s > 0.0 {
+        own = bench.stage(fit.walk_m2_s);
+        &own
+    } else {
+        &bench.still
+    };
+    let held: Vec<f64> =
+        fit.left.iter().zip(&bench.with.grid.count).filter(|(_, count)| **count > 0.0).map(|(v, _)| *v).collect();
+    let mut tests = spectrum(&held, bench.with.grid.step_s);
+    tests.push(variance(&held));
+    tests.push(jump(bench, stage, fit));
+    tests.extend(in_step(bench, stage, fit));
+    let least = tests.iter().map(|t| t.p_value).fold(1.0, f64::min);
+    let p_value = 1.0 - (1.0 - least).powi(tests.len() as i32);
+    Adequacy { adequate: p_value > FALSE_ALARM, p_value, tests }
+}
+
+fn beyond(chi2: f64, freedoms: f64) -> f64 {
+    ChiSquared::new(freedoms.max(1.0)).map_or(1.0, |law| law.sf(chi2.max(0.0)))
+}
+
+/// A line anywhere, and more power than noise has in bands from the slowest on.
+fn spectrum(left: &[f64], step_s: f64) -> Vec<Test> {
+    let mut values: Vec<Complex<f64>> = left.iter().map(|v| Complex::new(*v, 0.0)).collect();
+    FftPlanner::new().plan_fft_forward(values.len()).process(&mut values);
+    let lines = values.len() / 2;
+    let count = values.len() as f64;
+    let mean = left.iter().map(|v| v * v).sum::<f64>() / count;
+    // each is exponential with mean 1 for white noise
+    let power: Vec<f64> = values[1..lines.max(2)].iter().map(|v| v.norm_sqr() / count).collect();
+    let hz = |k: usize| (k + 1) as f64 / (count * step_s);
+    let strongest = (0..power.len()).max_by(|a, b| power[*a].total_cmp(&power[*b])).unwrap_or(0);
+    let highest = power.get(strongest).copied().unwrap_or(0.0) / mean.max(1.0);
+    let line = -f64::exp_m1(power.len() as f64 * f64::ln_1p(-(-highest).exp().min(1.0 - 1e-16)));
+    let mut tests = vec![Test { looks_for: "a line in the spectrum", p_value: line.max(0.0), at: Some(hz(strongest)) }];
+    let (mut from, mut width, mut worst) = (0, 6, Test { looks_for: "slow structure", p_value: 1.0, at: None });
+    let mut bands = 0;
+    while from + width <= power.len() / 2 {
+        let sum: f64 = power[from..from + width].iter().sum();
+        let p_value = beyond(2.0 * sum, 2.0 * width as f64);
+        if p_value < worst.p_value {
+            worst = Test { p_value, at: Some(hz(from + width / 2)), ..worst };
+        }
+        bands += 1;
+        from += width;
+        width *= BAND_RATIO;
+    }
+    worst.p_value = 1.0 - (1.0 - worst.p_value).powi(bands.max(1));
+    tests.push(worst);
+    tests
+}
+
+/// Variance that is not the same throughout.
+fn variance(left: &[f64]) -> Test {
+    let length = (left.len() / STRETCHES).max(1);
+    let power = |part: &[f64]| part.iter().map(|v| v * v).sum::<f64>();
+    let mean = power(left) / left.len().max(1) as f64;
+    let fourth = left.iter().map(|v| v.powi(4)).sum::<f64>() / left.len().max(1) as f64;
+    // of a mean of squares, whatever their law
+    let spread = (fourth - mean * mean).max(mean * mean);
+    let chi2: f64 = left
+        .chunks(length)
+        .filter(|part| part.len() == length)
+        .map(|part| (power(part) / length as f64 - mean).powi(2) * length as f64 / spread)
+        .sum();
+    Test { looks_for: "uneven noise", p_value: beyond(chi2, (STRETCHES - 1) as f64), at: None }
+}
+
+/// A jump of the level, away from the lamp's edges.
+fn jump(bench: &Bench<'_>, stage: &Stage, fit: &Fit) -> Test {
+    let grid = bench.with.grid;
+    let scan = stage.filter.jumps(&fit.left, 1);
+    let steps =
+        fit.members.iter().filter(|m| m.form == super::forms::Form::Step).map(|m| m.shape[0]).collect::<Vec<_>>();
+    let is_free = |t_s: f64| {
+        bench.with.lamp.nearest_s(t_s) > BESIDE_EDGE_S && steps.iter().all(|s| (s - t_s).abs() > BESIDE_EDGE_S)
+    };
+    let cells = (3..grid.len()).filter(|cell| is_free(grid.time_s(*cell)));
+    let best = cells.max_by(|a, b| scan[*a].0.total_cmp(&scan[*b].0)).unwrap_or(0);
+    let one = beyond(scan[best].0, 1.0);
+    Test { looks_for: "a jump", p_value: (one * grid.len() as f64).min(1.0), at: Some(grid.time_s(best)) }
+}
+
+/// Levels of their own for stretches after each kind of edge, and for each cycle.
+fn in_step(bench: &Bench<'_>, stage: &Stage, fit: &Fit) -> Vec<Test> {
+    let (grid, lamp) = (bench.with.grid, bench.with.lamp);
+    let members: Vec<Vec<f64>> = fit
+        .members
+        .iter()
+        .flat_map(|m| m.form.columns(&m.shape, &bench.with))
+        .map(|column| stage.filter.whiten(&column))
+        .collect();
+    let plain: Vec<&[f64]> = stage.base.iter().chain(&members).map(Vec::as_slice).collect();
+    let mut after = Vec::new();
+    for is_lit in [true, false] {
+        for (k, end_s) in AFTER_EDGE_S.iter().enumerate() {
+            let start_s = if k == 0 { 0.0 } else { AFTER_EDGE_S[k - 1] };
+            let course = lamp.course(grid, |_, i| {
+                f64::from(i.edges > 0 && i.is_lit == is_lit && i.since_s >= start_s && i.since_s < *end_s)
+            });
+            after.push(stage.filter.whiten(&course));
+        }
+    }
+    let cycles: Vec<Vec<f64>> = lamp.each(grid).iter().skip(1).map(|c| stage.filter.whiten(c)).collect();
+    [("a course in step with the lamp", after), ("cycles that differ", cycles)]
+        .into_iter()
+        .filter(|(_, further)| !further.is_empty())
+        .map(|(looks_for, further)| {
+            let all: Vec<&[f64]> = plain.iter().copied().chain(further.iter().map(Vec::as_slice)).collect();
+            let chi2 = solve(&all, &stage.y, &[]).map_or(fit.chi2, |solution| solution.chi2);
+            Test { looks_for, p_value: beyond(fit.chi2 - chi2, further.len() as f64), at: None }
+        })
+        .collect()
+}
+
+/// The push of each cycle alone with its standard deviation, under a fit's forms.
+pub fn push_of_each(bench: &Bench<'_>, fit: &Fit) -> Vec<[f64; 2]> {
+    let stage = bench.stage(fit.walk_m2_s);
+    let members: Vec<Vec<f64>> = fit
+        .members
+        .iter()
+        .flat_map(|m| m.form.columns(&m.shape, &bench.with))
+        .map(|column| stage.filter.whiten(&column))
+        .collect();
+    let cycles: Vec<Vec<f64>> = bench.with.lamp.each(bench.with.grid).iter().map(|c| stage.filter.whiten(c)).collect();
+    let all: Vec<&[f64]> = cycles.iter().chain(&stage.base[1..]).chain(&members).map(Vec::as_slice).collect();
+    let Some(solution) = solve(&all, &stage.y, &[]) else { return Vec::new() };
+    (0..cycles.len()).map(|k| [solution.amplitude[k], solution.covariance[(k, k)].max(0.0).sqrt()]).collect()
+}

@@ -1,0 +1,282 @@
+//! What no form explains, as a state-space model: a level that may wander, swings that are kept up at random, white noise.
+//!
+//! ```text
+//! y = level + Σ aₖ + white;   level' = level + walk;   (a, b)ₖ' = ρₖ R(ωₖ h) (a, b)ₖ + drive
+//! ```
+//!
+//! with b = −ȧ/ω: what keeps a swing up is a force, so it drives b alone and a moves smoothly.
+//! The Kalman filter turns it into independent innovations of variance 1. It depends on no datum, so the same filter whitens the record and
+//! every column of a model, and least squares of the whitened are generalised least squares. Level and swings start anywhere.
+
+use std::f64::consts::TAU;
+
+use super::grid::Grid;
+
+/// Level and three swings.
+pub const MOST_STATES: usize = 7;
+/// Standard deviation of the states' start, of the record's spread.
+const START_SPREAD: f64 = 100.0;
+
+/// Parts of a step over which a drive is integrated.
+const DRIVEN_PARTS: usize = 16;
+
+type State = [f64; MOST_STATES];
+type Matrix = [State; MOST_STATES];
+
+/// A swing of the strip.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Swing {
+    /// Frequency of the damped swing.
+    pub hz: f64,
+    /// Damping ratio.
+    pub damping: f64,
+    /// Variance that its speed over ω gains, kept up by a random force (m²/s).
+    pub drive_m2_s: f64,
+}
+
+impl Swing {
+    /// Decay rate and angular frequency (1/s, rad/s).
+    pub fn pole(&self) -> [f64; 2] {
+        let damped = TAU * self.hz;
+        [self.damping / (1.0 - self.damping * self.damping).sqrt() * damped, damped]
+    }
+
+    /// The part κ by which an oscillator follows a drive of exp(−t/τ), over that by which it follows a constant one: 1/(1 − 2ζ/ωτ + 1/(ωτ)²).
+    pub fn carried(&self, tau_s: f64) -> f64 {
+        let turns = self.pole()[1] * tau_s;
+        1.0 / (1.0 - 2.0 * self.damping / turns + 1.0 / (turns * turns))
+    }
+
+    /// Root mean square at which the force keeps the swing: √(q/4δ).
+    pub fn kept_up_m(&self) -> f64 {
+        (self.drive_m2_s / (4.0 * self.pole()[0])).sqrt()
+    }
+
+    /// Variances of both states and their covariance that the force adds in a time: ∫ exp(Aτ) (0, 1) (0, 1)ᵀ exp(Aᵀτ) dτ.
+    fn driven(&self, step_s: f64) -> [f64; 3] {
+        let [decay, turn] = self.pole();
+        let part_s = step_s / DRIVEN_PARTS as f64;
+        let mut sum = [0.0; 3];
+        for k in 0..DRIVEN_PARTS {
+            let since = (k as f64 + 0.5) * part_s;
+            let size = self.drive_m2_s * part_s * (-2.0 * decay * since).exp();
+            let (s, c) = (turn * since).sin_cos();
+            sum = [sum[0] + size * s * s, sum[1] + size * c * c, sum[2] - size * s * c];
+        }
+        sum
+    }
+}
+
+/// Noise of known form.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Noise {
+    /// Standard deviation of a sample.
+    pub white_m: f64,
+    /// Variance that the level gains (m²/s).
+    pub walk_m2_s: f64,
+    /// The slowest first.
+    pub swings: Vec<Swing>,
+}
+
+impl Noise {
+    /// The same with another walk.
+    #[must_use]
+    pub fn with_walk(&self, walk_m2_s: f64) -> Self {
+        Self { walk_m2_s, ..self.clone() }
+    }
+
+    /// Number of states.
+    pub fn states(&self) -> usize {
+        1 + 2 * self.swings.len()
+    }
+}
+
+/// The gains of the Kalman filter for a grid.
+#[derive(Debug, Clone)]
+pub struct Filter {
+    states: usize,
+    turns: Vec<[f64; 2]>,
+    /// Of each cell: gain and 1/√(variance of the innovation); that is 0 where the cell holds nothing.
+    cells: Vec<(State, f64)>,
+    /// Σ ln of the innovations' variances.
+    pub ln_determinant: f64,
+}
+
+impl Filter {
+    /// The filter of a noise on a grid.
+    pub fn of(noise: &Noise, grid: &Grid) -> Self {
+        let states = noise.states();
+        let turns: Vec<[f64; 2]> = noise
+            .swings
+            .iter()
+            .map(|swing| {
+                let [decay, turn] = swing.pole();
+                let size = (-decay * grid.step_s).exp();
+                [size * (turn * grid.step_s).cos(), size * (turn * grid.step_s).sin()]
+            })
+            .collect();
+        let start = (START_SPREAD * grid.spread_m().max(noise.white_m)).powi(2);
+        let mut p: Matrix = [[0.0; MOST_STATES]; MOST_STATES];
+        for k in 0..states {
+            p[k][k] = start;
+        }
+        let mut filter = Self { states, turns, cells: Vec::with_capacity(grid.len()), ln_determinant: 0.0 };
+        let driven: Vec<[f64; 3]> = noise.swings.iter().map(|swing| swing.driven(grid.step_s)).collect();
+        for count in &grid.count {
+            let seen = |row: &State| row[0] + row[1..states].iter().step_by(2).sum::<f64>();
+            let mut gain = [0.0; MOST_STATES];
+            let mut scale = 0.0;
+            if *count > 0.0 {
+                let mut across = [0.0; MOST_STATES];
+                (0..states).for_each(|k| across[k] = seen(&p[k]));
+                let variance = seen(&across) + noise.white_m.powi(2) / count;
+                for k in 0..states {
+                    gain[k] = across[k] / variance;
+                }
+                for i in 0..states {
+                    for j in 0..states {
+                        p[i][j] -= gain[i] * across[j];
+                    }
+                }
+                scale = 1.0 / variance.sqrt();
+                filter.ln_determinant += variance.ln();
+            }
+            filter.cells.push((gain, scale));
+            filter.advance_covariance(&mut p, noise.walk_m2_s * grid.step_s, &driven);
+        }
+        filter
+    }
+
+    /// P ← T P Tᵀ + Q.
+    fn advance_covariance(&self, p: &mut Matrix, walked_m2: f64, driven: &[[f64; 3]]) {
+        for row in &mut p[..self.states] {
+            self.turn(row);
+        }
+        for column in 0..self.states {
+            for (k, [c, s]) in self.turns.iter().enumerate() {
+                let (a, b) = (p[1 + 2 * k][column], p[2 + 2 * k][column]);
+                p[1 + 2 * k][column] = c * a - s * b;
+                p[2 + 2 * k][column] = s * a + c * b;
+            }
+        }
+        p[0][0] += walked_m2;
+        for (k, [own, speed, both]) in driven.iter().enumerate() {
+            let (a, b) = (1 + 2 * k, 2 + 2 * k);
+            p[a][a] += own;
+            p[b][b] += speed;
+            p[a][b] += both;
+            p[b][a] += both;
+        }
+    }
+
+    fn turn(&self, state: &mut State) {
+        for (k, [c, s]) in self.turns.iter().enumerate() {
+            let (a, b) = (state[1 + 2 * k], state[2 + 2 * k]);
+            state[1 + 2 * k] = c * a - s * b;
+            state[2 + 2 * k] = s * a + c * b;
+        }
+    }
+
+    fn turn_back(&self, state: &mut State) {
+        for (k, [c, s]) in self.turns.iter().enumerate() {
+            let (a, b) = (state[1 + 2 * k], state[2 + 2 * k]);
+            state[1 + 2 * k] = c * a + s * b;
+            state[2 + 2 * k] = c * b - s * a;
+        }
+    }
+
+    /// Whether a state is seen.
+    fn is_seen(state: usize) -> bool {
+        state == 0 || state % 2 == 1
+    }
+
+    /// The innovations of a column, each over its standard deviation.
+    pub fn whiten(&self, column: &[f64]) -> Vec<f64> {
+        self.states_of(column, |_, _| ())
+    }
+
+    /// The states that a column leads to, after each cell, beside the innovations.
+    fn states_of(&self, column: &[f64], after: impl FnMut(usize, f64)) -> Vec<f64> {
+        match self.turns.len() {
+            1 => self.followed::<1>(column, after),
+            2 => self.followed::<2>(column, after),
+            _ => self.followed::<3>(column, after),
+        }
+    }
+
+    /// The same with so many swings, known when this is compiled: nothing takes more time than this loop.
+    fn followed<const SWINGS: usize>(&self, column: &[f64], mut after: impl FnMut(usize, f64)) -> Vec<f64> {
+        let turns: [[f64; 2]; SWINGS] = std::array::from_fn(|k| self.turns.get(k).copied().unwrap_or([0.0; 2]));
+        let (mut level, mut a, mut b) = (0.0, [0.0; SWINGS], [0.0; SWINGS]);
+        let mut white = Vec::with_capacity(column.len());
+        for (cell, ((gain, scale), y)) in self.cells.iter().zip(column).enumerate() {
+            let foreseen = level + a.iter().sum::<f64>();
+            let off = if *scale > 0.0 { y - foreseen } else { 0.0 };
+            level += gain[0] * off;
+            for k in 0..SWINGS {
+                let (x, y) = (a[k] + gain[1 + 2 * k] * off, b[k] + gain[2 + 2 * k] * off);
+                let [c, s] = turns[k];
+                (a[k], b[k]) = (c * x - s * y, s * x + c * y);
+            }
+            white.push(off * scale);
+            after(cell, level);
+        }
+        white
+    }
+
+    /// The level after each cell, from what came before and the cell itself.
+    pub fn level(&self, column: &[f64]) -> Vec<f64> {
+        let mut all = Vec::with_capacity(column.len());
+        self.states_of(column, |_, level| all.push(level));
+        all
+    }
+
+    /// How much a jump of the level at each cell (`free` = 1), or of the level and the first swing (3), would take from the sum of squares: rᵀN⁻¹r of the disturbance smoother
+    /// (de Jong and Penzer, 1998); and the jump of the level.
+    pub fn jumps(&self, white: &[f64], free: usize) -> Vec<(f64, f64)> {
+        let (mut r, mut n): (State, Matrix) = ([0.0; MOST_STATES], [[0.0; MOST_STATES]; MOST_STATES]);
+        let mut found = vec![(0.0, 0.0); white.len()];
+        let free = free.min(self.states);
+        for cell in (0..white.len()).rev() {
+            let (gain, scale) = &self.cells[cell];
+            // back through the transition, T'r and T'NT
+            self.turn_back(&mut r);
+            for row in &mut n[..self.states] {
+                self.turn_back(row);
+            }
+            for column in 0..self.states {
+                let mut whole = [0.0; MOST_STATES];
+                (0..self.states).for_each(|k| whole[k] = n[k][column]);
+                self.turn_back(&mut whole);
+                (0..self.states).for_each(|k| n[k][column] = whole[k]);
+            }
+            if *scale > 0.0 {
+                // back through the update, (I − KZ)'
+                let along: f64 = (0..self.states).map(|k| gain[k] * r[k]).sum();
+                let mut across = [0.0; MOST_STATES];
+                (0..self.states).for_each(|k| across[k] = (0..self.states).map(|i| n[k][i] * gain[i]).sum());
+                let both: f64 = (0..self.states).map(|k| across[k] * gain[k]).sum();
+                for i in 0..self.states {
+                    let seen_i = f64::from(Self::is_seen(i));
+                    r[i] += seen_i * (white[cell] * scale - along);
+                    for j in 0..self.states {
+                        let seen_j = f64::from(Self::is_seen(j));
+                        n[i][j] += -seen_i * across[j] - seen_j * across[i] + seen_i * seen_j * (both + scale * scale);
+                    }
+                }
+            }
+            found[cell] = match free {
+                1 => (r[0] * r[0] / n[0][0].max(f64::MIN_POSITIVE), r[0] / n[0][0].max(f64::MIN_POSITIVE)),
+                _ => {
+                    let block = nalgebra::Matrix3::from_fn(|i, j| n[i][j]);
+                    let score = nalgebra::Vector3::from_fn(|i, _| r[i]);
+                    block
+                        .cholesky()
+                        .map(|c| c.solve(&score))
+                        .map_or((0.0, 0.0), |solved| (solved.dot(&score), solved[0]))
+                }
+            };
+        }
+        found
+    }
+}

@@ -1,0 +1,94 @@
+//! Least squares of whitened columns.
+
+use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
+
+/// Added to the diagonal of columns scaled to 1, so that two that are the same cost no solution.
+const RIDGE: f64 = 1e-9;
+
+/// Amplitudes of columns, and how well they are known.
+#[derive(Debug, Clone)]
+pub struct Solution {
+    /// Amplitudes.
+    pub amplitude: Vec<f64>,
+    /// Their covariance.
+    pub covariance: DMatrix<f64>,
+    /// Sum of squares of what is left.
+    pub chi2: f64,
+    /// ln of the determinant of the Fisher matrix.
+    pub ln_fisher: f64,
+    /// What is left.
+    pub left: Vec<f64>,
+}
+
+/// Amplitudes of the columns that together come nearest to `y`; `known` adds to the Fisher matrix's diagonal what is known of each beforehand.
+pub fn solve(columns: &[&[f64]], y: &[f64], known: &[f64]) -> Option<Solution> {
+    let (rows, count) = (y.len(), columns.len());
+    let y_vector = DVector::from_column_slice(y);
+    if count == 0 {
+        let covariance = DMatrix::zeros(0, 0);
+        return Some(Solution {
+            amplitude: Vec::new(),
+            covariance,
+            chi2: y_vector.norm_squared(),
+            ln_fisher: 0.0,
+            left: y.to_vec(),
+        });
+    }
+    let mut x = DMatrix::zeros(rows, count);
+    for (k, column) in columns.iter().enumerate() {
+        x.column_mut(k).copy_from_slice(column);
+    }
+    let mut fisher = x.tr_mul(&x);
+    let right = x.tr_mul(&y_vector);
+    for (k, own) in known.iter().enumerate() {
+        fisher[(k, k)] += own;
+    }
+    let scale: Vec<f64> = (0..count).map(|k| fisher[(k, k)].sqrt().max(f64::MIN_POSITIVE)).collect();
+    let (factor, scaled) = scaled_cholesky(&fisher, &scale)?;
+    let _ = scaled;
+    let solved = factor.solve(&DVector::from_fn(count, |k, _| right[k] / scale[k]));
+    let amplitude: Vec<f64> = (0..count).map(|k| solved[k] / scale[k]).collect();
+    let inverse = factor.inverse();
+    let covariance = DMatrix::from_fn(count, count, |i, j| inverse[(i, j)] / (scale[i] * scale[j]));
+    let left = y_vector - &x * DVector::from_column_slice(&amplitude);
+    let ln_fisher = factor.l_dirty().diagonal().iter().map(|d| 2.0 * d.ln()).sum::<f64>()
+        + scale.iter().map(|s| 2.0 * s.ln()).sum::<f64>();
+    Some(Solution { amplitude, covariance, chi2: left.norm_squared(), ln_fisher, left: left.as_slice().to_vec() })
+}
+
+fn scaled_cholesky(fisher: &DMatrix<f64>, scale: &[f64]) -> Option<(Cholesky<f64, Dyn>, DMatrix<f64>)> {
+    let count = scale.len();
+    let mut scaled = DMatrix::from_fn(count, count, |i, j| fisher[(i, j)] / (scale[i] * scale[j]));
+    for k in 0..count {
+        scaled[(k, k)] = 1.0 + RIDGE;
+    }
+    Some((scaled.clone().cholesky()?, scaled))
+}
+
+/// An orthonormal basis of whitened columns, to ask quickly what a further one would explain.
+#[derive(Debug)]
+pub struct Span {
+    basis: DMatrix<f64>,
+}
+
+impl Span {
+    /// Of some columns.
+    pub fn of(columns: &[&[f64]], rows: usize) -> Self {
+        let mut x = DMatrix::zeros(rows, columns.len());
+        for (k, column) in columns.iter().enumerate() {
+            x.column_mut(k).copy_from_slice(column);
+        }
+        Self { basis: if columns.is_empty() { x } else { x.qr().q() } }
+    }
+
+    /// What of the sum of squares of `left`, which is perpendicular to the span, a further column explains.
+    pub fn gain(&self, column: &[f64], left: &[f64]) -> f64 {
+        let column = DVector::from_column_slice(column);
+        let beyond = &column - &self.basis * self.basis.tr_mul(&column);
+        let size = beyond.norm_squared();
+        if size <= 1e-12 * column.norm_squared() || size == 0.0 {
+            return 0.0;
+        }
+        beyond.dot(&DVector::from_column_slice(left)).powi(2) / size
+    }
+}
