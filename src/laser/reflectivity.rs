@@ -11,7 +11,7 @@
 use serde::Serialize;
 
 use crate::experiment::{Experiment, Support};
-use crate::model::radiation::{SPEED_OF_LIGHT_M_S, Spotlight, radiation_force_n};
+use crate::model::light::{SPEED_OF_LIGHT_M_S, Spotlight, radiation_force_n};
 
 /// Steps of the integral along the strip.
 const STEPS: usize = 2000;
