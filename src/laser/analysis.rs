@@ -203,8 +203,7 @@ fn curves(bench: &Bench<'_>, fit: &Fit) -> Curves {
     columns.extend(fit.members.iter().flat_map(|m| m.form.columns(&m.shape, &bench.with)));
     let sum = |keep: &dyn Fn(usize) -> bool| {
         let mut sum = vec![0.0; grid.len()];
-        for (k, (column, amplitude)) in columns.iter().zip(&fit.amplitude).enumerate().filter(|(k, _)| keep(*k)) {
-            let _ = k;
+        for (_, (column, amplitude)) in columns.iter().zip(&fit.amplitude).enumerate().filter(|(k, _)| keep(*k)) {
             sum.iter_mut().zip(column).for_each(|(s, c)| *s += amplitude * c);
         }
         sum

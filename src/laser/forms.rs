@@ -17,6 +17,8 @@ use super::lamp::{Lamp, rings_from, step_at};
 /// Between a film and a support: the slowest film cools in so many seconds, the fastest support warms in so many.
 const SLOWEST_FILM_S: f64 = 50.0;
 
+/// How far from the record's ends a step must be, so that level and swing are known before and after (s).
+pub const FROM_ENDS_S: f64 = 2.0;
 /// Modes of the strip that a force of its own excites.
 const RINGING: usize = 2;
 
@@ -201,7 +203,7 @@ impl Form {
                 key: "at_s",
                 unit: "s",
                 is_logarithm: false,
-                bounds: [with.grid.start_s, with.grid.end_s()],
+                bounds: [with.grid.start_s + FROM_ENDS_S, with.grid.end_s() - FROM_ENDS_S],
             }],
             Self::Slow => vec![Shape::logarithm("time_constant_s", SLOWEST_FILM_S, 900.0)],
             Self::Creep => vec![

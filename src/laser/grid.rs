@@ -57,6 +57,11 @@ impl Grid {
         self.y_m.len()
     }
 
+    /// Whether there is no cell; never so of a record that was read.
+    pub fn is_empty(&self) -> bool {
+        self.y_m.is_empty()
+    }
+
     /// Middle of a cell.
     pub fn time_s(&self, cell: usize) -> f64 {
         self.start_s + cell as f64 * self.step_s

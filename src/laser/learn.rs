@@ -23,8 +23,10 @@ const SWEEPS: usize = 3;
 const FIRST_HZ: usize = 2;
 const NEARBY_TURNS: [f64; 8] = [-0.6, -0.4, -0.25, -0.12, 0.12, 0.25, 0.4, 0.6];
 /// The first swing's frequency is looked for at so many places to each side, and with these damping ratios.
-const FREQUENCIES: i32 = 6;
+const FREQUENCIES: i32 = 5;
 const DAMPINGS: [f64; 3] = [0.0015, 0.006, 0.025];
+/// So much of its root mean square is then kept up by a force.
+const KEPT_UP: f64 = 0.05;
 /// Time constants of what may follow the lamp slowly while the noise is learnt (s).
 const SLOW_ANSWERS_S: [f64; 3] = [1.0, 4.0, 20.0];
 
@@ -107,16 +109,23 @@ impl Acting<'_> {
     pub fn learnt(&self, from: &Noise, bands_hz: &[[f64; 2]]) -> Noise {
         // the likelihood has a summit at every turn missed, so the first swing's frequency is looked for before it is led on
         let band = bands_hz[0];
+        let changes = self.grid.y_m.windows(2).map(|pair| (pair[1] - pair[0]).powi(2)).sum::<f64>();
+        let turn = std::f64::consts::TAU * from.swings[0].hz * self.grid.step_s;
+        let rms_m = (changes / self.grid.len() as f64).sqrt() / turn;
         let of = |hz: f64, damping: f64| {
             let mut noise = from.clone();
-            // kept up by next to nothing, for what is kept up at random has no frequency to be missed
-            let drive_m2_s = 1e-4 * from.white_m * from.white_m;
-            noise.swings[0] = Swing { hz: hz.clamp(band[0], band[1]), damping, drive_m2_s };
+            // kept up by a part of its size: what goes on by itself alone fits nowhere beside the very summit
+            let swing = Swing { hz: hz.clamp(band[0], band[1]), damping, drive_m2_s: 0.0 };
+            let drive_m2_s = 4.0 * swing.pole()[0] * (KEPT_UP * rms_m).powi(2);
+            noise.swings[0] = Swing { drive_m2_s, ..swing };
             noise
         };
         let spacing_hz = 0.4 / self.grid.duration_s();
-        let around = (-FREQUENCIES..=FREQUENCIES).map(|k| from.swings[0].hz + k as f64 * spacing_hz);
-        let tried = around.flat_map(|hz| DAMPINGS.map(|damping| of(hz, damping)));
+        let around = |hz: f64| (-FREQUENCIES..=FREQUENCIES).map(move |k| hz + k as f64 * spacing_hz);
+        let strongest = strongest_hz(self.grid, band);
+        let further = if (strongest - from.swings[0].hz).abs() > spacing_hz { Some(strongest) } else { None };
+        let all = around(from.swings[0].hz).chain(further.into_iter().flat_map(around));
+        let tried = all.flat_map(|hz| DAMPINGS.map(|damping| of(hz, damping)));
         let best = tried.map(|noise| (self.minus_two_ln(&noise), noise)).min_by(|a, b| a.0.total_cmp(&b.0));
         self.descended(&best.map_or_else(|| from.clone(), |best| best.1), bands_hz, EVALUATIONS, 1.0)
     }

@@ -3,7 +3,7 @@
 use rayon::prelude::*;
 
 use super::fit::{Bench, Fit, Member, Stage};
-use super::forms::{Effect, Form};
+use super::forms::{Effect, FROM_ENDS_S, Form};
 use super::solve::Span;
 
 /// Prior odds of each effect of the table.
@@ -140,7 +140,8 @@ fn jumps_of(bench: &Bench<'_>, fit: &Fit, stage: &Stage) -> Vec<f64> {
     let columns: Vec<&[f64]> = stage.base.iter().chain(&members).map(Vec::as_slice).collect();
     let left = left_on(&columns, stage, fit);
     let scan = stage.filter.jumps(&left, 3);
-    let mut cells: Vec<usize> = (3..grid.len())
+    let ends = (FROM_ENDS_S / grid.step_s).ceil() as usize;
+    let mut cells: Vec<usize> = (ends..grid.len().saturating_sub(ends))
         .filter(|cell| scan[*cell].0 > WORTH && bench.with.lamp.nearest_s(grid.time_s(*cell)) > BESIDE_EDGE_S)
         .collect();
     cells.sort_by(|a, b| scan[*b].0.total_cmp(&scan[*a].0));

@@ -44,8 +44,7 @@ pub fn solve(columns: &[&[f64]], y: &[f64], known: &[f64]) -> Option<Solution> {
         fisher[(k, k)] += own;
     }
     let scale: Vec<f64> = (0..count).map(|k| fisher[(k, k)].sqrt().max(f64::MIN_POSITIVE)).collect();
-    let (factor, scaled) = scaled_cholesky(&fisher, &scale)?;
-    let _ = scaled;
+    let factor = scaled_cholesky(&fisher, &scale)?;
     let solved = factor.solve(&DVector::from_fn(count, |k, _| right[k] / scale[k]));
     let amplitude: Vec<f64> = (0..count).map(|k| solved[k] / scale[k]).collect();
     let inverse = factor.inverse();
@@ -56,13 +55,13 @@ pub fn solve(columns: &[&[f64]], y: &[f64], known: &[f64]) -> Option<Solution> {
     Some(Solution { amplitude, covariance, chi2: left.norm_squared(), ln_fisher, left: left.as_slice().to_vec() })
 }
 
-fn scaled_cholesky(fisher: &DMatrix<f64>, scale: &[f64]) -> Option<(Cholesky<f64, Dyn>, DMatrix<f64>)> {
+fn scaled_cholesky(fisher: &DMatrix<f64>, scale: &[f64]) -> Option<Cholesky<f64, Dyn>> {
     let count = scale.len();
     let mut scaled = DMatrix::from_fn(count, count, |i, j| fisher[(i, j)] / (scale[i] * scale[j]));
     for k in 0..count {
         scaled[(k, k)] = 1.0 + RIDGE;
     }
-    Some((scaled.clone().cholesky()?, scaled))
+    scaled.cholesky()
 }
 
 /// An orthonormal basis of whitened columns, to ask quickly what a further one would explain.
