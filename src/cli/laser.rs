@@ -44,7 +44,7 @@ impl LaserArgs {
     /// One line: what, where, what to do.
     pub fn run(&self, console: &Console) -> Result<()> {
         self.figure.as_deref().map(super::diagnose::check_figure).transpose()?;
-        let experiment = super::read_experiment(&self.config, console)?;
+        let experiment = super::read_strip(&self.config, console)?;
         let record = LaserRecord::read(&self.record, &experiment.laser.clone().unwrap_or_default())?;
         for warning in &record.warnings {
             console.warning(warning);

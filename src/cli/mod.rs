@@ -137,7 +137,15 @@ fn read_angles(path: &Path, console: &Console) -> crate::Result<AngleSeries> {
 
 /// An experiment file for a command that needs the specimen; what is odd in it is said on standard error.
 fn read_experiment(path: &Path, console: &Console) -> crate::Result<Experiment> {
-    let experiment = Experiment::read_with_specimen(path)?;
+    heard(Experiment::read_with_specimen(path)?, console)
+}
+
+/// The same for a command that needs a strip, and no marks on it.
+fn read_strip(path: &Path, console: &Console) -> crate::Result<Experiment> {
+    heard(Experiment::read_with_strip(path)?, console)
+}
+
+fn heard(experiment: Experiment, console: &Console) -> crate::Result<Experiment> {
     for warning in &experiment.warnings {
         console.warning(warning);
     }

@@ -45,8 +45,27 @@ const LINKS: Key = Key {
     example: "link_lengths_m = [0.10, 0.10]",
 };
 
+const LENGTH: Key = Key { name: "specimen.length_m", meaning: "m, the whole strip", example: "length_m = 0.20" };
+
 /// What of the specimen the file does not say, one line; `None` where it says enough.
 pub fn missing(file: &Table) -> Option<String> {
+    let states = states_of(file);
+    lacking(file, !states("link_lengths_m"), LINKS)
+}
+
+/// The same where the specimen is a strip without marks: its length is enough.
+pub fn missing_of_strip(file: &Table) -> Option<String> {
+    let states = states_of(file);
+    lacking(file, !states("link_lengths_m") && !states("length_m"), LENGTH)
+}
+
+/// Whether the file states a key of the specimen.
+fn states_of(file: &Table) -> impl Fn(&str) -> bool {
+    let specimen = file.get("specimen").and_then(toml::Value::as_table);
+    move |key| specimen.is_some_and(|s| s.contains_key(key))
+}
+
+fn lacking(file: &Table, lacks_length: bool, length: Key) -> Option<String> {
     let specimen = file.get("specimen").and_then(toml::Value::as_table);
     let states = |key: &str| specimen.is_some_and(|s| s.contains_key(key));
     if specimen.and_then(|s| s.get("links")?.as_array()).is_some_and(|links| !links.is_empty()) {
@@ -57,7 +76,7 @@ pub fn missing(file: &Table) -> Option<String> {
     let lacks = [
         (!states("mass_kg") && !from_measures, MASS),
         (!states("width_m") && bends, WIDTH),
-        (!states("link_lengths_m"), LINKS),
+        (lacks_length, length),
     ];
     let lacks: Vec<String> = lacks
         .into_iter()
@@ -78,6 +97,9 @@ pub fn complete(specimen: &mut Specimen, file: &Table, name: &str) {
     }
     if states("link_lengths_m") && !states("length_m") {
         specimen.length_m = specimen.link_lengths_m.iter().sum();
+    }
+    if states("length_m") && !states("link_lengths_m") {
+        specimen.link_lengths_m = vec![specimen.length_m];
     }
     if let (false, Some(mass_kg)) = (states("mass_kg"), measured_mass_kg(specimen).filter(|_| states("width_m"))) {
         specimen.mass_kg = mass_kg;

@@ -46,6 +46,9 @@ pub struct Experiment {
     /// What of the specimen the file does not say, in words; nothing where it says enough.
     #[serde(skip)]
     pub missing: Option<String>,
+    /// The same where the specimen is a strip without marks.
+    #[serde(skip)]
+    pub missing_of_strip: Option<String>,
     /// What in the file is odd, and may yet be true.
     #[serde(skip)]
     pub warnings: Vec<String>,
@@ -88,6 +91,18 @@ impl Experiment {
         }
     }
 
+    /// The same for a strip that needs no marks.
+    ///
+    /// # Errors
+    /// As [`Experiment::read_with_specimen`].
+    pub fn read_with_strip(path: &Path) -> Result<Self> {
+        let experiment = Self::read(path)?;
+        match experiment.missing_of_strip {
+            Some(message) => Err(Error::Config { path: path.to_owned(), line: None, message }),
+            None => Ok(experiment),
+        }
+    }
+
     /// Parses the text of a file; `path` only appears in errors.
     ///
     /// # Errors
@@ -105,6 +120,7 @@ impl Experiment {
         let invalid = |message: String| Error::Config { path: path.to_owned(), line: None, message };
         let name = path.file_stem().map_or_else(|| "specimen".into(), std::ffi::OsStr::to_string_lossy);
         experiment.missing = consistency::missing(&keys);
+        experiment.missing_of_strip = consistency::missing_of_strip(&keys);
         consistency::complete(&mut experiment.specimen, &keys, &name);
         experiment.specimen.validate().map_err(invalid)?;
         experiment.rig.validate().map_err(invalid)?;

@@ -10,8 +10,8 @@
 
 use serde::Serialize;
 
-use crate::experiment::{Experiment, Support};
-use crate::model::light::{SPEED_OF_LIGHT_M_S, Spotlight, radiation_force_n};
+use crate::experiment::{Experiment, Reflectivity, Support};
+use crate::model::light::{Beam, SPEED_OF_LIGHT_M_S, radiation_force_n};
 
 /// Steps of the integral along the strip.
 const STEPS: usize = 2000;
@@ -50,11 +50,14 @@ pub fn figure(experiment: &Experiment, [push_m, sd_m]: [f64; 2]) -> Result<Figur
         return Err("the specimen is made of links: the push is turned into a reflectivity for a strip only".to_owned());
     }
     if experiment.rig.support != Support::Hinged || experiment.rig.support_stiffness_n_m_per_rad > 0.0 {
-        return Err("the strip does not turn freely (rig.support): its answer hangs on a stiffness, so the push is not turned into a reflectivity".to_owned());
+        return Err("the strip does not turn freely (rig.support): its answer depends on its stiffness, so the push is not turned into a reflectivity".to_owned());
     }
     let incidence_rad = light.direction_deg.to_radians();
-    let flux_w_m2 = Spotlight { power_w, distance_m, window: light.window }.flux_w_m2();
-    let (lever_m3_n, area_m2) = lever(experiment);
+    let specimen = &experiment.specimen;
+    let surface = specimen.reflectivity.unwrap_or(Reflectivity::opaque(0.0, 0.0, 1.0));
+    let beam = Beam::of(&light, power_w, distance_m, specimen.width_m, specimen.length_m, [surface; 2]);
+    let flux_w_m2 = beam.flux_w_m2;
+    let (lever_m3_n, area_m2) = lever(experiment, &beam);
     if !(area_m2 > 0.0 && lever_m3_n > 0.0) {
         return Err(
             "the lit spot misses the strip above the sensor's point (light.spot_diameter_m, light.spot_height_m)"
@@ -83,26 +86,17 @@ pub fn figure(experiment: &Experiment, [push_m, sd_m]: [f64; 2]) -> Result<Figur
 }
 
 /// Displacement of the sensor's point a pressure (m³/N), and the lit area (m²).
-fn lever(experiment: &Experiment) -> (f64, f64) {
+fn lever(experiment: &Experiment, beam: &Beam) -> (f64, f64) {
     let specimen = &experiment.specimen;
-    let light = experiment.light.clone().unwrap_or_default();
     let length_m = specimen.length_m;
     let height_m = experiment.laser.as_ref().and_then(|l| l.height_m).unwrap_or(length_m);
-    let centre_m = light.spot_height_m.unwrap_or(0.5 * length_m);
-    let lit_width_m = |s: f64| match light.spot_diameter_m {
-        None => specimen.width_m,
-        Some(diameter_m) => {
-            let half = (0.25 * diameter_m * diameter_m - (s - centre_m).powi(2)).max(0.0).sqrt();
-            (2.0 * half).min(specimen.width_m)
-        }
-    };
     let step_m = length_m / STEPS as f64;
     let weight_n_m = specimen.mass_kg * experiment.rig.gravity_m_s2 / length_m;
     let middle = |k: usize| (k as f64 + 0.5) * step_m;
     // lit area below each step's middle
     let (mut below_m2, mut lever_m3_n) = (0.0, 0.0);
     for k in (0..STEPS).rev() {
-        let own_m2 = lit_width_m(middle(k)) * step_m;
+        let own_m2 = specimen.width_m * beam.lit(middle(k)) * step_m;
         let share = ((height_m - k as f64 * step_m) / step_m).clamp(0.0, 1.0);
         lever_m3_n += share * step_m * (below_m2 + 0.5 * own_m2) / (weight_n_m * (length_m - middle(k)));
         below_m2 += own_m2;

@@ -71,7 +71,7 @@ impl ForceArgs {
     pub fn run(&self, console: &Console) -> Result<()> {
         let create = |path: &Option<PathBuf>| path.as_deref().map(OutputFile::create).transpose();
         let (json, figure, trace) = (create(&self.json)?, create(&self.figure)?, create(&self.trace)?);
-        let experiment = super::read_experiment(&self.config, console)?;
+        let experiment = super::read_strip(&self.config, console)?;
         let setup = Setup::of(&experiment).map_err(|e| in_file(e, &self.config))?;
         if self.plan {
             let plan = self.planned(&setup, &experiment).map_err(|e| in_file(e, &self.config))?;
