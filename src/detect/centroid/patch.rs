@@ -1,5 +1,7 @@
 //! The pixels around a mark: luma and both colour differences at luma resolution, in polar coordinates.
 
+use std::ops::Range;
+
 use super::outline::Outline;
 use crate::video::{Picture, Plane};
 
@@ -117,16 +119,18 @@ impl Patch {
         let layout = picture.layout;
         let (wide, scale) = (picture.wide(), code_scale(picture));
         // two more pixels on every side, the picture's border repeated
-        let column = |i: usize| (self.left + i).saturating_sub(2).min(layout.width_px - 1);
         let row = |j: usize| (self.top + j).saturating_sub(2).min(layout.height_px - 1);
         let (width, height) = (self.width + 4, self.height + 4);
-        let columns: Vec<usize> = (0..width).map(column).collect();
+        let inside = self.left.saturating_sub(2)..(self.left + self.width + 2).min(layout.width_px);
+        let before = 2usize.saturating_sub(self.left);
         let (across, down) = (softening(layout.chroma_shift_x), softening(layout.chroma_shift_y));
         let mut raw = Vec::with_capacity(width);
         let mut rows = vec![0.0; self.width * height];
         for (j, out) in rows.chunks_exact_mut(self.width).enumerate() {
             raw.clear();
-            raw.extend(columns.iter().map(|x| f32::from(picture.luma.code(wide, *x, row(j))) * scale));
+            raw.resize(before, f32::from(picture.luma.code(wide, 0, row(j))) * scale);
+            read(&picture.luma, wide, row(j), inside.clone(), scale, &mut raw);
+            raw.resize(width, raw[raw.len() - 1]);
             (0..across.len()).for_each(|k| add(out, across[k], &raw[k..]));
         }
         let mut soft = vec![0.0; self.width * self.height];
@@ -149,8 +153,9 @@ impl Patch {
         let columns = cx1 - cx0;
         let mut coarse = Vec::with_capacity(columns * (cy1 - cy0));
         for y in cy0..cy1 {
-            coarse.extend((cx0..cx1).map(|x| f32::from(plane.code(picture.wide(), x, y)) * scale - 128.0));
+            read(plane, picture.wide(), y, cx0..cx1, scale, &mut coarse);
         }
+        coarse.iter_mut().for_each(|code| *code -= 128.0);
         let taps = |at: f64, from: usize, to: usize| {
             let at = at.clamp(from as f64, (to - 1) as f64);
             let i = (at as usize).min(to.saturating_sub(2).max(from));
@@ -182,6 +187,16 @@ fn code_scale(picture: &Picture<'_>) -> f32 {
 /// half the samples; nothing where it has all.
 fn softening(shift: u32) -> [f32; 5] {
     if shift == 0 { [0.0, 0.0, 1.0, 0.0, 0.0] } else { [0.0625, 0.25, 0.375, 0.25, 0.0625] }
+}
+
+/// Reads some columns of a row as 8-bit codes.
+fn read(plane: &Plane<'_>, wide: bool, y: usize, columns: Range<usize>, scale: f32, codes: &mut Vec<f32>) {
+    if wide || plane.step != 1 {
+        codes.extend(columns.map(|x| f32::from(plane.code(wide, x, y)) * scale));
+    } else {
+        let row = &plane.bytes[y * plane.stride..][columns];
+        codes.extend(row.iter().map(|code| f32::from(*code) * scale));
+    }
 }
 
 /// Adds a row, weighted.
