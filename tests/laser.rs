@@ -164,7 +164,7 @@ fn what_is_no_record_is_one_line_and_exit_code_2() {
     let good = |t: f64, y: f64| format!("{t},{y:.3}");
     let bad = [
         (folder.file("empty.csv", ""), "empty"),
-        (folder.file("text.csv", "Dear all,\nthe record follows\n"), "one column"),
+        (folder.file("text.csv", "Dear all,\nthe record follows\n"), "no row of numbers"),
         (folder.file("bytes.csv", [0x89, 0x50, 0x00, 0x01]), "not text"),
         (folder.file("short.csv", "t_s,y_um\n0,1\n1,2\n"), "2 samples"),
         (folder.file("one.csv", "y_um\n1\n2\n"), "one column"),
@@ -258,7 +258,7 @@ fn the_whole_bank() {
     let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join("laser");
     let run = Command::new(bank().join("run.sh"))
         .arg(&folder)
-        .args(["1001", "200"])
+        .args(["3001", "200"])
         .env("FREESWING", cargo_bin("freeswing"))
         .output()
         .unwrap();

@@ -73,11 +73,8 @@ fn lacking(file: &Table, lacks_length: bool, length: Key) -> Option<String> {
     }
     let from_measures = ["thickness_m", "density_kg_m3", "width_m"].iter().all(|key| states(key));
     let bends = states("young_modulus_pa") && states("thickness_m");
-    let lacks = [
-        (!states("mass_kg") && !from_measures, MASS),
-        (!states("width_m") && bends, WIDTH),
-        (lacks_length, length),
-    ];
+    let lacks =
+        [(!states("mass_kg") && !from_measures, MASS), (!states("width_m") && bends, WIDTH), (lacks_length, length)];
     let lacks: Vec<String> = lacks
         .into_iter()
         .filter_map(|(lacks, key)| {

@@ -70,8 +70,13 @@ impl LaserRecord {
             let record = record.map_err(|e| refuse(e.position().map(csv::Position::line), e.to_string()))?;
             let line = record.position().map(csv::Position::line);
             let is_header = columns.is_none() && record.iter().all(|field| number(field, comma).is_none());
-            if is_header && names.is_none() {
-                names = Some(record);
+            if is_header {
+                // of several lines before the numbers the last names the columns, but for the one that names the wanted
+                let is_named =
+                    |names: &csv::StringRecord| names.iter().any(|name| Some(name) == laser.column.as_deref());
+                if !names.as_ref().is_some_and(is_named) {
+                    names = Some(record);
+                }
                 continue;
             }
             if columns.is_none() {
