@@ -25,6 +25,7 @@
 
 pub mod error;
 pub mod experiment;
+mod input;
 pub mod output;
 pub mod progress;
 mod digits;

@@ -2,7 +2,6 @@
 //!
 //! Only `t_s` and `theta1_rad`, `theta2_rad`, … are needed, in any order among any other columns. An empty field is a missing value.
 
-use std::io::Read as _;
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 
@@ -50,14 +49,7 @@ impl AngleSeries {
     /// [`Error::Unreadable`], [`Error::EmptyFile`], or [`Error::Table`] with the line: missing columns, fields that are not numbers, NaN or
     /// infinity, times that do not increase, fewer than [`FEWEST_ROWS`] rows, an angle that never changes, degrees.
     pub fn read(path: &Path) -> Result<Self> {
-        let (name, bytes) = if path.as_os_str() == "-" {
-            let name = PathBuf::from("standard input");
-            let mut bytes = Vec::new();
-            std::io::stdin().lock().read_to_end(&mut bytes).map_err(|e| Error::unreadable(&name, e))?;
-            (name, bytes)
-        } else {
-            (path.to_owned(), std::fs::read(path).map_err(|e| Error::unreadable(path, e))?)
-        };
+        let (name, bytes) = crate::input::read(path)?;
         Self::parse(&bytes, &name)
     }
 

@@ -99,8 +99,7 @@ fn effects(report: &Report) -> String {
     let mut table =
         Table::with_sentences(["beside the push", "probability", "would be seen from", "", "where it is there"]);
     for found in &report.effects {
-        let Some(effect) = found.effect else { continue };
-        let smallest = report.detectable.get(effect.id()).map_or_else(|| "–".to_owned(), |limit| um(limit.smallest, 2));
+        let smallest = report.detectable.get(found.effect.id()).map_or_else(|| "–".to_owned(), |limit| um(limit.smallest, 2));
         let numbers: Vec<String> = found
             .parameters
             .iter()
@@ -111,7 +110,7 @@ fn effects(report: &Report) -> String {
             })
             .collect();
         table.row([
-            effect.id().to_owned(),
+            found.effect.id().to_owned(),
             format!("{:.3}", found.probability),
             smallest,
             "µm".to_owned(),

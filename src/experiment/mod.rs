@@ -84,11 +84,9 @@ impl Experiment {
     /// # Errors
     /// As [`Experiment::read`], and [`Error::Config`] that asks for what is missing.
     pub fn read_with_specimen(path: &Path) -> Result<Self> {
-        let experiment = Self::read(path)?;
-        match experiment.missing {
-            Some(message) => Err(Error::Config { path: path.to_owned(), line: None, message }),
-            None => Ok(experiment),
-        }
+        let mut experiment = Self::read(path)?;
+        let missing = experiment.missing.take();
+        experiment.unless(missing, path)
     }
 
     /// The same for a strip that needs no marks.
@@ -96,10 +94,15 @@ impl Experiment {
     /// # Errors
     /// As [`Experiment::read_with_specimen`].
     pub fn read_with_strip(path: &Path) -> Result<Self> {
-        let experiment = Self::read(path)?;
-        match experiment.missing_of_strip {
+        let mut experiment = Self::read(path)?;
+        let missing = experiment.missing_of_strip.take();
+        experiment.unless(missing, path)
+    }
+
+    fn unless(self, missing: Option<String>, path: &Path) -> Result<Self> {
+        match missing {
             Some(message) => Err(Error::Config { path: path.to_owned(), line: None, message }),
-            None => Ok(experiment),
+            None => Ok(self),
         }
     }
 

@@ -9,18 +9,13 @@
 use nalgebra::{DMatrix, DVector};
 
 use super::Setup;
-use crate::error::{Error, Result};
+use crate::error::Result;
 use crate::experiment::Support;
 use crate::model::light::Beam;
-use crate::model::{ForwardModel, Partials};
+use crate::model::{Chain, ForwardModel};
 
 /// Parts of a link, so that the edge of a spot is seen.
 const PARTS: usize = 16;
-/// Newton's steps; light turns a chain by so little that three do.
-const STEPS: usize = 50;
-/// A correction this small beside the angles is rounding.
-const CONVERGED: f64 = 1e-13;
-
 /// The chain of an experiment at rest.
 #[derive(Debug)]
 pub struct LitChain {
@@ -39,15 +34,13 @@ impl LitChain {
         if experiment.rig.support == Support::Clamped {
             return Ok(None);
         }
-        let effects = &mut experiment.model.effects;
-        effects.hinge_coulomb = None;
-        effects.support_motion = None;
         let spring = experiment.rig.support_stiffness_n_m_per_rad;
         if spring > 0.0 {
+            let effects = &mut experiment.model.effects;
             effects.hinge_stiffness = Some(effects.hinge_stiffness.unwrap_or(0.0) + spring);
         }
-        let model = ForwardModel::of(&experiment)?;
-        let dark_rad = rest(&model, None, DVector::zeros(model.chain().count()))?;
+        let model = ForwardModel::still(&experiment)?;
+        let dark_rad = model.rest_rad(DVector::zeros(model.chain().count()), |_, _, _| {})?;
         Ok(Some(Self { model, dark_rad }))
     }
 
@@ -56,7 +49,9 @@ impl LitChain {
     /// # Errors
     /// [`Error::Simulation`].
     pub fn moved_m(&self, beam: &Beam, s_m: f64) -> Result<f64> {
-        let lit_rad = rest(&self.model, Some(beam), self.dark_rad.clone())?;
+        let lit_rad = self.model.rest_rad(self.dark_rad.clone(), |theta, torque, stiffness| {
+            add_push(self.model.chain(), beam, theta, torque, stiffness);
+        })?;
         Ok(self.x_m(&lit_rad, s_m) - self.x_m(&self.dark_rad, s_m))
     }
 
@@ -72,40 +67,14 @@ impl LitChain {
     }
 }
 
-/// θ at rest, by Newton's method.
-fn rest(model: &ForwardModel, beam: Option<&Beam>, from_rad: DVector<f64>) -> Result<DVector<f64>> {
-    let none = || Error::Simulation { detail: "the chain of links comes to no rest under this light".into() };
-    let n = model.chain().count();
-    let mut theta = from_rad;
-    let mut torque_n_m = vec![0.0; model.rates()];
-    let mut partials = Partials::zero(n, model.rates());
-    for _ in 0..STEPS {
-        let motion = model.motion(0.0, theta.as_slice(), &vec![0.0; n]);
-        model.torque(&motion, &mut torque_n_m);
-        model.partials(&motion, &mut partials);
-        let mut residual = DVector::from_column_slice(&torque_n_m[..n]);
-        let mut stiffness = -partials.theta.rows(0, n);
-        if let Some(beam) = beam {
-            add_push(model, beam, &theta, &mut residual, &mut stiffness);
-        }
-        let step = stiffness.lu().solve(&residual).ok_or_else(none)?;
-        theta += &step;
-        if step.amax() <= CONVERGED * theta.amax() {
-            return Ok(theta);
-        }
-    }
-    Err(none())
-}
-
 /// Adds the torques of light, and takes their derivatives from the stiffness.
 fn add_push(
-    model: &ForwardModel,
+    chain: &Chain,
     beam: &Beam,
     theta: &DVector<f64>,
     torque: &mut DVector<f64>,
     stiffness: &mut DMatrix<f64>,
 ) {
-    let chain = model.chain();
     let mut above_m = 0.0;
     for j in 0..chain.count() {
         let length_m = chain.length_m(j);

@@ -13,9 +13,7 @@ use serde::Serialize;
 
 use super::{Response, Setup};
 use crate::error::{Error, Result};
-
-/// Half a 95 % interval in standard deviations.
-const NORMAL_95: f64 = 1.959_963_985;
+use crate::identify::estimate::NORMAL_QUANTILE;
 
 /// What is wanted, and what there is to measure with.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -104,7 +102,7 @@ impl Plan {
         let response = Response::of(setup, power_w, distance_m, wanted.damping_ratio)?;
         let settling_s = 10f64.ln() / (wanted.damping_ratio * std::f64::consts::TAU * response.first_mode_hz());
         let way = |[push_m, heat_m]: [f64; 2], noise_factor: f64| {
-            let per_root_s_m = NORMAL_95 * noise_factor * wanted.noise_m / wanted.rate_hz.sqrt();
+            let per_root_s_m = NORMAL_QUANTILE * noise_factor * wanted.noise_m / wanted.rate_hz.sqrt();
             let push_m = push_m.abs();
             let relative_interval = per_root_s_m / wanted.time_s.sqrt() / push_m;
             Way {

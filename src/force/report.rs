@@ -5,6 +5,7 @@ use serde::Serialize;
 use super::chain::LitChain;
 use super::{Lit, Parts, Setup};
 use crate::error::{Error, Result};
+use crate::model::light::Beam;
 use crate::model::strip::load::Free;
 use crate::model::strip::{Mesh, Rest};
 
@@ -113,17 +114,17 @@ impl Force {
                 sweep.push(dark.row(power_w, distance_m)?);
             }
         }
-        let own = dark.row(power_w, distance_m)?;
+        let lit = dark.lit(power_w, distance_m)?;
         Ok(Self {
             schema: "freeswing.force/1",
             specimen: setup.experiment.specimen.name.clone(),
             power_w,
             distance_m,
-            flux_w_m2: own.flux_w_m2,
-            force_n: own.force_n,
+            flux_w_m2: lit.beam.flux_w_m2,
+            force_n: dark.force_n(&lit.beam),
             weight_n: setup.strip.mass_per_length_kg_m * setup.strip.length_m * setup.strip.gravity_m_s2,
             first_mode_hz: vibration.map_or(f64::NAN, |v| v.frequencies_hz(1)[0]),
-            points: dark.points(power_w, distance_m, &places_m)?,
+            points: places_m.iter().map(|s_m| dark.point(&lit, *s_m)).collect::<Result<_>>()?,
             sweep,
             heat: setup.film.map(|film| Times {
                 time_constant_s: film.time_constant_s(film.wall_k),
@@ -155,55 +156,75 @@ fn places_m(setup: &Setup, further_m: &[f64]) -> Result<Vec<f64>> {
     Ok(places_m)
 }
 
+/// The strip at rest under the push, and under each of what its warmth does.
+struct LitRests {
+    beam: Beam,
+    pushed: Rest,
+    warm: Option<Warm>,
+}
+
+/// Rests of a warm strip.
+struct Warm {
+    hottest_k: Option<f64>,
+    all: Rest,
+    gradient: Rest,
+    coating: Rest,
+    recoil: Rest,
+}
+
 impl Dark<'_> {
-    fn row(&self, power_w: f64, distance_m: f64) -> Result<Row> {
+    fn lit(&self, power_w: f64, distance_m: f64) -> Result<LitRests> {
         let beam = self.setup.beam(power_w, distance_m);
+        let of = |parts: Parts| Lit::rest(&self.setup.strip, &self.mesh, beam, self.setup.film, parts);
+        let warm = match self.setup.film {
+            None => None,
+            Some(_) => {
+                let (all, lit) = of(Parts::ALL)?;
+                Some(Warm {
+                    hottest_k: lit.hottest_k(),
+                    all,
+                    gradient: of(Parts { gradient: true, ..Parts::NONE })?.0,
+                    coating: of(Parts { coating: true, ..Parts::NONE })?.0,
+                    recoil: of(Parts { recoil: true, ..Parts::NONE })?.0,
+                })
+            }
+        };
+        Ok(LitRests { beam, pushed: of(Parts::PUSH)?.0, warm })
+    }
+
+    /// Along x, on the strip as it hangs in the dark.
+    fn force_n(&self, beam: &Beam) -> f64 {
         let angles = self.mesh.angles(self.rest.freedoms.as_slice());
-        let push =
-            |point: usize| self.mesh.weight_m(point) * beam.push(self.mesh.s_m(point), angles[point]).force_n_m[0];
-        let (_, lit) = Lit::rest(&self.setup.strip, &self.mesh, beam, self.setup.film, Parts::ALL)?;
+        let push = |p: usize| self.mesh.weight_m(p) * beam.push(self.mesh.s_m(p), angles[p]).force_n_m[0];
+        (0..self.mesh.points()).map(push).sum()
+    }
+
+    fn row(&self, power_w: f64, distance_m: f64) -> Result<Row> {
+        let lit = self.lit(power_w, distance_m)?;
         Ok(Row {
             power_w,
             distance_m,
-            flux_w_m2: beam.flux_w_m2,
-            force_n: (0..self.mesh.points()).map(push).sum(),
-            temperature_k: lit.hottest_k(),
-            point: self.points(power_w, distance_m, &[self.setup.sensor_m()])?[0],
+            flux_w_m2: lit.beam.flux_w_m2,
+            force_n: self.force_n(&lit.beam),
+            temperature_k: lit.warm.as_ref().and_then(|warm| warm.hottest_k),
+            point: self.point(&lit, self.setup.sensor_m())?,
         })
     }
 
-    /// Each part alone, at some places.
-    fn points(&self, power_w: f64, distance_m: f64, places_m: &[f64]) -> Result<Vec<Point>> {
-        let beam = self.setup.beam(power_w, distance_m);
-        let rest = |parts: Parts| -> Result<Rest> {
-            Ok(Lit::rest(&self.setup.strip, &self.mesh, beam, self.setup.film, parts)?.0)
-        };
-        let pushed = rest(Parts::PUSH)?;
-        let warm = match self.setup.film {
-            None => None,
-            Some(_) => Some([
-                rest(Parts::ALL)?,
-                rest(Parts { gradient: true, ..Parts::NONE })?,
-                rest(Parts { coating: true, ..Parts::NONE })?,
-                rest(Parts { recoil: true, ..Parts::NONE })?,
-            ]),
-        };
-        let of = |s_m: f64| -> Result<Point> {
-            let moved = |rest: &Rest| rest.place_m(s_m)[0] - self.rest.place_m(s_m)[0];
-            let strip_m = moved(&pushed);
-            let alone = |k: usize| warm.as_ref().map(|rests| moved(&rests[k]));
-            let total_m = alone(0).unwrap_or(strip_m);
-            Ok(Point {
-                s_m,
-                multibody_m: self.chain.as_ref().map(|chain| chain.moved_m(&beam, s_m)).transpose()?,
-                strip_m,
-                heat_m: alone(0).map(|total_m| total_m - strip_m),
-                gradient_m: alone(1),
-                coating_m: alone(2),
-                recoil_m: alone(3),
-                total_m,
-            })
-        };
-        places_m.iter().map(|s_m| of(*s_m)).collect()
+    fn point(&self, lit: &LitRests, s_m: f64) -> Result<Point> {
+        let moved = |rest: &Rest| rest.place_m(s_m)[0] - self.rest.place_m(s_m)[0];
+        let strip_m = moved(&lit.pushed);
+        let alone = |of: fn(&Warm) -> &Rest| lit.warm.as_ref().map(|warm| moved(of(warm)));
+        let total_m = alone(|warm| &warm.all);
+        Ok(Point {
+            s_m,
+            multibody_m: self.chain.as_ref().map(|chain| chain.moved_m(&lit.beam, s_m)).transpose()?,
+            strip_m,
+            heat_m: total_m.map(|total_m| total_m - strip_m),
+            gradient_m: alone(|warm| &warm.gradient),
+            coating_m: alone(|warm| &warm.coating),
+            recoil_m: alone(|warm| &warm.recoil),
+            total_m: total_m.unwrap_or(strip_m),
+        })
     }
 }

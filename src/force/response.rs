@@ -98,18 +98,14 @@ impl Response {
         let modes = MODES.min(vibration.squares_rad2_s2.len());
         let seen = rest.seen(&vibration, setup.sensor_m());
         let forces: [DVector<f64>; PARTS] = std::array::from_fn(|part| along_freedoms(&rest, &lit, part));
-        let at_rest_m = (0..modes)
+        let mut at_rest_m = (0..vibration.squares_rad2_s2.len())
             .map(|k| {
                 let shape = vibration.shapes.column(k);
                 std::array::from_fn(|part| seen[k] * shape.dot(&forces[part]) / vibration.squares_rad2_s2[k])
             })
             .collect::<Vec<[f64; PARTS]>>();
-        let all: [f64; PARTS] = std::array::from_fn(|part| {
-            (0..vibration.squares_rad2_s2.len())
-                .map(|k| seen[k] * vibration.shapes.column(k).dot(&forces[part]) / vibration.squares_rad2_s2[k])
-                .sum::<f64>()
-        });
-        let further_m = std::array::from_fn(|part| all[part] - at_rest_m.iter().map(|m| m[part]).sum::<f64>());
+        let further = at_rest_m.split_off(modes);
+        let further_m = std::array::from_fn(|part| further.iter().map(|m| m[part]).sum());
         Ok(Self {
             omega_rad_s: vibration.squares_rad2_s2[..modes].iter().map(|square| square.sqrt()).collect(),
             damping_ratio,

@@ -72,8 +72,8 @@ impl Estimate {
     }
 }
 
-/// Quantile 0.975 of the normal distribution.
-const NORMAL_QUANTILE: f64 = 1.959_963_984_540_054;
+/// Quantile 0.975 of the normal distribution: half a 95 % interval in standard deviations.
+pub const NORMAL_QUANTILE: f64 = 1.959_963_984_540_054;
 /// From here on Student's quantile differs from the normal one by less than 3·10⁻⁶ of it; the library's inversion does not end for very many.
 const NEARLY_NORMAL: f64 = 5e5;
 

@@ -2,11 +2,11 @@
 
 use rustfft::{FftPlanner, num_complex::Complex};
 use serde::Serialize;
-use statrs::distribution::{ChiSquared, ContinuousCDF};
 
 use super::fit::{Bench, Fit, Stage};
 use super::search::BESIDE_EDGE_S;
 use super::solve::solve;
+use crate::identify::estimate::chi_squared_tail;
 
 /// A record that leaves only noise fails one of the tests this often. Rare, for forms and modes are not exact to the last digit, and what is not in the table
 /// is beyond it by many powers of ten.
@@ -42,13 +42,7 @@ pub struct Adequacy {
 
 /// Tests what a fit leaves.
 pub fn adequacy(bench: &Bench<'_>, fit: &Fit) -> Adequacy {
-    let own;
-    let stage = if fit.walk_m2_s > 0.0 {
-        own = bench.stage(fit.walk_m2_s);
-        &own
-    } else {
-        &bench.still
-    };
+    let stage = &bench.stage(fit.walk_m2_s);
     let held: Vec<f64> =
         fit.left.iter().zip(&bench.with.grid.count).filter(|(_, count)| **count > 0.0).map(|(v, _)| *v).collect();
     let mut tests = spectrum(&held, bench.with.grid.step_s);
@@ -58,10 +52,6 @@ pub fn adequacy(bench: &Bench<'_>, fit: &Fit) -> Adequacy {
     let least = tests.iter().map(|t| t.p_value).fold(1.0, f64::min);
     let p_value = 1.0 - (1.0 - least).powi(tests.len() as i32);
     Adequacy { adequate: p_value > FALSE_ALARM, p_value, tests }
-}
-
-fn beyond(chi2: f64, freedoms: f64) -> f64 {
-    ChiSquared::new(freedoms.max(1.0)).map_or(1.0, |law| law.sf(chi2.max(0.0)))
 }
 
 /// A line anywhere, and more power than noise has in bands from the slowest on.
@@ -82,7 +72,7 @@ fn spectrum(left: &[f64], step_s: f64) -> Vec<Test> {
     let mut bands = 0;
     while from + width <= power.len() / 2 {
         let sum: f64 = power[from..from + width].iter().sum();
-        let p_value = beyond(2.0 * sum, 2.0 * width as f64);
+        let p_value = chi_squared_tail(2.0 * sum, 2.0 * width as f64);
         if p_value < worst.p_value {
             worst = Test { p_value, at: Some(hz(from + width / 2)), ..worst };
         }
@@ -108,7 +98,7 @@ fn variance(left: &[f64]) -> Test {
         .filter(|part| part.len() == length)
         .map(|part| (power(part) / length as f64 - mean).powi(2) * length as f64 / spread)
         .sum();
-    Test { looks_for: "uneven noise", p_value: beyond(chi2, (STRETCHES - 1) as f64), at: None }
+    Test { looks_for: "uneven noise", p_value: chi_squared_tail(chi2, (STRETCHES - 1) as f64), at: None }
 }
 
 /// A jump of the level, away from the lamp's edges.
@@ -122,19 +112,14 @@ fn jump(bench: &Bench<'_>, stage: &Stage, fit: &Fit) -> Test {
     };
     let cells = (3..grid.len()).filter(|cell| is_free(grid.time_s(*cell)));
     let best = cells.max_by(|a, b| scan[*a].0.total_cmp(&scan[*b].0)).unwrap_or(0);
-    let one = beyond(scan[best].0, 1.0);
+    let one = chi_squared_tail(scan[best].0, 1.0);
     Test { looks_for: "a jump", p_value: (one * grid.len() as f64).min(1.0), at: Some(grid.time_s(best)) }
 }
 
 /// Levels of their own for stretches after each kind of edge, and for each cycle.
 fn in_step(bench: &Bench<'_>, stage: &Stage, fit: &Fit) -> Vec<Test> {
     let (grid, lamp) = (bench.with.grid, bench.with.lamp);
-    let members: Vec<Vec<f64>> = fit
-        .members
-        .iter()
-        .flat_map(|m| m.form.columns(&m.shape, &bench.with))
-        .map(|column| stage.filter.whiten(&column))
-        .collect();
+    let members = bench.whitened(stage, &fit.members);
     let plain: Vec<&[f64]> = stage.base.iter().chain(&members).map(Vec::as_slice).collect();
     let mut after = Vec::new();
     for is_lit in [true, false] {
@@ -153,20 +138,15 @@ fn in_step(bench: &Bench<'_>, stage: &Stage, fit: &Fit) -> Vec<Test> {
         .map(|(looks_for, further)| {
             let all: Vec<&[f64]> = plain.iter().copied().chain(further.iter().map(Vec::as_slice)).collect();
             let chi2 = solve(&all, &stage.y, &[]).map_or(fit.chi2, |solution| solution.chi2);
-            Test { looks_for, p_value: beyond(fit.chi2 - chi2, further.len() as f64), at: None }
+            Test { looks_for, p_value: chi_squared_tail(fit.chi2 - chi2, further.len() as f64), at: None }
         })
         .collect()
 }
 
 /// The push of each cycle alone with its standard deviation, under a fit's forms.
 pub fn push_of_each(bench: &Bench<'_>, fit: &Fit) -> Vec<[f64; 2]> {
-    let stage = bench.stage(fit.walk_m2_s);
-    let members: Vec<Vec<f64>> = fit
-        .members
-        .iter()
-        .flat_map(|m| m.form.columns(&m.shape, &bench.with))
-        .map(|column| stage.filter.whiten(&column))
-        .collect();
+    let stage = &bench.stage(fit.walk_m2_s);
+    let members = bench.whitened(stage, &fit.members);
     let cycles: Vec<Vec<f64>> = bench.with.lamp.each(bench.with.grid).iter().map(|c| stage.filter.whiten(c)).collect();
     let all: Vec<&[f64]> = cycles.iter().chain(&stage.base[1..]).chain(&members).map(Vec::as_slice).collect();
     let Some(solution) = solve(&all, &stage.y, &[]) else { return Vec::new() };

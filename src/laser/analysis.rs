@@ -3,7 +3,7 @@
 use super::adequacy::{Adequacy, adequacy, push_of_each};
 use super::edges::{self, Jump};
 use super::filter::Noise;
-use super::fit::{Bench, Fit};
+use super::fit::{Bench, Fit, columns_of};
 use super::forms::{Effect, Setting};
 use super::grid::Grid;
 use super::heldout::{Heldout, heldout};
@@ -11,6 +11,7 @@ use super::lamp::Lamp;
 use super::learn::Acting;
 use super::record::LaserRecord;
 use super::search::{Candidate, candidates};
+use super::solve::combined;
 use super::verdict::{Verdict, verdict};
 use crate::error::{Error, Result};
 use crate::experiment::Experiment;
@@ -200,13 +201,10 @@ fn nothing_switched(jumps: &[Jump]) -> String {
 fn curves(bench: &Bench<'_>, fit: &Fit) -> Curves {
     let grid = bench.with.grid;
     let mut columns: Vec<Vec<f64>> = bench.base.clone();
-    columns.extend(fit.members.iter().flat_map(|m| m.form.columns(&m.shape, &bench.with)));
+    columns.extend(columns_of(&fit.members, &bench.with));
     let sum = |keep: &dyn Fn(usize) -> bool| {
-        let mut sum = vec![0.0; grid.len()];
-        for (_, (column, amplitude)) in columns.iter().zip(&fit.amplitude).enumerate().filter(|(k, _)| keep(*k)) {
-            sum.iter_mut().zip(column).for_each(|(s, c)| *s += amplitude * c);
-        }
-        sum
+        let kept = columns.iter().zip(&fit.amplitude).enumerate().filter(|(k, _)| keep(*k));
+        combined(kept.map(|(_, term)| term), grid.len())
     };
     let whole = sum(&|_| true);
     let left: Vec<f64> = grid.y_m.iter().zip(&whole).map(|(y, m)| y - m).collect();
@@ -217,21 +215,9 @@ fn curves(bench: &Bench<'_>, fit: &Fit) -> Curves {
     let base = bench.base.len();
     let effects = sum(&|k| k == 0 || k >= base);
     let light = sum(&|k| k == 0);
-    let period = ((1.0 / bench.with.swings[0].hz) / grid.step_s).round().max(1.0) as usize;
     Curves {
         effects_m: (0..grid.len()).map(|c| effects[c] + level(c)).collect(),
         push_m: (0..grid.len()).map(|c| light[c] + last).collect(),
-        without_swings_m: smoothed(&grid.y_m, period),
+        without_swings_m: bench.with.smoothed(&grid.y_m),
     }
-}
-
-/// Means over a period.
-pub fn smoothed(values: &[f64], period: usize) -> Vec<f64> {
-    let half = period / 2;
-    (0..values.len())
-        .map(|k| {
-            let part = &values[k.saturating_sub(half)..(k + half + 1).min(values.len())];
-            part.iter().sum::<f64>() / part.len() as f64
-        })
-        .collect()
 }

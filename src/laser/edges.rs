@@ -1,11 +1,10 @@
 //! The lamp's edges: found in a record, or led to where the record has them.
 
-use super::filter::Swing;
-use super::filter::{Filter, Noise};
+use super::filter::{Filter, Noise, Swing};
 use super::grid::Grid;
 use super::lamp::Lamp;
 use super::learn::Acting;
-use super::solve::solve;
+use super::solve::{combined, solve};
 
 /// What a jump of the level with its swing must take from the sum of squares to be seen: three numbers anywhere among ten thousand cells, at 0.1 %.
 const SEEN: f64 = 40.0;
@@ -142,12 +141,7 @@ fn shifts(with: &Shifting<'_>, lamp: &Lamp, stated_s: &[f64], known_s: f64) -> O
     let columns: Vec<&[f64]> = white.iter().map(Vec::as_slice).collect();
     let base = solve(&columns, &y, &[])?;
     let of = |lamp: &Lamp| {
-        let moved = sharp(lamp, grid, &noise.swings);
-        let mut sum = vec![0.0; grid.len()];
-        for (column, amplitude) in moved.iter().zip(&base.amplitude) {
-            sum.iter_mut().zip(column).for_each(|(s, c)| *s += amplitude * c);
-        }
-        sum
+        combined(sharp(lamp, grid, &noise.swings).iter().zip(&base.amplitude), grid.len())
     };
     let step_s = 0.25 * grid.step_s;
     let here = of(lamp);
@@ -177,7 +171,7 @@ fn shifts(with: &Shifting<'_>, lamp: &Lamp, stated_s: &[f64], known_s: f64) -> O
 
 /// Light that switches at once and the swings that it then excites: 1 − cos ωt after each edge. Their phase tells an edge to a hundredth of a second.
 fn sharp(lamp: &Lamp, grid: &Grid, swings: &[Swing]) -> Vec<Vec<f64>> {
-    let to_and_fro: Vec<f64> = (0..lamp.edges_s.len()).map(|k| if k % 2 == 0 { 1.0 } else { -1.0 }).collect();
+    let to_and_fro = lamp.to_and_fro();
     let rings = swings.iter().map(|swing| {
         let [cos, _] = lamp.rings_of(grid, swing, &to_and_fro);
         cos

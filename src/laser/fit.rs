@@ -1,5 +1,7 @@
 //! A candidate – some forms beside the push – fitted: amplitudes by least squares of the whitened, shapes by Gauss and Newton, and its evidence.
 
+use std::borrow::Cow;
+
 use nalgebra::DMatrix;
 
 use super::filter::{Filter, Noise};
@@ -103,17 +105,24 @@ impl<'a> Bench<'a> {
     pub fn of(with: Setting<'a>, noise: &'a Noise) -> Self {
         let base = lamp_columns(with.lamp, with.grid, &noise.swings);
         let still = stage(&base, with, noise, 0.0);
-        let period = ((1.0 / with.swings[0].hz) / with.grid.step_s).round().max(1.0) as usize;
-        let calm = super::analysis::smoothed(&with.grid.y_m, period);
+        let calm = with.smoothed(&with.grid.y_m);
         let mean = calm.iter().sum::<f64>() / calm.len() as f64;
         let reach_m =
             (calm.iter().map(|v| (v - mean).powi(2)).sum::<f64>() / calm.len() as f64).sqrt().max(noise.white_m);
         Self { with, noise, base, still, reach_m }
     }
 
-    /// With another walk.
-    pub fn stage(&self, walk_m2_s: f64) -> Stage {
-        stage(&self.base, self.with, self.noise, walk_m2_s)
+    /// With another walk; what was made already where there is none.
+    pub fn stage(&self, walk_m2_s: f64) -> Cow<'_, Stage> {
+        if walk_m2_s == 0.0 {
+            return Cow::Borrowed(&self.still);
+        }
+        Cow::Owned(stage(&self.base, self.with, self.noise, walk_m2_s))
+    }
+
+    /// The columns of some members, whitened.
+    pub fn whitened(&self, stage: &Stage, members: &[Member]) -> Vec<Vec<f64>> {
+        columns_of(members, &self.with).iter().map(|column| stage.filter.whiten(column)).collect()
     }
 
     /// A candidate from a start of its shapes; a walk among its members is led to its likeliest size.
@@ -158,6 +167,11 @@ impl<'a> Bench<'a> {
         }
         state.finished(self, stage)
     }
+}
+
+/// The columns of some members.
+pub fn columns_of(members: &[Member], with: &Setting<'_>) -> Vec<Vec<f64>> {
+    members.iter().flat_map(|member| member.form.columns(&member.shape, with)).collect()
 }
 
 fn stage(base: &[Vec<f64>], with: Setting<'_>, noise: &Noise, walk_m2_s: f64) -> Stage {
@@ -303,7 +317,7 @@ fn heat_m2(fit: &Fit, bench: &Bench<'_>) -> f64 {
             let inertia = HIGHER_MODES * (1.0 - bench.with.swings[0].carried(tau_s)).abs();
             sum += fit.amplitude[place].powi(2) * ((EDGE_S / tau_s).powi(2) + inertia.powi(2));
         }
-        place += member.form.columns(&member.shape, &bench.with).len();
+        place += member.form.count(&bench.with);
     }
     sum
 }
@@ -320,7 +334,7 @@ fn ln_prior(fit: &Fit, reach_m: &[f64], bench: &Bench<'_>) -> f64 {
     let mut place = bench.base.len();
     let mut sum = 0.0;
     for (member, reach_m) in fit.members.iter().zip(reach_m) {
-        let count = member.form.columns(&member.shape, &bench.with).len();
+        let count = member.form.count(&bench.with);
         if count > 0 {
             let size = fit.amplitude[place];
             for (k, amplitude) in fit.amplitude[place..place + count].iter().enumerate() {

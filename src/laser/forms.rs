@@ -129,6 +129,20 @@ pub struct Setting<'a> {
     pub lasts_s: f64,
 }
 
+impl Setting<'_> {
+    /// Means over the period of the slowest swing.
+    pub fn smoothed(&self, values: &[f64]) -> Vec<f64> {
+        let period = ((1.0 / self.swings[0].hz) / self.grid.step_s).round().max(1.0) as usize;
+        let half = period / 2;
+        (0..values.len())
+            .map(|k| {
+                let part = &values[k.saturating_sub(half)..(k + half + 1).min(values.len())];
+                part.iter().sum::<f64>() / part.len() as f64
+            })
+            .collect()
+    }
+}
+
 impl Form {
     /// All.
     pub const ALL: [Self; 11] = [
@@ -249,6 +263,17 @@ impl Form {
         }
     }
 
+    /// Number of its columns.
+    pub fn count(self, with: &Setting<'_>) -> usize {
+        match self {
+            Self::Walk => 0,
+            Self::Curve => 2,
+            Self::Step => 3,
+            Self::Lag | Self::Pulse | Self::Train => 1 + 2 * RINGING.min(with.swings.len()),
+            Self::Warmth | Self::Line | Self::Warming | Self::Slow | Self::Creep => 1,
+        }
+    }
+
     /// Its columns, the first of which bears its size.
     pub fn columns(self, shape: &[f64], with: &Setting<'_>) -> Vec<Vec<f64>> {
         let Setting { grid, lamp, swings, lasts_s } = *with;
@@ -297,6 +322,27 @@ impl Form {
             Self::Creep => {
                 let (from, tau) = ((shape[0] - grid.start_s) / lasts_s, shape[1].exp() / lasts_s);
                 vec![over_time(&|x| -f64::exp_m1(-(x - from).max(0.0) / tau))]
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_form_has_as_many_columns_as_it_says() {
+        let grid =
+            Grid { start_s: 0.0, step_s: 0.25, y_m: vec![0.0; 400], count: vec![1.0; 400], origin_m: 0.0 };
+        let lamp = Lamp { edges_s: vec![10.0, 30.0, 50.0, 70.0] };
+        let swing = |hz| Swing { hz, damping: 0.01, drive_m2_s: 0.0 };
+        for swings in [&[swing(1.35)][..], &[swing(1.35), swing(3.1), swing(4.8)]] {
+            let with = Setting { grid: &grid, lamp: &lamp, swings, lasts_s: grid.duration_s() };
+            for form in Form::ALL {
+                let shape: Vec<f64> =
+                    form.shapes(&with).iter().map(|shape| shape.bounds[0] + 0.5 * shape.width()).collect();
+                assert_eq!(form.columns(&shape, &with).len(), form.count(&with), "{}", form.id());
             }
         }
     }

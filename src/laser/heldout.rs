@@ -2,9 +2,8 @@
 
 use serde::Serialize;
 
-use super::analysis::smoothed;
 use super::filter::Noise;
-use super::fit::{Bench, Fit};
+use super::fit::{Bench, Fit, Member, columns_of};
 use super::forms::Setting;
 use super::grid::Grid;
 
@@ -32,17 +31,16 @@ pub fn heldout(bench: &Bench<'_>, fit: &Fit) -> Option<Heldout> {
     let first = Grid { y_m: grid.y_m[..border].to_vec(), count: grid.count[..border].to_vec(), ..grid.clone() };
     let noise: &Noise = bench.noise;
     let early = Bench::of(Setting { grid: &first, lamp, swings, lasts_s }, noise);
-    let rmse = |members: Vec<super::fit::Member>| -> Option<f64> {
+    let rmse = |members: Vec<Member>| -> Option<f64> {
         let own = early.fit(members)?;
         let mut columns = bench.base.clone();
-        columns.extend(own.members.iter().flat_map(|m| m.form.columns(&m.shape, &bench.with)));
+        columns.extend(columns_of(&own.members, &bench.with));
         let mut left = grid.y_m.clone();
         for (column, amplitude) in columns.iter().zip(&own.amplitude) {
             left.iter_mut().zip(column).for_each(|(l, c)| *l -= amplitude * c);
         }
         let level = early.stage(own.walk_m2_s).filter.level(&left[..border]).last().copied()?;
-        let period = ((1.0 / swings[0].hz) / grid.step_s).round().max(1.0) as usize;
-        let calm = smoothed(&left, period);
+        let calm = bench.with.smoothed(&left);
         let squares: f64 = calm[border..].iter().map(|v| (v - level).powi(2)).sum();
         Some((squares / (grid.len() - border).max(1) as f64).sqrt())
     };

@@ -130,8 +130,7 @@ impl Lamp {
     /// What an oscillator makes of a first-order answer, its swings included: u − κ exp(−t/τ) − (1−κ) cos ωt − κ/(ωτ) sin ωt after each edge.
     pub fn swung_low_pass(&self, grid: &Grid, tau_s: f64, swing: &Swing) -> Vec<f64> {
         let carried = swing.carried(tau_s);
-        let to_and_fro: Vec<f64> = (0..self.edges_s.len()).map(|k| if k % 2 == 0 { 1.0 } else { -1.0 }).collect();
-        let [cos, sin] = self.rings_of(grid, swing, &to_and_fro);
+        let [cos, sin] = self.rings_of(grid, swing, &self.to_and_fro());
         let quarter = carried / (swing.pole()[1] * tau_s);
         let slow = self.low_pass(grid, tau_s).into_iter().zip(self.light(grid));
         slow.zip(cos.into_iter().zip(sin))
@@ -174,6 +173,11 @@ impl Lamp {
     pub fn each(&self, grid: &Grid) -> Vec<Vec<f64>> {
         let alone = |pair: &[f64]| Lamp { edges_s: pair.to_vec() }.light(grid);
         self.edges_s.chunks(2).map(alone).collect()
+    }
+
+    /// The jumps of the light at each edge: 1 and −1 in turn.
+    pub fn to_and_fro(&self) -> Vec<f64> {
+        (0..self.edges_s.len()).map(|k| if k % 2 == 0 { 1.0 } else { -1.0 }).collect()
     }
 
     /// The swings that a force excites which jumps by `jump` at each edge: cosine, sine.

@@ -40,7 +40,7 @@ pub mod grid;
 pub mod heldout;
 pub mod lamp;
 pub mod learn;
-mod numbers;
+pub mod numbers;
 pub mod plot;
 pub mod record;
 pub mod reflectivity;

@@ -1,10 +1,24 @@
 //! The numbers of an effect: sizes and shapes with their standard deviations.
 
+use serde::Serialize;
+
 use super::analysis::Analysis;
 use super::fit::Fit;
 use super::forms::{Effect, Form, Setting};
-use super::learn::lamp_columns;
-use super::report::Quantity;
+
+/// A value with its standard deviation.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Quantity {
+    /// Its name where it stands in a list.
+    #[serde(skip)]
+    pub key: String,
+    /// The value.
+    pub value: f64,
+    /// Its standard deviation.
+    pub sd: f64,
+    /// Its unit.
+    pub unit: &'static str,
+}
 
 impl Form {
     /// Names of its amplitudes.
@@ -27,12 +41,12 @@ impl Analysis {
         let swings = &self.noise.swings[..];
         let with = Setting { grid: &self.grid, lamp: &self.lamp, swings, lasts_s: self.grid.duration_s() };
         let sd = |place: usize| fit.covariance[(place, place)].max(0.0).sqrt();
-        let mut amplitude = lamp_columns(&self.lamp, &self.grid, &self.noise.swings).len();
+        let of_members: usize = fit.members.iter().map(|member| member.form.count(&with)).sum();
+        let mut amplitude = fit.amplitude.len() - of_members;
         let mut coordinate = fit.amplitude.len();
         let mut all = Vec::new();
         for member in &fit.members {
             let (sizes, shapes) = (member.form.sizes(), member.form.shapes(&with));
-            let columns = member.form.columns(&member.shape, &with).len();
             if member.form.effect() == effect {
                 all.extend(sizes.iter().enumerate().map(|(k, key)| Quantity {
                     key: format!("{key}_m"),
@@ -52,7 +66,7 @@ impl Analysis {
                     all.push(Quantity { key: "in_a_second_m".to_owned(), value, sd: 0.3 * value, unit: "m/√s" });
                 }
             }
-            amplitude += columns;
+            amplitude += member.form.count(&with);
             coordinate += shapes.len();
         }
         all

@@ -1,6 +1,5 @@
 //! The reader of a displacement record: a table of times and displacements, with a header or without.
 
-use std::io::Read as _;
 use std::path::{Path, PathBuf};
 
 use crate::error::{Error, Result};
@@ -34,13 +33,7 @@ impl LaserRecord {
     /// [`Error::Unreadable`], [`Error::EmptyFile`], or [`Error::Table`]: no such column, no unit, times that do not rise, too few rows,
     /// mostly out of the sensor's range.
     pub fn read(path: &Path, laser: &Laser) -> Result<Self> {
-        let (name, mut bytes) = (path.to_owned(), Vec::new());
-        if path.as_os_str() == "-" {
-            let name = PathBuf::from("standard input");
-            std::io::stdin().lock().read_to_end(&mut bytes).map_err(|e| Error::unreadable(&name, e))?;
-            return Self::parse(&bytes, &name, laser);
-        }
-        bytes = std::fs::read(path).map_err(|e| Error::unreadable(path, e))?;
+        let (name, bytes) = crate::input::read(path)?;
         Self::parse(&bytes, &name, laser)
     }
 

@@ -7,26 +7,11 @@ use super::adequacy::Adequacy;
 use super::analysis::Analysis;
 use super::forms::Effect;
 use super::heldout::Heldout;
+use super::numbers::Quantity;
 use super::reflectivity::{Figure, figure};
 use super::verdict::{Remainder, Status};
 use crate::experiment::Experiment;
-
-/// 95 % of a normal law.
-const NINETY_FIVE: f64 = 1.959_964;
-
-/// A value with its standard deviation.
-#[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct Quantity {
-    /// Its name where it stands in a list.
-    #[serde(skip)]
-    pub key: String,
-    /// The value.
-    pub value: f64,
-    /// Its standard deviation.
-    pub sd: f64,
-    /// Its unit.
-    pub unit: &'static str,
-}
+use crate::identify::estimate::NORMAL_QUANTILE;
 
 /// The push.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -46,7 +31,7 @@ pub struct Push {
 pub struct Found {
     /// The effect.
     #[serde(skip)]
-    pub effect: Option<Effect>,
+    pub effect: Effect,
     /// Over all candidates.
     pub probability: f64,
     /// The form of the likeliest candidate that holds it.
@@ -68,7 +53,7 @@ fn by_key<S: Serializer>(list: &[Quantity], serializer: S) -> Result<S::Ok, S::E
 fn effects_by_id<S: Serializer>(list: &[Found], serializer: S) -> Result<S::Ok, S::Error> {
     let mut map = serializer.serialize_map(Some(list.len()))?;
     for found in list {
-        map.serialize_entry(found.effect.map_or("", Effect::id), found)?;
+        map.serialize_entry(found.effect.id(), found)?;
     }
     map.end()
 }
@@ -203,8 +188,8 @@ impl Report {
             push_m: Push {
                 value,
                 sd,
-                interval: [value - NINETY_FIVE * sd, value + NINETY_FIVE * sd],
-                detectable: 2.0 * NINETY_FIVE * sd,
+                interval: [value - NORMAL_QUANTILE * sd, value + NORMAL_QUANTILE * sd],
+                detectable: 2.0 * NORMAL_QUANTILE * sd,
             },
             effects: analysis.found(),
             verdict: VerdictReport {
@@ -302,7 +287,7 @@ impl Analysis {
             let parameters = holder.map_or_else(Vec::new, |c| self.parameters(&c.fit, effect));
             let form =
                 holder.and_then(|c| c.fit.members.iter().find(|m| m.form.effect() == effect)).map(|m| m.form.id());
-            Found { effect: Some(effect), probability, form, parameters }
+            Found { effect, probability, form, parameters }
         };
         Effect::ALL.into_iter().map(of).collect()
     }

@@ -4,7 +4,7 @@ use rayon::prelude::*;
 
 use super::fit::{Bench, Fit, Member, Stage};
 use super::forms::{Effect, FROM_ENDS_S, Form};
-use super::solve::Span;
+use super::solve::{Span, solve};
 
 /// Prior odds of each effect of the table.
 const PRIOR_ODDS: f64 = 0.1;
@@ -70,14 +70,8 @@ fn weighed(fits: Vec<Fit>) -> Vec<Candidate> {
 
 /// A fit with one more form, from the starts that explain most of what is left.
 fn with_one_more(bench: &Bench<'_>, fit: &Fit, form: Form) -> Option<Fit> {
-    let walks = fit.walk_m2_s > 0.0 || form == Form::Walk;
-    let own;
-    let stage = if walks {
-        own = bench.stage(if fit.walk_m2_s > 0.0 { fit.walk_m2_s } else { bench.noise.walk_m2_s });
-        &own
-    } else {
-        &bench.still
-    };
+    let begins_to_walk = form == Form::Walk && fit.walk_m2_s == 0.0;
+    let stage = &bench.stage(if begins_to_walk { bench.noise.walk_m2_s } else { fit.walk_m2_s });
     let tried = starts(bench, fit, form, stage).into_iter().filter_map(|shape| {
         let mut members = fit.members.clone();
         members.push(Member { form, shape });
@@ -94,12 +88,7 @@ fn starts(bench: &Bench<'_>, fit: &Fit, form: Form, stage: &Stage) -> Vec<Vec<f6
         return jumps_of(bench, fit, stage).into_iter().map(|at_s| vec![at_s]).collect();
     }
     let all = form.starts(&bench.with);
-    let members: Vec<Vec<f64>> = fit
-        .members
-        .iter()
-        .flat_map(|m| m.form.columns(&m.shape, &bench.with))
-        .map(|column| stage.filter.whiten(&column))
-        .collect();
+    let members = bench.whitened(stage, &fit.members);
     let columns: Vec<&[f64]> = stage.base.iter().chain(&members).map(Vec::as_slice).collect();
     let span = Span::of(&columns, stage.y.len());
     let left = left_on(&columns, stage, fit);
@@ -125,18 +114,13 @@ fn starts(bench: &Bench<'_>, fit: &Fit, form: Form, stage: &Stage) -> Vec<Vec<f6
 }
 
 fn left_on(columns: &[&[f64]], stage: &Stage, fit: &Fit) -> Vec<f64> {
-    super::solve::solve(columns, &stage.y, &[]).map_or_else(|| fit.left.clone(), |solution| solution.left)
+    solve(columns, &stage.y, &[]).map_or_else(|| fit.left.clone(), |solution| solution.left)
 }
 
 /// The likeliest jumps of what a fit leaves, away from the lamp's edges.
 fn jumps_of(bench: &Bench<'_>, fit: &Fit, stage: &Stage) -> Vec<f64> {
     let grid = bench.with.grid;
-    let members: Vec<Vec<f64>> = fit
-        .members
-        .iter()
-        .flat_map(|m| m.form.columns(&m.shape, &bench.with))
-        .map(|column| stage.filter.whiten(&column))
-        .collect();
+    let members = bench.whitened(stage, &fit.members);
     let columns: Vec<&[f64]> = stage.base.iter().chain(&members).map(Vec::as_slice).collect();
     let left = left_on(&columns, stage, fit);
     let scan = stage.filter.jumps(&left, 3);

@@ -55,6 +55,15 @@ pub fn solve(columns: &[&[f64]], y: &[f64], known: &[f64]) -> Option<Solution> {
     Some(Solution { amplitude, covariance, chi2: left.norm_squared(), ln_fisher, left: left.as_slice().to_vec() })
 }
 
+/// The sum of columns times their amplitudes.
+pub fn combined<'c>(terms: impl Iterator<Item = (&'c Vec<f64>, &'c f64)>, rows: usize) -> Vec<f64> {
+    let mut sum = vec![0.0; rows];
+    for (column, amplitude) in terms {
+        sum.iter_mut().zip(column).for_each(|(s, c)| *s += amplitude * c);
+    }
+    sum
+}
+
 fn scaled_cholesky(fisher: &DMatrix<f64>, scale: &[f64]) -> Option<Cholesky<f64, Dyn>> {
     let count = scale.len();
     let mut scaled = DMatrix::from_fn(count, count, |i, j| fisher[(i, j)] / (scale[i] * scale[j]));

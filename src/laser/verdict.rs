@@ -7,6 +7,7 @@ use super::fit::{Bench, Fit, Member};
 use super::forms::{Effect, Form};
 use super::search::{Candidate, inclusion, mixed_push};
 use super::solve::solve;
+use crate::identify::estimate::student_quantile;
 
 /// A set of effects is certain from this probability on.
 const CERTAIN: f64 = 0.9;
@@ -169,23 +170,17 @@ fn scatter_m(cycles_m: &[[f64; 2]]) -> f64 {
     }
     let mean = cycles_m.iter().map(|c| c[0]).sum::<f64>() / count;
     let variance = cycles_m.iter().map(|c| (c[0] - mean).powi(2)).sum::<f64>() / (count - 1.0);
-    let student = statrs::distribution::StudentsT::new(0.0, 1.0, count - 1.0)
-        .map_or(2.0, |law| statrs::distribution::ContinuousCDF::inverse_cdf(&law, 0.975));
-    (variance / count).sqrt() * student / 1.96
+    (variance / count).sqrt() * student_quantile(count - 1.0) / 1.96
 }
 
 /// The smallest size of each effect that would be named beside what a fit holds, and what it would be confused with.
 pub fn detectable(bench: &Bench<'_>, fit: &Fit) -> Vec<(Effect, f64, Vec<Effect>)> {
     let typical = [Form::Warmth, Form::Lag, Form::Pulse, Form::Line, Form::Slow];
-    let stage = bench.stage(fit.walk_m2_s);
-    let held = |members: &[Member]| -> Vec<Vec<f64>> {
-        let columns = members.iter().flat_map(|m| m.form.columns(&m.shape, &bench.with));
-        columns.map(|column| stage.filter.whiten(&column)).collect()
-    };
+    let stage = &bench.stage(fit.walk_m2_s);
     let column_of = |form: Form| {
         let starts = form.starts(&bench.with);
         let shape = starts[starts.len() / 2].clone();
-        held(&[Member { form, shape }]).swap_remove(0)
+        bench.whitened(stage, &[Member { form, shape }]).swap_remove(0)
     };
     let others: Vec<Vec<f64>> = typical.iter().map(|form| column_of(*form)).collect();
     let beyond: Vec<Option<(Vec<f64>, f64)>> = typical
@@ -194,7 +189,7 @@ pub fn detectable(bench: &Bench<'_>, fit: &Fit) -> Vec<(Effect, f64, Vec<Effect>
         .map(|(form, column)| {
             let members: Vec<Member> =
                 fit.members.iter().filter(|m| m.form.effect() != form.effect()).cloned().collect();
-            let beside = held(&members);
+            let beside = bench.whitened(stage, &members);
             let columns: Vec<&[f64]> = stage.base.iter().chain(&beside).map(Vec::as_slice).collect();
             let solution = solve(&columns, column, &[])?;
             Some((solution.left, solution.chi2))

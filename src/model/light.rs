@@ -38,10 +38,12 @@ impl Spotlight {
 pub fn radiation_force_n(flux_w_m2: f64, area_m2: f64, incidence_rad: f64, surface: &Reflectivity) -> [f64; 2] {
     let cos = incidence_rad.cos().max(0.0);
     let caught_n = flux_w_m2 * area_m2 * cos / SPEED_OF_LIGHT_M_S;
-    [
-        caught_n * 2.0 * (surface.diffuse / 3.0 + surface.specular * cos),
-        caught_n * (1.0 - surface.specular - surface.transmitted),
-    ]
+    momentum(surface, cos).map(|share| caught_n * share)
+}
+
+/// Momentum that a face takes of the light it catches, as [along its normal, along the light]: the braces of Eq. 41.
+fn momentum(face: &Reflectivity, cos: f64) -> [f64; 2] {
+    [2.0 * (face.diffuse / 3.0 + face.specular * cos), 1.0 - face.specular - face.transmitted]
 }
 
 /// What of a strip is lit.
@@ -120,9 +122,8 @@ impl Beam {
         let (sign, face) = if cos < 0.0 { (-1.0, &self.back) } else { (1.0, &self.front) };
         let per_cos = self.flux_w_m2 * self.width_m * self.lit(s_m) / SPEED_OF_LIGHT_M_S;
         let (cos, cos_slope) = (sign * cos, -sign * (theta_rad - self.direction_rad).sin());
-        let across = 2.0 * (face.diffuse / 3.0 + face.specular * cos);
+        let [across, along] = momentum(face, cos);
         let across_slope = 2.0 * face.specular * cos_slope;
-        let along = 1.0 - face.specular - face.transmitted;
         let (sin_theta, cos_theta) = theta_rad.sin_cos();
         let normal = [sign * cos_theta, -sign * sin_theta];
         let normal_slope = [-sign * sin_theta, -sign * cos_theta];

@@ -17,6 +17,7 @@
 //! | [`trajectory`] | the motion at every instant, with its sensitivities |
 //! | [`work`] | what integrations have cost |
 //! | [`observe`] | the angles between marks |
+//! | `rest` | the chain at rest |
 //! | [`camera`] | what a camera makes of them |
 //! | [`modes`] | small vibrations: frequencies, damping ratios, shapes |
 //! | [`strip`] | the strip as a beam in gravity, by finite elements |
@@ -37,6 +38,7 @@ pub mod motion;
 pub mod observe;
 pub mod parameter;
 mod partials;
+mod rest;
 pub mod heat;
 pub mod light;
 pub mod shapes;

@@ -1,9 +1,9 @@
 //! The time-stamp audit: gaps, duplicates, jitter, and whether the stated rate is the real one.
 
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 /// A step much longer than usual.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Gap {
     /// The frame before the gap.
     pub after_frame: usize,
@@ -16,7 +16,8 @@ pub struct Gap {
 }
 
 /// What the time stamps look like.
-#[derive(Debug, Clone, Default, PartialEq, Serialize)]
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
+#[serde(default)]
 pub struct Timing {
     /// Frames.
     pub frames: usize,

@@ -2,12 +2,9 @@
 
 use nalgebra::{DMatrix, DVector};
 
-use crate::error::{Error, Result};
+use crate::error::Result;
 use crate::experiment::{Effects, Experiment};
-use crate::model::{ForwardModel, Partials};
-
-/// Largest correction (rad) that still counts as rest.
-const AT_REST_RAD: f64 = 1e-14;
+use crate::model::ForwardModel;
 
 /// The chain's equations of motion linearised at its rest position: M δ̈ + C δ̇ + K δ = 0 (paper Eq. 26), δ = θ − θ₀.
 #[derive(Debug, Clone, PartialEq)]
@@ -31,13 +28,10 @@ impl Linearised {
     /// # Errors
     /// [`Error::Simulation`] when the specimen cannot swing or has no rest position near the vertical.
     pub fn of(experiment: &Experiment) -> Result<Self> {
-        let mut free = experiment.clone();
-        free.model.effects.hinge_coulomb = None;
-        free.model.effects.support_motion = None;
-        let model = ForwardModel::of(&free)?;
-        let rest_rad = rest_rad(&model)?;
-        let partials = partials_at_rest(&model, rest_rad.as_slice());
+        let model = ForwardModel::still(experiment)?;
         let (n, hidden) = (model.chain().count(), model.rates() - model.chain().count());
+        let rest_rad = model.rest_rad(DVector::zeros(n), |_, _, _| {})?;
+        let partials = model.partials_at_rest(rest_rad.as_slice());
         // A law's own variable z has ż = R ω at rest, so z = R δ: what it does to the torques is a stiffness.
         let of_hidden = partials.rate.view((0, n), (n, hidden)) * partials.rate.view((n, 0), (hidden, n));
         Ok(Self {
@@ -55,36 +49,6 @@ impl Linearised {
             .filter_map(|(id, coefficient)| coefficient.map(|_| id))
             .collect()
     }
-}
-
-/// θ₀ by Newton's method from the vertical.
-fn rest_rad(model: &ForwardModel) -> Result<DVector<f64>> {
-    let none = || {
-        Error::Simulation {
-        detail: "the chain has no stable rest position near the vertical; lower rest_curl, side_force or a negative stiffness"
-            .into(),
-    }
-    };
-    let n = model.chain().count();
-    let mut theta = DVector::zeros(n);
-    let mut torque_n_m = vec![0.0; model.rates()];
-    for _ in 0..50 {
-        model.torque(&model.motion(0.0, theta.as_slice(), &vec![0.0; n]), &mut torque_n_m);
-        let stiffness = -partials_at_rest(model, theta.as_slice()).theta.rows(0, n);
-        let step = stiffness.cholesky().ok_or_else(none)?.solve(&DVector::from_column_slice(&torque_n_m[..n]));
-        theta += &step;
-        if step.amax() <= AT_REST_RAD {
-            return Ok(theta);
-        }
-    }
-    Err(none())
-}
-
-fn partials_at_rest(model: &ForwardModel, theta_rad: &[f64]) -> Partials {
-    let n = model.chain().count();
-    let mut partials = Partials::zero(n, model.rates());
-    model.partials(&model.motion(0.0, theta_rad, &vec![0.0; n]), &mut partials);
-    partials
 }
 
 #[cfg(test)]

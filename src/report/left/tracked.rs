@@ -2,6 +2,8 @@
 
 use serde::Deserialize;
 
+use crate::video::Timing;
+
 /// `angles.json`.
 #[derive(Debug, Default, Deserialize)]
 #[serde(default)]
@@ -10,7 +12,7 @@ pub struct Track {
     pub source: Source,
     pub options: TrackOptions,
     pub video: Video,
-    pub time_stamps: TimeStamps,
+    pub time_stamps: Timing,
     pub angles: Vec<TrackedAngle>,
     pub warnings: Vec<String>,
 }
@@ -40,24 +42,6 @@ pub struct Video {
     pub codec: String,
     pub width_px: u64,
     pub height_px: u64,
-}
-
-/// The audit of the time stamps.
-#[derive(Debug, Default, Deserialize)]
-#[serde(default)]
-pub struct TimeStamps {
-    pub frames: usize,
-    pub first_s: f64,
-    pub last_s: f64,
-    pub nominal_rate_hz: Option<f64>,
-    pub real_rate_hz: Option<f64>,
-    pub median_step_s: f64,
-    pub shortest_step_s: f64,
-    pub longest_step_s: f64,
-    pub jitter_sd_s: f64,
-    pub repeated_or_backward_frames: Vec<usize>,
-    pub gap_count: usize,
-    pub missing_frames: u64,
 }
 
 /// Noise of one angle.
