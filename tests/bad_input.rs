@@ -1,5 +1,7 @@
 //! Bad input: one clear line, exit 2, nothing written, nothing overwritten; never a panic.
 
+mod nobody;
+
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
@@ -8,6 +10,7 @@ use std::sync::LazyLock;
 use assert_cmd::cargo::CommandCargoExt;
 use freeswing::experiment::{Experiment, MarkColour, Rgb};
 use freeswing::synth::Recording;
+use nobody::{Nobody, set_mode};
 use rand::rngs::Xoshiro256PlusPlus;
 use rand::{RngExt, SeedableRng};
 use tempfile::TempDir;
@@ -144,14 +147,15 @@ fn a_missing_file_a_folder_a_pipe() {
 
 #[test]
 fn a_file_that_may_not_be_read() {
-    use std::os::unix::fs::PermissionsExt;
     let bench = Bench::with("secret.mp4", &CLIP);
-    std::fs::set_permissions(bench.path("secret.mp4"), std::fs::Permissions::from_mode(0o0)).unwrap();
-    if std::fs::File::open(bench.path("secret.mp4")).is_ok() {
-        eprintln!("skipped: this user may read everything");
-        return;
-    }
-    bench.refuses_with("secret.mp4", &[], "secret.mp4: cannot be read: Permission denied");
+    let track = Command::cargo_bin("track").unwrap().get_program().to_owned();
+    let Some(nobody) = Nobody::at(bench.folder.path(), Path::new(&track)) else { return };
+    set_mode(&bench.path("secret.mp4"), 0o000);
+    let before = bench.contents();
+    let line =
+        bench.one_line_of_refusal(&nobody.command().args(["secret.mp4", "--out", "angles.csv"]).output().unwrap());
+    assert!(line.contains("secret.mp4: cannot be read: Permission denied"), "{line}");
+    assert_eq!(bench.contents(), before, "the folder is not as it was");
 }
 
 #[test]

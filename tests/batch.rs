@@ -2,6 +2,7 @@
 
 #[allow(dead_code, reason = "only a whole film is wanted of it")]
 mod clips;
+mod nobody;
 
 use std::collections::BTreeMap;
 use std::fs;
@@ -11,6 +12,7 @@ use std::time::{Duration, SystemTime};
 
 use assert_cmd::cargo::CommandCargoExt;
 use clips::{Clip, Scene};
+use nobody::{Nobody, set_mode};
 use rand::rngs::StdRng;
 use rand::{RngExt, SeedableRng};
 use tempfile::TempDir;
@@ -178,6 +180,50 @@ fn every_recording_has_a_row_and_a_bad_one_says_why_as_its_command_alone_does() 
     for file in ["angles.csv", "angles.json", "identify.json", "log.txt"] {
         assert!(lab.path("out/films/good.mp4").join(file).is_file(), "{file}");
     }
+}
+
+#[test]
+fn what_may_not_be_read_has_a_row_that_says_so_and_is_done_once_it_may_be() {
+    let lab = Laboratory::new().with_tables(1);
+    let program = Command::cargo_bin("freeswing").unwrap().get_program().to_owned();
+    let film = "in/films/good.mp4";
+    lab.film(film);
+    for copy in ["in/films/closed.mp4", "in/films/config.mp4", "in/closed/film.mp4"] {
+        lab.write(copy, fs::read(lab.path(film)).unwrap());
+    }
+    lab.write("in/closed.csv", table(1.3));
+    lab.write("in/films/config.toml", SPECIMEN);
+    // the file, its row, and what else its command needs
+    let closed = [
+        ("closed", "closed", &[][..]),
+        ("closed.csv", "closed.csv", &[]),
+        ("films/closed.mp4", "films/closed.mp4", &[]),
+        ("films/config.toml", "films/config.mp4", &["--config", "in/films/config.toml"]),
+    ];
+    let Some(nobody) = Nobody::at(lab.folder.path(), Path::new(&program)) else { return };
+    let set_modes = |mode| closed.iter().for_each(|(file, _, _)| set_mode(&lab.path("in").join(file), mode));
+    let start = |words: &[&str]| nobody.command().args(words).output().unwrap();
+    let batch = ["batch", "in", "--out", "out", "--until", "track", "--no-overlay"];
+    set_modes(0o000);
+    let output = start(&batch);
+    assert_eq!(output.status.code(), Some(1), "{}", said(&output));
+    let rows = lab.rows("out");
+    let failed: Vec<&str> =
+        rows.values().filter(|row| row["status"] == "failed").map(|row| row["recording"].as_str()).collect();
+    assert_eq!(failed, closed.map(|(_, row, _)| row));
+    assert_eq!(rows["films/good.mp4"]["status"], "done");
+    for (file, row, more) in closed {
+        let alone = start(&[&["track", &format!("in/{row}"), "--out", "alone.csv"], more].concat());
+        let line = format!(
+            "error: in/{file}: cannot be read: Permission denied (os error 13); check the path and its permissions"
+        );
+        assert_eq!((alone.status.code(), said(&alone)), (Some(2), line.clone() + "\n"), "{row}");
+        assert_eq!(rows[row]["reason"], line);
+    }
+    set_modes(0o755);
+    let output = start(&batch);
+    assert_eq!(output.status.code(), Some(0), "{}", said(&output));
+    assert_eq!(lab.rows("out")["closed/film.mp4"]["status"], "done");
 }
 
 #[test]
