@@ -68,13 +68,7 @@ impl LitChain {
 }
 
 /// Adds the torques of light, and takes their derivatives from the stiffness.
-fn add_push(
-    chain: &Chain,
-    beam: &Beam,
-    theta: &DVector<f64>,
-    torque: &mut DVector<f64>,
-    stiffness: &mut DMatrix<f64>,
-) {
+fn add_push(chain: &Chain, beam: &Beam, theta: &DVector<f64>, torque: &mut DVector<f64>, stiffness: &mut DMatrix<f64>) {
     let mut above_m = 0.0;
     for j in 0..chain.count() {
         let length_m = chain.length_m(j);

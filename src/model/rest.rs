@@ -33,9 +33,11 @@ impl ForwardModel {
         from_rad: DVector<f64>,
         further: impl Fn(&DVector<f64>, &mut DVector<f64>, &mut DMatrix<f64>),
     ) -> Result<DVector<f64>> {
-        let none = || Error::Simulation {
+        let none = || {
+            Error::Simulation {
             detail: "the chain has no stable rest position near the vertical; lower rest_curl, side_force, the light or a negative stiffness"
                 .into(),
+        }
         };
         let n = self.chain().count();
         let mut theta = from_rad;
