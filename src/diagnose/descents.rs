@@ -7,7 +7,7 @@ use super::hypothesis::Hypothesis;
 use super::refit::Refit;
 use crate::experiment::Experiment;
 use crate::fit::descent::Descent;
-use crate::fit::shooting::{multiple_shooting, shooting_along};
+use crate::fit::shooting::{STATE_NEAR, multiple_shooting, shooting_along};
 use crate::fit::whitening::RecordNoise;
 use crate::fit::{Problem, straight};
 use crate::model::Parameter;
@@ -123,12 +123,39 @@ impl<'a> FitContext<'a> {
     /// A restart along another fit's motion, which follows the recordings, whatever hypothesis it is of: stretches begin where that motion is, with its
     /// parameters, and are drawn together.
     pub fn refit_along(&self, hypothesis: &Hypothesis, leader: &Refit<'_>, start: &Start) -> Option<Refit<'a>> {
-        let (mut problem, x) = self.start(hypothesis, leader, start)?;
-        let (noise, accuracy) = (problem.noise.clone(), problem.accuracy);
         let motions: Vec<Vec<Vec<f64>>> =
             (0..self.records.len()).map(|record| states_along(leader, record)).collect::<Option<_>>()?;
+        self.drawn_along(hypothesis, leader, start, |_, record, row| motions[record][row].clone())
+    }
+
+    /// A fit from given coefficients and the starts that the recordings show; where that motion falls out of step, along the recorded motion.
+    pub fn refit_along_recording(&self, hypothesis: &Hypothesis, near: &Refit<'_>, start: &Start) -> Option<Refit<'a>> {
+        let seen = |reach_s: f64, record: usize, row: usize| -> Vec<f64> {
+            let seen = self.records[record].state_near(row, reach_s);
+            [0, 1].iter().flat_map(|part| seen.iter().map(move |state| state[*part])).collect()
+        };
+        let (problem, mut x) = self.start(hypothesis, near, start)?;
+        x.truncate(problem.free.len());
+        let reach_s = STATE_NEAR / problem.model(0, &x).ok()?.0.pace_rad_s();
+        x.extend((0..self.records.len()).flat_map(|record| seen(reach_s, record, 0)));
+        let straight = self.descend(hypothesis, problem, x, self.settings.descent.few_steps);
+        let in_step = straight.filter(|fit| fit.left_share() < self.settings.misfit.out_of_step);
+        in_step.or_else(|| self.drawn_along(hypothesis, near, start, seen))
+    }
+
+    /// Stretches that begin in given states (by how far around a row to look, recording and row), drawn together into one motion.
+    fn drawn_along(
+        &self,
+        hypothesis: &Hypothesis,
+        near: &Refit<'_>,
+        start: &Start,
+        state: impl Fn(f64, usize, usize) -> Vec<f64>,
+    ) -> Option<Refit<'a>> {
+        let (mut problem, x) = self.start(hypothesis, near, start)?;
+        let (noise, accuracy) = (problem.noise.clone(), problem.accuracy);
         let parameters = &x[..problem.free.len()];
-        let x = shooting_along(&mut problem, parameters, |record, row| motions[record][row].clone()).ok()?.x;
+        let reach_s = STATE_NEAR / problem.model(0, parameters).ok()?.0.pace_rad_s();
+        let x = shooting_along(&mut problem, parameters, |record, row| state(reach_s, record, row)).ok()?.x;
         (problem.noise, problem.accuracy) = (noise, accuracy);
         self.descend_by(self.descent(self.settings.descent.most_steps), hypothesis, problem, x)
     }

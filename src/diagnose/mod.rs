@@ -4,7 +4,7 @@
 //! |---|---|---|
 //! | 1 | the recordings are prepared: outliers, noise, where the base model's descent starts | [`preparation`] |
 //! | 2 | the base model is fitted | [`taken`], [`base`], [`context`], [`refit`], [`descents`], [`noise`], [`learnt_noise`] |
-//! | 3 | what it lacks is sought: effects are proposed, fitted, kept | [`mod@search`], [`screen`], [`misfit`], [`laws`] |
+//! | 3 | what it lacks is sought: effects are proposed, fitted, kept | [`mod@search`], [`screen`], [`weak_form`], [`misfit`], [`laws`] |
 //! | 4 | a strip's rods are counted | [`rods`] |
 //! | 5 | the hypotheses are weighed, beside something that is not in the table | [`posterior`], [`evidence`], [`bag`], [`unknowns`], [`latent`], [`basis_law`] |
 //! | 6 | in doubt the search goes on, and they are weighed again | [`mod@search`], [`search::horizon`] |
@@ -53,6 +53,7 @@ pub mod taken;
 pub mod torque;
 pub mod unknowns;
 pub mod verdict;
+pub mod weak_form;
 pub mod words;
 
 use std::sync::OnceLock;

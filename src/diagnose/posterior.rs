@@ -26,7 +26,7 @@ pub struct Candidate<'a> {
     pub probability: f64,
     /// Posterior where nothing outside the table is at work.
     pub if_named: f64,
-    /// Posterior of these names, whatever remains beside them.
+    /// Posterior of these names, whatever remains beside them: what they stand for is not asked.
     pub in_layers: f64,
     /// The odds that these names are what has been filmed, and stand for nothing else.
     pub genuine: f64,
@@ -84,7 +84,7 @@ pub fn weigh<'a>(fits: Vec<Refit<'a>>, effects: usize, settings: &Settings) -> P
     let mut probability = normalised(&posterior);
     let mut unknown = probability.pop().unwrap_or(0.0);
     let remains = unknown;
-    let layers = Layers { fits: &fits, best, ln_posterior: &posterior, if_named: &if_named, genuine: &genuine };
+    let layers = Layers { fits: &fits, best, ln_posterior: &posterior, if_named: &if_named };
     let in_layers = layers.probabilities((scatter, remains), settings);
     // a name, above all a support that moves, may be a stand-in for what is not known
     for (genuine, probability) in genuine.iter().zip(&mut probability) {
@@ -110,7 +110,7 @@ pub fn weigh<'a>(fits: Vec<Refit<'a>>, effects: usize, settings: &Settings) -> P
 }
 
 /// The names in layers: P(S) = (1 − z) P(S | nothing remains) + z g P(S | something remains), z being the probability that something does, and g the odds
-/// that names which leave so much are at work and stand for nothing else.
+/// that names which leave so much are at work.
 struct Layers<'f, 'a> {
     fits: &'f [Refit<'a>],
     /// The likeliest.
@@ -119,13 +119,11 @@ struct Layers<'f, 'a> {
     ln_posterior: &'f [f64],
     /// P(S | nothing remains).
     if_named: &'f [f64],
-    /// The odds that a fit's effects stand for nothing else.
-    genuine: &'f [f64],
 }
 
 impl Layers<'_, '_> {
     fn probabilities(&self, (scatter, remains): (Scatter, f64), settings: &Settings) -> Vec<f64> {
-        let Self { fits, if_named, genuine, .. } = *self;
+        let Self { fits, if_named, .. } = *self;
         let bagged = match remains > NEGLIGIBLE {
             true => self.bagged(scatter, settings),
             false => if_named.to_vec(),
@@ -135,7 +133,7 @@ impl Layers<'_, '_> {
             let left = base.map_or(1.0, |base| left_of_excess(&fits[place], base));
             let named = !fits[place].hypothesis.effects.is_empty();
             let odds = if named { settings.prior.odds_where_left(left) } else { 1.0 };
-            genuine[place] * ((1.0 - remains) * if_named[place] + remains * odds * bagged[place])
+            (1.0 - remains) * if_named[place] + remains * odds * bagged[place]
         };
         (0..fits.len()).map(of).collect()
     }
@@ -184,6 +182,12 @@ fn genuine(fit: &Refit<'_>, others: &[&Refit<'_>], settings: &Settings) -> f64 {
     odds * (1.0 - settings.prior.imitated) * settings.prior.beyond_two.powi(beyond_two)
 }
 
+/// The same of one of them: what another one beside it stands for is not its concern.
+fn genuine_alone(effect: Effect, is_further: bool, fit: &Refit<'_>, others: &[&Refit<'_>], settings: &Settings) -> f64 {
+    let beyond_two = if is_further { settings.prior.beyond_two } else { 1.0 };
+    law_of(effect).odds(fit, others, settings) * (1.0 - settings.prior.imitated) * beyond_two
+}
+
 /// By how much the torque of a fit's laws may be wrong.
 fn law_error_n_m(fit: &Refit<'_>, added_n_m: f64) -> f64 {
     let part = |effect: &Effect| effect.entry().law_error;
@@ -218,21 +222,41 @@ impl<'a> Posterior<'a> {
         &self.candidates[0].fit
     }
 
+    /// The fit of some effects and no others.
+    pub fn of(&self, effects: &[Effect]) -> Option<&Refit<'a>> {
+        self.candidates.iter().find(|c| c.fit.hypothesis.effects == effects).map(|c| &c.fit)
+    }
+
     /// The base model's fit, which every search holds.
     pub fn base(&self) -> &Refit<'a> {
-        self.candidates.iter().find(|c| c.fit.hypothesis.effects.is_empty()).map_or(self.best(), |c| &c.fit)
+        self.of(&[]).unwrap_or(self.best())
     }
 
     /// How probable an effect is, over all sets of names that hold it, whatever remains beside them: as the fits of the table say, and where something remains as
     /// the laws say that may stand in its place.
-    pub fn inclusion(&self, effect: Effect) -> f64 {
-        let with = self.candidates.iter().filter(|c| c.fit.hypothesis.has(effect));
-        let of_table = with.map(|c| c.in_layers).fold(0.0, |sum, p| sum + p).min(1.0);
+    pub fn inclusion(&self, effect: Effect, settings: &Settings) -> f64 {
+        let others: Vec<&Refit<'_>> = self.candidates.iter().map(|c| &c.fit).collect();
+        let genuine = |fit: &Refit<'_>| {
+            let explaining = self.by_what_they_explain(fit);
+            let is_further = explaining.iter().skip(settings.search.main_effects).any(|further| *further == effect);
+            genuine_alone(effect, is_further, fit, &others, settings)
+        };
+        let with = self.candidates.iter().filter(|c| c.in_layers > NEGLIGIBLE && c.fit.hypothesis.has(effect));
+        let of_table = with.map(|c| c.in_layers * genuine(&c.fit)).fold(0.0, |sum, p| sum + p).min(1.0);
         let needed = self.needed.iter().find(|own| own.0 == effect);
         let beside = |(_, needed): &(Effect, f64)| {
-            (1.0 - self.remains) * of_table + self.remains * needed * self.candidates[0].genuine
+            (1.0 - self.remains) * of_table + self.remains * needed * genuine(self.best())
         };
         needed.map_or(of_table, beside)
+    }
+
+    /// The effects that are more probable than not, the most probable first: the median probability model (Barbieri and Berger, Annals of Statistics 32 (2004)
+    /// 870), which of all sets predicts best where none takes all.
+    pub fn likelier_than_not(&self, settings: &Settings) -> Vec<(Effect, f64)> {
+        let all = Effect::ALL.into_iter().map(|effect| (effect, self.inclusion(effect, settings)));
+        let mut likely: Vec<(Effect, f64)> = all.filter(|own| own.1 > settings.verdict.even).collect();
+        likely.sort_by(|a, b| b.1.total_cmp(&a.1));
+        likely
     }
 
     /// A fit's effects, the one that explains most first: without which it would be worst.
@@ -240,7 +264,7 @@ impl<'a> Posterior<'a> {
         let mut effects = fit.hypothesis.effects.clone();
         let left_without = |effect: &Effect| {
             let others = fit.hypothesis.without(*effect).effects;
-            self.candidates.iter().find(|c| c.fit.hypothesis.effects == others).map_or(f64::INFINITY, |c| c.fit.chi2)
+            self.of(&others).map_or(f64::INFINITY, |fit| fit.chi2)
         };
         effects.sort_by(|a, b| left_without(b).total_cmp(&left_without(a)));
         effects

@@ -2,7 +2,7 @@
 
 use super::context::first_part;
 use super::settings::{SearchSettings, Settings};
-use super::taken::{Taken, base_of};
+use super::taken::{Taken, stated};
 use crate::error::Result;
 use crate::experiment::Experiment;
 use crate::fit::noise::noise_rad;
@@ -54,7 +54,7 @@ pub fn prepare(records: &[Record], experiment: &Experiment, settings: &Settings)
         Seen::of(record).map_or(Ok(()), |seen| refuse_another_pace(record, &seen, experiment))?;
     }
     let marks = records.first().map_or(0, Record::links);
-    let (base, _) = base_of(experiment, marks, Taken::AtItsWord, &settings.search)?;
+    let base = stated(experiment, marks, Taken::AtItsWord);
     let noise_rad: Vec<Vec<f64>> = records.iter().map(noise_rad).collect();
     let part = affordable_part(records, experiment, &base, &noise_rad, &settings.search)?;
     let early = if part < 1.0 { first_part(records, part) } else { records.to_vec() };

@@ -117,8 +117,12 @@ pub struct SearchSettings {
     pub early_swings: f64,
     /// … unless that is next to the whole (cost).
     pub part_worth: f64,
-    /// A length or an inertia of a rig is known to this share (judgement: a rule and kitchen scales).
-    pub geometry_share: f64,
+    /// An inertia of a general link is known to this share (judgement: from a drawing)…
+    pub inertia_share: f64,
+    /// … and its centre of mass to this one (judgement: balanced on an edge, to a few millimetres in a tenth of a metre).
+    pub com_share: f64,
+    /// Sets of each number of laws that are fitted because the recorded motion asks for them (cost).
+    pub asked: usize,
     /// Fits from which pairs are built (cost).
     pub pair_seeds: usize,
     /// Of these, the ones beside which what is dear to score is looked for (cost).
@@ -248,8 +252,6 @@ pub struct VerdictSettings {
     /// Where the best of the table leaves far more than noise, its names stand if they leave at most this part of what the base model leaves of what was not
     /// fitted (judgement: half)…
     pub proven: f64,
-    /// … with these odds: they may be the largest part, or the nearest relatives of what is not in the table.
-    pub nearest: f64,
     /// There a further effect must leave at most this part of what the others do of what was not fitted (training bank: the double arm's third passes).
     pub borne_out: f64,
     /// Part of a recording that is fitted; the rest is predicted (judgement).
@@ -271,6 +273,9 @@ pub struct LawSettings {
     pub nothing_left: f64,
     /// A term whose effect on the angles has this cosine with that of another, or of a name, is the same under another name (judgement).
     pub the_same: f64,
+    /// A term of the grammar whose torque along the motion has this cosine with that of a law of the table is that law (judgement: they differ by a seventh; the linear
+    /// and the quadratic drag of a swing that does not decay have 0.98).
+    pub the_same_law: f64,
     /// The foremost terms, each of which is paired with every one that promises less (cost).
     pub paired: usize,
     /// Terms, and pairs, begun beside each set of names, and as many of all that was begun fitted to the end: at least (cost)…
@@ -326,7 +331,9 @@ impl Default for SearchSettings {
             evaluations: 3000.0,
             early_swings: 12.0,
             part_worth: 0.6,
-            geometry_share: 0.1,
+            inertia_share: 0.1,
+            com_share: 0.02,
+            asked: 3,
             pair_seeds: 6,
             dear_seeds: 3,
             far: 100.0,
@@ -416,7 +423,6 @@ impl Default for VerdictSettings {
             alone: 0.75,
             told_apart: 0.05,
             proven: 0.5,
-            nearest: 0.5,
             borne_out: 0.9,
             fitted: 2.0 / 3.0,
             places: 3.0,
@@ -432,6 +438,7 @@ impl Default for LawSettings {
         Self {
             nothing_left: 1e-3,
             the_same: 0.999,
+            the_same_law: 0.99,
             paired: 12,
             fewest: 2,
             most: 6,

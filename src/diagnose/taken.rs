@@ -6,12 +6,12 @@ use crate::experiment::Experiment;
 use crate::fit::{Belief, base_parameters};
 use crate::model::{ForwardModel, Parameter};
 
-/// How the file is taken.
+/// How a file that states no damper for a single link is taken.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Taken {
-    /// At its word: the geometry is what it states, and one link has a damper where it states one.
+    /// At its word: there is none, and what damps it is missing from the model.
     AtItsWord,
-    /// Loosely: inertias and centres of mass of general links were measured to about a tenth, and whatever swings has a damper.
+    /// Loosely: whatever swings has a damper.
     Loosely,
 }
 
@@ -22,7 +22,8 @@ impl Taken {
     }
 }
 
-/// The base model's parameters and what is known of them.
+/// The base model's parameters and what is known of them. Inertias and centres of mass of general links were measured, and so are free within what such measurements
+/// are worth: an inertia that is off by a hundredth would otherwise pass for a clock or a spring.
 ///
 /// # Errors
 /// [`crate::error::Error::Simulation`] for a specimen that cannot swing.
@@ -32,13 +33,7 @@ pub fn base_of(
     taken: Taken,
     settings: &SearchSettings,
 ) -> Result<(Vec<Parameter>, Vec<Belief>)> {
-    let mut base = base_parameters(experiment, marks);
-    if taken == Taken::AtItsWord {
-        if lacks_a_damper(experiment, marks) {
-            base.retain(|parameter| *parameter != Parameter::HingeViscous);
-        }
-        return Ok((base, Vec::new()));
-    }
+    let mut base = stated(experiment, marks, taken);
     let mut beliefs = Vec::new();
     if !experiment.specimen.links.is_empty() {
         let model = ForwardModel::of(experiment)?;
@@ -48,19 +43,25 @@ pub fn base_of(
         };
         for parameter in uncertain {
             let value = model.value(*parameter).unwrap_or(0.0);
+            let is_inertia = matches!(parameter, Parameter::FirstInertia | Parameter::SecondInertia);
+            let share = if is_inertia { settings.inertia_share } else { settings.com_share };
             base.push(*parameter);
-            beliefs.push(Belief { parameter: *parameter, value, sd: settings.geometry_share * value.abs().max(1e-12) });
+            beliefs.push(Belief { parameter: *parameter, value, sd: share * value.abs().max(1e-12) });
         }
     }
     Ok((base, beliefs))
 }
 
-/// Whether taking the file loosely frees anything: a geometry, or a damper that it does not state.
-pub fn has_slack(experiment: &Experiment, marks: usize) -> bool {
-    !experiment.specimen.links.is_empty() || lacks_a_damper(experiment, marks)
+/// The base model's parameters with the geometry as stated.
+pub fn stated(experiment: &Experiment, marks: usize, taken: Taken) -> Vec<Parameter> {
+    let mut base = base_parameters(experiment, marks);
+    if taken == Taken::AtItsWord && has_slack(experiment, marks) {
+        base.retain(|parameter| *parameter != Parameter::HingeViscous);
+    }
+    base
 }
 
 /// Whether the file of a single link, which has no joint, states no damper: neither the hinge's nor a C.
-fn lacks_a_damper(experiment: &Experiment, marks: usize) -> bool {
+pub fn has_slack(experiment: &Experiment, marks: usize) -> bool {
     marks == 1 && !experiment.model.states_damping && experiment.model.effects.hinge_viscous.is_none()
 }

@@ -2,7 +2,6 @@
 
 use super::effect::Effect;
 use super::heldout::HeldOut;
-use super::misfit::is_beyond_noise;
 use super::posterior::{Candidate, Posterior, left_of_excess};
 use super::settings::Settings;
 
@@ -73,35 +72,15 @@ impl Verdict {
             to_decide: None,
         };
         if unknown > adequate && unknown > named {
-            // one or two names that take all but next to nothing stand, whatever remains beside them; three imitate much
+            // names stand, whatever remains beside them, where each is likelier than not, however the others are chosen, and together they leave next to nothing or
+            // predict what was not fitted
             let best = posterior.best();
-            let left = left_of_excess(best, posterior.base());
-            let few = best.hypothesis.effects.len() <= settings.search.main_effects;
-            // none stand for which another law may stand in
-            let least = best.hypothesis.effects.iter().map(|effect| posterior.inclusion(*effect));
-            let least = least.fold(1.0, f64::min);
-            let asked = !posterior.needed.is_empty();
-            let is_sound = few && best.is_certified(&settings.certificate);
-            let may_stand = is_sound && (!asked || least >= settings.verdict.alone);
-            if may_stand && left < settings.prior.imitated_down_to {
-                let verdict = Self::naming(weighed, |w| w.in_layers, unknown, marks, settings);
-                if verdict.status == Status::Identified {
-                    return verdict;
-                }
-            }
-            // and so do those that no other law can stand in for, where they predict what was not fitted
+            let leaves_little = left_of_excess(best, posterior.base()) < settings.prior.imitated_down_to;
             let predicts = proof.is_some_and(|proof| proof.leaves() <= settings.verdict.proven);
-            if asked && may_stand && predicts {
-                let probability = |w: &Candidate<'_>| {
-                    let is_best = w.fit.hypothesis.effects == best.hypothesis.effects;
-                    if is_best { least } else { (1.0 - least) * w.if_named }
-                };
-                return Self::naming(weighed, probability, unknown, marks, settings);
-            }
-            let nearest = settings.verdict.nearest;
-            let replaced = asked && least < settings.verdict.even;
-            return if predicts && !replaced && is_beyond_noise(posterior.best(), &settings.noise) {
-                Self::naming(weighed, |w| nearest * w.if_named, 1.0 - nearest, marks, settings)
+            let likely = posterior.likelier_than_not(settings);
+            let stand = !likely.is_empty() && (leaves_little || predicts);
+            return if stand {
+                Self::standing(&likely, posterior, marks, settings)
             } else {
                 nothing(Status::Unknown, unknown)
             };
@@ -116,6 +95,28 @@ impl Verdict {
     pub fn leaves_it_open(&self) -> bool {
         let names_stand = matches!(self.status, Status::Adequate | Status::Identified);
         self.status == Status::Unknown || self.unknown >= self.class_probability && !names_stand
+    }
+
+    /// Names beside which something remains, and the class of what the recordings do not tell from them.
+    fn standing(likely: &[(Effect, f64)], posterior: &Posterior<'_>, marks: usize, settings: &Settings) -> Self {
+        let least = likely.iter().map(|own| own.1).fold(1.0, f64::min);
+        let is_clear = least >= settings.verdict.alone && posterior.best().is_certified(&settings.certificate);
+        let mut effects: Vec<Effect> = likely.iter().map(|own| own.0).collect();
+        effects.sort_unstable();
+        let mut class = effects.clone();
+        if !is_clear {
+            let possible = |effect: &Effect| posterior.inclusion(*effect, settings) > settings.verdict.told_apart;
+            class.extend(Effect::ALL.into_iter().filter(|effect| !effects.contains(effect)).filter(possible));
+        }
+        Self {
+            status: if is_clear { Status::Identified } else { Status::Ambiguous },
+            to_decide: to_decide(&effects, &class, marks),
+            effects,
+            class,
+            probability: least,
+            class_probability: least,
+            unknown: 1.0 - least,
+        }
     }
 
     /// The likeliest names and their class.

@@ -140,9 +140,7 @@ fn shifts(with: &Shifting<'_>, lamp: &Lamp, stated_s: &[f64], known_s: f64) -> O
     let y = filter.whiten(&grid.y_m);
     let columns: Vec<&[f64]> = white.iter().map(Vec::as_slice).collect();
     let base = solve(&columns, &y, &[])?;
-    let of = |lamp: &Lamp| {
-        combined(sharp(lamp, grid, &noise.swings).iter().zip(&base.amplitude), grid.len())
-    };
+    let of = |lamp: &Lamp| combined(sharp(lamp, grid, &noise.swings).iter().zip(&base.amplitude), grid.len());
     let step_s = 0.25 * grid.step_s;
     let here = of(lamp);
     let slopes: Vec<Vec<f64>> = (0..lamp.edges_s.len())

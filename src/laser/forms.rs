@@ -333,8 +333,7 @@ mod tests {
 
     #[test]
     fn every_form_has_as_many_columns_as_it_says() {
-        let grid =
-            Grid { start_s: 0.0, step_s: 0.25, y_m: vec![0.0; 400], count: vec![1.0; 400], origin_m: 0.0 };
+        let grid = Grid { start_s: 0.0, step_s: 0.25, y_m: vec![0.0; 400], count: vec![1.0; 400], origin_m: 0.0 };
         let lamp = Lamp { edges_s: vec![10.0, 30.0, 50.0, 70.0] };
         let swing = |hz| Swing { hz, damping: 0.01, drive_m2_s: 0.0 };
         for swings in [&[swing(1.35)][..], &[swing(1.35), swing(3.1), swing(4.8)]] {

@@ -1,5 +1,6 @@
 //! What is fitted: names with and without laws of the grammar, in full simulation, and the length of each description.
 
+use nalgebra::DVector;
 use rayon::prelude::*;
 
 use super::super::context::FitContext;
@@ -10,6 +11,9 @@ use super::super::hypothesis::Hypothesis;
 use super::super::refit::Refit;
 use super::sought::{Candidate, candidates};
 use crate::experiment::Law;
+use crate::model::effects::Effect as _;
+use crate::model::effects::formula::Formula;
+use crate::model::{ForwardModel, Motion, Partials};
 
 /// Terms that were fitted beside some effects, with the length of the description.
 pub struct Described<'a> {
@@ -108,9 +112,49 @@ fn described(fitted: Vec<(Vec<Term>, Refit<'_>)>) -> Option<Vec<Described<'_>>> 
     Some(order)
 }
 
-/// The probability of a name among all descriptions.
-pub fn needed(order: &[Described<'_>], effect: Effect) -> f64 {
+/// The probability of a name among all descriptions: of those that have it, and of those with a term that does what it does.
+pub fn needed(order: &[Described<'_>], best: &Refit<'_>, effect: Effect, the_same_law: f64) -> f64 {
     let weights = normalised(&order.iter().map(|own| -own.length).collect::<Vec<f64>>());
-    let with = order.iter().zip(weights).filter(|(own, _)| own.fit.hypothesis.has(effect));
-    with.map(|(_, weight)| weight).sum()
+    let own = torque_of_effect(best, effect);
+    let is_it = |term: &Term| {
+        let torques = own.as_ref().zip(torque_of_term(best, term));
+        torques.is_some_and(|(own, other)| own.dot(&other) > the_same_law * own.norm() * other.norm())
+    };
+    let has_it = |own: &Described<'_>| own.fit.hypothesis.has(effect) || own.terms.iter().any(is_it);
+    order.iter().zip(weights).filter(|(own, _)| has_it(own)).map(|(_, weight)| weight).sum()
+}
+
+/// The torques on the links along a fit's motion, one instant after another.
+fn along(fit: &Refit<'_>, torque: impl Fn(&ForwardModel, &Motion, &mut [f64])) -> Option<DVector<f64>> {
+    let mut all = Vec::new();
+    for record in 0..fit.problem.records.len() {
+        let (model, swing, true_s) = fit.motion(record)?;
+        let links = model.chain().count();
+        for t_s in true_s {
+            let state = swing.at(t_s);
+            let motion = model.motion(t_s, &state.theta_rad, &state.omega_rad_s);
+            let mut q = vec![0.0; model.rates()];
+            torque(&model, &motion, &mut q);
+            all.extend_from_slice(&q[..links]);
+        }
+    }
+    Some(DVector::from_vec(all))
+}
+
+/// Of an effect of a fit, in the direction in which it acts.
+fn torque_of_effect(fit: &Refit<'_>, effect: Effect) -> Option<DVector<f64>> {
+    let parameter = effect.parameters()[0];
+    let sign = fit.value(parameter)?.signum();
+    along(fit, |model, motion, q| {
+        let mut partials = Partials::zero(model.chain().count(), model.rates());
+        model.partials(motion, &mut partials);
+        model.sensitivity(parameter, motion, &partials, q);
+        q.iter_mut().for_each(|q| *q *= sign);
+    })
+}
+
+/// Of a term with its coefficients.
+fn torque_of_term(fit: &Refit<'_>, term: &Term) -> Option<DVector<f64>> {
+    let formula = Formula::of(&term.law)?;
+    along(fit, |model, motion, q| formula.add_torque(model.chain(), motion, q))
 }

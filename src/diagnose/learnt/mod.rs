@@ -10,6 +10,8 @@
 //! L = χ²/(2vτ) + ½ k ln(n/τ)        k: coefficients
 //! P(name | something remains) = Σ exp(−L) of the fits with it / Σ exp(−L) of all
 //! ```
+//!
+//! A term whose torque along the motion is that of a name's law, but for a tenth, is that law: dry friction that reverses smoothly is dry friction.
 //! 5. Of the shortest the one stands that leaves least of what was not fitted, or nearly so, if that is clearly less than the names do.
 //!
 //! | file | holds |
@@ -44,7 +46,9 @@ pub fn beside<'a>(
     let is_worth = posterior.remains > context.settings.verdict.even && !context.is_strip();
     let order = if is_worth { descriptions(context, posterior.best()) } else { None };
     let Some(order) = order else { return (Needed::new(), None) };
-    let names = &posterior.best().hypothesis.effects;
-    let needed = names.iter().map(|effect| (*effect, needed(&order, *effect))).collect();
+    let best = posterior.best();
+    let the_same_law = context.settings.law.the_same_law;
+    let of_name = |effect: &Effect| (*effect, needed(&order, best, *effect, the_same_law));
+    let needed = best.hypothesis.effects.iter().map(of_name).collect();
     (needed, proof.and_then(|proof| best_proven(context, &order, proof, from_s)))
 }

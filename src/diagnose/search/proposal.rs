@@ -6,6 +6,7 @@ use super::super::hypothesis::Hypothesis;
 use super::super::laws::{self, law_of};
 use super::super::refit::{Certificate, Refit};
 use super::super::screen::{Score, Screen};
+use super::super::weak_form::Asked;
 use super::beside::Beside;
 use super::horizon;
 use crate::fit::Record;
@@ -33,6 +34,8 @@ pub enum Proposal<'f, 'a> {
     Restart(&'f Refit<'a>),
     /// A restart along the motion of another fit, which follows the recordings: the hypothesis cannot fall out of step with them.
     Along(Hypothesis, &'f Refit<'a>),
+    /// A set of laws that the recorded motion itself asks for, along that motion.
+    Asked(Asked, &'f Refit<'a>),
     /// A hypothesis from a fit that has fewer of its effects, the others being nothing: it cannot leave more than that one does.
     Nested(Hypothesis, &'f Refit<'a>),
     /// A hypothesis from the base model's fit, followed from the beginning of the recordings on.
@@ -60,6 +63,9 @@ impl<'a> Proposal<'_, 'a> {
             }
             Self::Restart(fit) => restarted(context, fit).into_iter().collect(),
             Self::Along(hypothesis, leader) => context.refit_along(hypothesis, leader, &[]).into_iter().collect(),
+            Self::Asked(asked, base) => {
+                context.refit_along_recording(&asked.hypothesis, base, &asked.start).into_iter().collect()
+            }
             Self::Nested(hypothesis, within) => context.refit(hypothesis, within, &[]).into_iter().collect(),
             Self::FromTheBeginning(hypothesis, base) => {
                 let begun = Refit { hypothesis: hypothesis.clone(), ..(*base).clone() };

@@ -8,6 +8,7 @@ use super::super::laws;
 use super::super::misfit::{Misfit, leaves_more_than_noise, needs};
 use super::super::refit::{Refit, best, best_of_each_count, least, least_chi2};
 use super::super::screen::{Score, Screen};
+use super::super::weak_form::asked_for;
 use super::Search;
 use super::beside::Beside;
 use super::proposal::{Proposal, comes_to_rest};
@@ -15,6 +16,8 @@ use super::proposal::{Proposal, comes_to_rest};
 /// One round.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Round {
+    /// Sets of laws that the recorded motion itself asks for, where the base model leaves far more than noise.
+    Asked,
     /// Every effect alone, beside the base model.
     Singles,
     /// Those that are dear to fit: sought the longer the less the others explain.
@@ -58,14 +61,22 @@ pub enum Learns {
 
 impl Round {
     /// The rounds that every recording has.
-    pub const USUAL: [Self; 6] =
-        [Self::Singles, Self::DearSingles, Self::FromTheLeader, Self::AlongTheLeader, Self::Pairs, Self::Stragglers];
+    pub const USUAL: [Self; 7] = [
+        Self::Asked,
+        Self::Singles,
+        Self::DearSingles,
+        Self::FromTheLeader,
+        Self::AlongTheLeader,
+        Self::Pairs,
+        Self::Stragglers,
+    ];
     /// Those where the best of the usual ones leaves more than noise: it may stand in a false minimum, or its partner have been sought from the wrong place.
     pub const RESTARTS: [Self; 3] = [Self::RestartedLeaders, Self::BesideLeaders, Self::RestartedBest];
 
     /// The name, of which progress tells.
     pub fn name(self) -> &'static str {
         match self {
+            Self::Asked => "balance of torques",
             Self::Singles => "effects",
             Self::DearSingles => "dear effects",
             Self::FromTheLeader => "from the best",
@@ -95,6 +106,7 @@ impl Round {
     /// What it proposes.
     pub fn proposals<'f, 'a>(self, search: &'f Search<'a, '_>, tried: &mut Tried) -> Vec<Proposal<'f, 'a>> {
         match self {
+            Self::Asked => search.asked(),
             Self::Singles => search.singles(false),
             Self::DearSingles => search.singles(true),
             Self::FromTheLeader => search.begun_at_the_leader(),
@@ -123,6 +135,22 @@ pub struct Tried {
 }
 
 impl<'a> Search<'a, '_> {
+    /// A strip's marks do not show its rods.
+    fn asked(&self) -> Vec<Proposal<'_, 'a>> {
+        if !self.leaves_more_than_noise() || self.context.is_strip() {
+            return Vec::new();
+        }
+        // the small swings at the end part the losses
+        let whole = self.context.on(&self.prepared.records);
+        let asked = asked_for(&whole, self.base(), &self.effects, self.context.settings.search.asked);
+        if std::env::var("WEAK").is_ok() {
+            for a in &asked {
+                eprintln!("asked {:?} {:.4} {:?}", a.hypothesis.effects, a.leaves, a.start);
+            }
+        }
+        asked.into_iter().map(|asked| Proposal::Asked(asked, self.base())).collect()
+    }
+
     /// Every effect beside the base model: those of ordinary cost, or the others.
     fn singles(&self, dear: bool) -> Vec<Proposal<'_, 'a>> {
         let base = self.base();
@@ -202,7 +230,9 @@ impl<'a> Search<'a, '_> {
         let (settings, counts) = (&self.context.settings.search, self.context.settings.misfit.counts);
         let base = self.base();
         let further = laws::cheap_to_score(&self.context, &self.effects);
-        let mut seeds: Vec<&Refit<'a>> = self.fits[1..].iter().filter(|s| s.chi2 < base.chi2 - 4.0).collect();
+        let is_single = |s: &&Refit<'a>| s.hypothesis.effects.len() == 1;
+        let mut seeds: Vec<&Refit<'a>> =
+            self.fits[1..].iter().filter(is_single).filter(|s| s.chi2 < base.chi2 - 4.0).collect();
         seeds.sort_by(|a, b| a.chi2.total_cmp(&b.chi2));
         seeds.truncate(settings.pair_seeds);
         let least = seeds.first().map_or(0.0, |s| s.chi2);
