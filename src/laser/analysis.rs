@@ -84,7 +84,7 @@ pub fn analyse(record: &LaserRecord, experiment: &Experiment) -> Result<Analysis
     let refuse = |message: String| Error::Table { path: record.path.clone(), line: None, message };
     let bands_hz = bands_hz(experiment);
     let resolution_m = experiment.laser.as_ref().and_then(|l| l.resolution_m).unwrap_or(0.0);
-    let sample_m = sample_noise_m(&record.y_m).max(resolution_m / 12f64.sqrt());
+    let sample_m = sample_noise_m(record).max(resolution_m / 12f64.sqrt());
     let stated = experiment.light.as_ref().map_or(&[][..], |light| &light.on_s);
     let alone = Acting { grid: &grid, lamp: None, jumps_s: Vec::new(), sample_m, slow: Vec::new() };
     let mut begun = alone.begin(&bands_hz);
@@ -159,10 +159,18 @@ fn judged(grid: &Grid, noise: &Noise, lamp: &Lamp, candidates: Vec<Candidate>, l
     })
 }
 
-/// Standard deviation of a sample's noise from fourth differences, which no swing below a tenth of the rate survives.
-fn sample_noise_m(y_m: &[f64]) -> f64 {
-    let mut squares: Vec<f64> =
-        y_m.windows(5).map(|y| (y[0] - 4.0 * y[1] + 6.0 * y[2] - 4.0 * y[3] + y[4]).powi(2) / 70.0).collect();
+/// Standard deviation of a sample's noise: each against the cubic through its four neighbours at their own times, which no swing below a tenth of the rate survives.
+fn sample_noise_m(record: &LaserRecord) -> f64 {
+    let square = |(t, y): (&[f64], &[f64])| {
+        let share = |k: usize| {
+            let others = [0, 1, 3, 4].into_iter().filter(|j| *j != k);
+            others.map(|j| (t[2] - t[j]) / (t[k] - t[j])).product::<f64>()
+        };
+        let shares = [0, 1, 3, 4].map(|k| (share(k), y[k]));
+        let foreseen: f64 = shares.iter().map(|(share, y)| share * y).sum();
+        (y[2] - foreseen).powi(2) / (1.0 + shares.iter().map(|(share, _)| share * share).sum::<f64>())
+    };
+    let mut squares: Vec<f64> = record.t_s.windows(5).zip(record.y_m.windows(5)).map(square).collect();
     let usual = crate::statistics::median(&mut squares).unwrap_or(0.0);
     // a jump or a gap is no noise; of normal noise one in a million is left out
     let most = if usual > 0.0 { 50.0 * usual } else { f64::INFINITY };

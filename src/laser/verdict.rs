@@ -92,7 +92,7 @@ pub fn verdict(bench: &Bench<'_>, candidates: &[Candidate], adequacy: &Adequacy)
     }
     class.sort();
     class.dedup();
-    let stands = adequacy.adequate;
+    let stands = adequacy.adequate && !effects.contains(&Effect::Other);
     let status = match (stands, effects.is_empty(), likely >= CERTAIN && class == effects) {
         (false, _, _) => Status::Unknown,
         (true, true, _) if likely >= 0.5 => Status::Adequate,
@@ -155,7 +155,7 @@ impl Verdict {
         if self.status != Status::Unknown {
             return [push, sd];
         }
-        let walking = bench.fit_on(&bench.stage(bench.noise.walk_m2_s), Vec::new());
+        let walking = bench.fit_on(&bench.stage(bench.noise.walk_m2_s), candidates[0].fit.members.clone());
         let [other, other_sd] = walking.map_or([push, sd], |fit| fit.push());
         let over = self.remainder.over_noise.max(1.0);
         [push, [over * sd, other_sd, (push - other).abs(), scatter_m(cycles_m)].into_iter().fold(0.0, f64::max)]
