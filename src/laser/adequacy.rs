@@ -18,6 +18,8 @@ const SLOW_PART: f64 = 0.5;
 const BAND_RATIO: usize = 3;
 /// Stretches of which the variance is compared.
 const STRETCHES: usize = 12;
+/// Of the median of n squares of a normal number, times n, over the square of their median: 1/(2 f(m) m)² of χ² with one degree of freedom.
+const MEDIAN_VARIANCE: f64 = 5.43;
 /// Ends of the stretches of time after an edge of the lamp, each of which may have a level of its own (s).
 const AFTER_EDGE_S: [f64; 5] = [1.5, 4.0, 10.0, 25.0, 60.0];
 
@@ -107,19 +109,18 @@ fn spectrum(left: &[f64], step_s: f64) -> Vec<Test> {
     tests
 }
 
-/// Variance of the slow part that is not the same throughout.
+/// Variance of the slow part that is not the same throughout. Of each stretch by the median of the squares: what rings for seconds after a knock, in modes that are
+/// not followed, is no noise.
 fn variance(left: &[f64]) -> Test {
     let length = (left.len() / STRETCHES).max(1);
-    let power = |part: &[f64]| part.iter().map(|v| v * v).sum::<f64>();
-    let mean = power(left) / left.len().max(1) as f64;
-    let fourth = left.iter().map(|v| v.powi(4)).sum::<f64>() / left.len().max(1) as f64;
-    // of a mean of squares, whatever their law
-    let spread = (fourth - mean * mean).max(mean * mean);
-    let chi2: f64 = left
-        .chunks(length)
-        .filter(|part| part.len() == length)
-        .map(|part| (power(part) / length as f64 - mean).powi(2) * SLOW_PART * length as f64 / spread)
-        .sum();
+    let usual = |part: &[f64]| {
+        let mut squares: Vec<f64> = part.iter().map(|v| v * v).collect();
+        crate::statistics::median(&mut squares).unwrap_or(0.0)
+    };
+    let parts: Vec<f64> = left.chunks(length).filter(|part| part.len() == length).map(usual).collect();
+    let mean = parts.iter().sum::<f64>() / parts.len().max(1) as f64;
+    let spread = MEDIAN_VARIANCE / (SLOW_PART * length as f64) * mean * mean;
+    let chi2: f64 = parts.iter().map(|v| (v - mean).powi(2)).sum::<f64>() / spread.max(f64::MIN_POSITIVE);
     Test { looks_for: "uneven noise", p_value: chi_squared_tail(chi2, (STRETCHES - 1) as f64), at: None }
 }
 

@@ -14,8 +14,8 @@ const FEWER: usize = 40;
 const FURTHER_SWING: f64 = 16.3;
 /// Bounds of damping ratios.
 const DAMPING: [f64; 2] = [2e-4, 0.15];
-/// White noise of the means over that of neighbouring samples: less where the strip's fast modes move between samples, more where a sensor's noise is not quite white.
-const WHITE_FACTORS: [f64; 2] = [0.3, 2.0];
+/// The white noise of means is not less than that of neighbouring samples tells, but may be more where a sensor's noise is not quite white.
+const WHITE_FACTORS: [f64; 2] = [0.97, 2.0];
 /// First step of its logarithm, and sweeps over all numbers that end a descent.
 const WHITE_STEP: f64 = 0.05;
 const SWEEPS: usize = 3;
@@ -94,7 +94,8 @@ impl Acting<'_> {
         Some((filter, solution))
     }
 
-    fn minus_two_ln(&self, noise: &Noise) -> f64 {
+    /// −2 ln likelihood of a noise, but for a constant.
+    pub fn minus_two_ln(&self, noise: &Noise) -> f64 {
         self.solution(noise).map_or(f64::INFINITY, |(filter, solution)| solution.chi2 + filter.ln_determinant)
     }
 

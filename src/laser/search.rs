@@ -10,8 +10,6 @@ use super::solve::{Span, solve};
 const PRIOR_ODDS: f64 = 0.1;
 /// How near to an edge of the lamp no other jump is sought (s).
 pub const BESIDE_EDGE_S: f64 = 1.0;
-/// Pairs are those of the likeliest single forms with every other.
-const LEADING: usize = 4;
 /// A form whose best start takes less than this from the sum of squares cannot pay for its prior, size and shape.
 const WORTH: f64 = 5.0;
 /// A pair is led down from so many of the likeliest starts.
@@ -33,12 +31,11 @@ pub fn candidates(bench: &Bench<'_>) -> Vec<Candidate> {
     let mut ranked: Vec<&Fit> = singles.iter().collect();
     ranked.sort_by(|a, b| b.ln_evidence.total_cmp(&a.ln_evidence));
     let mut pairs: Vec<(&Fit, Form)> = Vec::new();
-    for one in ranked.into_iter().take(LEADING) {
-        for other in Form::ALL {
-            if other.effect() != one.members[0].form.effect() {
-                pairs.push((one, other));
-            }
-        }
+    for (k, one) in ranked.iter().enumerate() {
+        // forms without a fit of their own come last
+        let before = |form: Form| ranked[..k].iter().any(|better| better.members[0].form == form);
+        let own = one.members[0].form.effect();
+        pairs.extend(Form::ALL.into_iter().filter(|f| f.effect() != own && !before(*f)).map(|form| (*one, form)));
     }
     let pairs: Vec<Fit> = pairs.par_iter().filter_map(|(one, other)| with_one_more(bench, one, *other)).collect();
     let mut best: Vec<Fit> = vec![base];
