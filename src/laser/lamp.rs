@@ -156,8 +156,11 @@ impl Lamp {
     pub fn log_creep(&self, grid: &Grid, span_s: f64) -> Vec<f64> {
         let whole = (grid.duration_s() / span_s).ln_1p();
         self.course(grid, |t_s, i| {
-            let signed = self.to_and_fro().into_iter().zip(&self.edges_s).take(i.edges);
-            signed.map(|(sign, edge)| sign * ((t_s - edge) / span_s).ln_1p()).sum::<f64>() / whole
+            let ratio = |pair: &[f64]| {
+                let crept = |edge: f64| (t_s - edge).max(0.0) + span_s;
+                crept(pair[0]) / pair.get(1).map_or(span_s, |off| crept(*off))
+            };
+            self.edges_s[..i.edges].chunks(2).map(ratio).product::<f64>().ln() / whole
         })
     }
 

@@ -19,7 +19,7 @@ const WHITE_FACTORS: [f64; 2] = [0.97, 2.0];
 /// First step of its logarithm, and sweeps over all numbers that end a descent.
 const WHITE_STEP: f64 = 0.05;
 const SWEEPS: usize = 3;
-/// Where the first swing's frequency stands among the numbers, and turns over the record by which it is tried beside where a descent has ended.
+/// Where the first swing's frequency stands among the numbers, and turns over the record by which each is tried beside where a descent has ended.
 const FIRST_HZ: usize = 2;
 const NEARBY_TURNS: [f64; 8] = [-0.6, -0.4, -0.25, -0.12, 0.12, 0.25, 0.4, 0.6];
 /// The first swing's frequency is looked for at so many places to each side, and with these damping ratios.
@@ -156,13 +156,20 @@ impl Acting<'_> {
         };
         let (best, mut least) = descend(&coded[1..], &step, most, |x| self.minus_two_ln(&with_white(white, x)));
         let mut all: Vec<f64> = std::iter::once(white).chain(best).collect();
-        let first_hz = all[FIRST_HZ];
-        for turns in NEARBY_TURNS {
-            let mut moved = all.clone();
-            moved[FIRST_HZ] = first_hz + turns / self.grid.duration_s();
-            let lower = self.minus_two_ln(&with_white(moved[0], &moved[1..]));
-            if lower < least {
-                (least, all) = (lower, moved);
+        // the likelihood of each swing's frequency has a summit at every turn missed
+        for k in 0..from.swings.len() {
+            let place = FIRST_HZ + 3 * k;
+            let own_hz = all[place];
+            let left = self.left_of(&with_white(all[0], &all[1..]));
+            let around = strongest_hz(&left, [0.98, 1.02].map(|part| part * own_hz));
+            let nearby = NEARBY_TURNS.map(|turns| own_hz + turns / self.grid.duration_s());
+            for hz in nearby.into_iter().chain([around]) {
+                let mut moved = all.clone();
+                moved[place] = hz;
+                let lower = self.minus_two_ln(&with_white(moved[0], &moved[1..]));
+                if lower < least {
+                    (least, all) = (lower, moved);
+                }
             }
         }
         let mut step: Vec<f64> = std::iter::once(WHITE_STEP).chain(step.iter().map(|s| 0.3 * s)).collect();
