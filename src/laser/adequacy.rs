@@ -8,9 +8,10 @@ use super::search::BESIDE_EDGE_S;
 use super::solve::solve;
 use crate::identify::estimate::chi_squared_tail;
 
-/// A record that leaves only noise fails one of the tests this often. Rare, for forms and modes are not exact to the last digit, and what is not in the table
-/// is beyond it by many powers of ten.
+/// A record that leaves only noise fails one of the tests this often.
 const FALSE_ALARM: f64 = 1e-5;
+/// Forms are true to a hundredth of what they explain: the lamp's filament, higher modes and the strip's own shape are not in them. Less than that does not matter.
+const MATTERS: f64 = 0.01;
 /// The part of the spectrum that is looked at. What is faster than half the highest frequency of the grid, 4 Hz, is the strip's third and higher modes, which
 /// move no mean.
 const SLOW_PART: f64 = 0.5;
@@ -32,12 +33,14 @@ pub struct Test {
     pub p_value: f64,
     /// Where: Hz of a line, s of a jump.
     pub at: Option<f64>,
+    /// Root mean square of the displacement that it finds (m).
+    pub rms_m: f64,
 }
 
 /// All tests of a fit.
 #[derive(Debug, Clone, Serialize)]
 pub struct Adequacy {
-    /// Whether only noise is left.
+    /// Whether what is left, beside noise, is too little to matter.
     pub adequate: bool,
     /// The least probability, made up for the number of tests.
     pub p_value: f64,
@@ -45,18 +48,34 @@ pub struct Adequacy {
     pub tests: Vec<Test>,
 }
 
+impl Adequacy {
+    /// The largest that a failed test finds; what it looks for tells what is left.
+    pub fn left(&self) -> Option<&Test> {
+        let failed = self.tests.iter().filter(|test| test.p_value * (self.tests.len() as f64) < FALSE_ALARM);
+        failed.max_by(|a, b| a.rms_m.total_cmp(&b.rms_m))
+    }
+}
+
 /// Tests what a fit leaves.
 pub fn adequacy(bench: &Bench<'_>, fit: &Fit) -> Adequacy {
     let stage = &bench.stage(fit.walk_m2_s);
     let held: Vec<f64> =
         fit.left.iter().zip(&bench.with.grid.count).filter(|(_, count)| **count > 0.0).map(|(v, _)| *v).collect();
-    let mut tests = spectrum(&held, bench.with.grid.step_s);
-    tests.push(variance(&slow_part(&held)));
+    let cell_m = bench.cell_m();
+    let mut tests = spectrum(&held, bench.with.grid.step_s, cell_m);
+    tests.push(variance(&slow_part(&held), cell_m));
     tests.push(jump(bench, stage, fit));
     tests.extend(in_step(bench, stage, fit));
     let least = tests.iter().map(|t| t.p_value).fold(1.0, f64::min);
     let p_value = 1.0 - (1.0 - least).powi(tests.len() as i32);
-    Adequacy { adequate: p_value > FALSE_ALARM, p_value, tests }
+    let mut all = Adequacy { adequate: true, p_value, tests };
+    all.adequate = all.left().is_none_or(|left| left.rms_m < MATTERS * bench.reach_m);
+    all
+}
+
+/// The displacement of which the sum of squares, over the noise's, is `chi2`.
+fn rms_m(chi2: f64, cells: usize, cell_m: f64) -> f64 {
+    cell_m * (chi2.max(0.0) / cells.max(1) as f64).sqrt()
 }
 
 /// The lines of the spectrum of what is left, the mean first.
@@ -81,7 +100,7 @@ fn slow_part(left: &[f64]) -> Vec<f64> {
 }
 
 /// A line anywhere, and more power than noise has in bands from the slowest on.
-fn spectrum(left: &[f64], step_s: f64) -> Vec<Test> {
+fn spectrum(left: &[f64], step_s: f64, cell_m: f64) -> Vec<Test> {
     let values = lines(left);
     let count = values.len() as f64;
     let mean = left.iter().map(|v| v * v).sum::<f64>() / count;
@@ -91,14 +110,21 @@ fn spectrum(left: &[f64], step_s: f64) -> Vec<Test> {
     let strongest = (0..power.len()).max_by(|a, b| power[*a].total_cmp(&power[*b])).unwrap_or(0);
     let highest = power.get(strongest).copied().unwrap_or(0.0) / mean.max(1.0);
     let line = -f64::exp_m1(power.len() as f64 * f64::ln_1p(-(-highest).exp().min(1.0 - 1e-16)));
-    let mut tests = vec![Test { looks_for: "a line in the spectrum", p_value: line.max(0.0), at: Some(hz(strongest)) }];
-    let (mut from, mut width, mut worst) = (0, 6, Test { looks_for: "slow structure", p_value: 1.0, at: None });
+    let mut tests = vec![Test {
+        looks_for: "a line in the spectrum",
+        p_value: line.max(0.0),
+        at: Some(hz(strongest)),
+        rms_m: rms_m(2.0 * highest, left.len(), cell_m),
+    }];
+    let (mut from, mut width) = (0, 6);
+    let mut worst = Test { looks_for: "slow structure", p_value: 1.0, at: None, rms_m: 0.0 };
     let mut bands = 0;
     while from + width <= power.len() {
         let sum: f64 = power[from..from + width].iter().sum();
         let p_value = chi_squared_tail(2.0 * sum, 2.0 * width as f64);
         if p_value < worst.p_value {
-            worst = Test { p_value, at: Some(hz(from + width / 2)), ..worst };
+            let rms_m = rms_m(2.0 * (sum - width as f64), left.len(), cell_m);
+            worst = Test { p_value, at: Some(hz(from + width / 2)), rms_m, ..worst };
         }
         bands += 1;
         from += width;
@@ -111,7 +137,7 @@ fn spectrum(left: &[f64], step_s: f64) -> Vec<Test> {
 
 /// Variance of the slow part that is not the same throughout. Of each stretch by the median of the squares: what rings for seconds after a knock, in modes that are
 /// not followed, is no noise.
-fn variance(left: &[f64]) -> Test {
+fn variance(left: &[f64], cell_m: f64) -> Test {
     let length = (left.len() / STRETCHES).max(1);
     let usual = |part: &[f64]| {
         let mut squares: Vec<f64> = part.iter().map(|v| v * v).collect();
@@ -121,7 +147,13 @@ fn variance(left: &[f64]) -> Test {
     let mean = parts.iter().sum::<f64>() / parts.len().max(1) as f64;
     let spread = MEDIAN_VARIANCE / (SLOW_PART * length as f64) * mean * mean;
     let chi2: f64 = parts.iter().map(|v| (v - mean).powi(2)).sum::<f64>() / spread.max(f64::MIN_POSITIVE);
-    Test { looks_for: "uneven noise", p_value: chi_squared_tail(chi2, (STRETCHES - 1) as f64), at: None }
+    let most = parts.iter().copied().fold(0.0, f64::max) / mean.max(f64::MIN_POSITIVE);
+    Test {
+        looks_for: "uneven noise",
+        p_value: chi_squared_tail(chi2, (STRETCHES - 1) as f64),
+        at: None,
+        rms_m: cell_m * (most - 1.0).max(0.0).sqrt(),
+    }
 }
 
 /// A jump of the level, away from the lamp's edges.
@@ -136,7 +168,12 @@ fn jump(bench: &Bench<'_>, stage: &Stage, fit: &Fit) -> Test {
     let cells = (3..grid.len()).filter(|cell| is_free(grid.time_s(*cell)));
     let best = cells.max_by(|a, b| scan[*a].0.total_cmp(&scan[*b].0)).unwrap_or(0);
     let one = chi_squared_tail(scan[best].0, 1.0);
-    Test { looks_for: "a jump", p_value: (one * grid.len() as f64).min(1.0), at: Some(grid.time_s(best)) }
+    Test {
+        looks_for: "a jump",
+        p_value: (one * grid.len() as f64).min(1.0),
+        at: Some(grid.time_s(best)),
+        rms_m: scan[best].1.abs(),
+    }
 }
 
 /// Levels of their own for stretches after each kind of edge, and for each cycle.
@@ -161,7 +198,13 @@ fn in_step(bench: &Bench<'_>, stage: &Stage, fit: &Fit) -> Vec<Test> {
         .map(|(looks_for, further)| {
             let all: Vec<&[f64]> = plain.iter().copied().chain(further.iter().map(Vec::as_slice)).collect();
             let chi2 = solve(&all, &stage.y, &[]).map_or(fit.chi2, |solution| solution.chi2);
-            Test { looks_for, p_value: chi_squared_tail(fit.chi2 - chi2, further.len() as f64), at: None }
+            let gained = fit.chi2 - chi2;
+            Test {
+                looks_for,
+                p_value: chi_squared_tail(gained, further.len() as f64),
+                at: None,
+                rms_m: rms_m(gained, grid.held(), bench.cell_m()),
+            }
         })
         .collect()
 }

@@ -1,6 +1,7 @@
 //! The lamp's edges: found in a record, or led to where the record has them.
 
 use super::filter::{Filter, Noise, Swing};
+use super::forms::FROM_ENDS_S;
 use super::grid::Grid;
 use super::lamp::Lamp;
 use super::learn::Acting;
@@ -40,7 +41,12 @@ pub fn jumps(acting: &Acting<'_>, noise: &Noise, bands_hz: &[[f64; 2]], most: us
             acting.jumps_s.iter().map(|jump| (jump - t_s).abs()).fold(lamp, f64::min)
         };
         let grid = acting.grid;
-        let inside = |cell: &usize| *cell > 2 && near(grid.time_s(*cell)) > 1.0;
+        // level and swing must be known before and after
+        let from_ends_s = |t_s: f64| (t_s - grid.start_s).min(grid.end_s() - t_s);
+        let inside = |cell: &usize| {
+            let t_s = grid.time_s(*cell);
+            near(t_s) > 1.0 && from_ends_s(t_s) > FROM_ENDS_S
+        };
         let best = (0..grid.len()).filter(inside).max_by(|a, b| scan[*a].0.total_cmp(&scan[*b].0));
         let found = best.filter(|cell| scan[*cell].0 > SEEN);
         if let Some(cell) = found {
@@ -141,9 +147,7 @@ fn shifts(with: &Shifting<'_>, lamp: &Lamp, stated_s: &[f64], known_s: f64) -> O
     let y = filter.whiten(&grid.y_m);
     let columns: Vec<&[f64]> = white.iter().map(Vec::as_slice).collect();
     let base = solve(&columns, &y, &[])?;
-    let of = |lamp: &Lamp| {
-        combined(sharp(lamp, grid, &noise.swings).iter().zip(&base.amplitude), grid.len())
-    };
+    let of = |lamp: &Lamp| combined(sharp(lamp, grid, &noise.swings).iter().zip(&base.amplitude), grid.len());
     let step_s = 0.25 * grid.step_s;
     let here = of(lamp);
     let slopes: Vec<Vec<f64>> = (0..lamp.edges_s.len())

@@ -254,7 +254,9 @@ impl Form {
                 .flat_map(|from| between(&shapes[1], 3).into_iter().map(move |tau| vec![from, tau]))
                 .collect(),
             Self::Lag => between(&shapes[0], 9).into_iter().map(|tau| vec![tau]).collect(),
-            Self::Warming | Self::Slow | Self::LogCreep => between(&shapes[0], 5).into_iter().map(|tau| vec![tau]).collect(),
+            Self::Warming | Self::Slow | Self::LogCreep => {
+                between(&shapes[0], 5).into_iter().map(|tau| vec![tau]).collect()
+            }
             Self::Line | Self::Curve | Self::Walk => vec![Vec::new()],
             Self::Step => Vec::new(),
         }
@@ -277,9 +279,7 @@ impl Form {
                 let store_s = shape[1].exp();
                 swung(lamp.gas(grid, tau_s, store_s), lamp.gas_jumps(tau_s, store_s))
             }
-            Self::Train => {
-                swung(lamp.gas_train(grid, tau_s, shape[1]), lamp.gas_train_jumps(tau_s, shape[1]))
-            }
+            Self::Train => swung(lamp.gas_train(grid, tau_s, shape[1]), lamp.gas_train_jumps(tau_s, shape[1])),
             _ => self.columns(shape, with),
         }
     }
@@ -355,8 +355,7 @@ mod tests {
 
     #[test]
     fn every_form_has_as_many_columns_as_it_says() {
-        let grid =
-            Grid { start_s: 0.0, step_s: 0.25, y_m: vec![0.0; 400], count: vec![1.0; 400], origin_m: 0.0 };
+        let grid = Grid { start_s: 0.0, step_s: 0.25, y_m: vec![0.0; 400], count: vec![1.0; 400], origin_m: 0.0 };
         let lamp = Lamp { edges_s: vec![10.0, 30.0, 50.0, 70.0] };
         let swing = |hz| Swing { hz, damping: 0.01, drive_m2_s: 0.0, sense: 1.0 };
         for swings in [&[swing(1.35)][..], &[swing(1.35), swing(3.1), swing(4.8)]] {

@@ -12,7 +12,7 @@ const PRIOR_ODDS: f64 = 0.1;
 pub const BESIDE_EDGE_S: f64 = 1.0;
 /// A form whose best start takes less than this from the sum of squares cannot pay for its prior, size and shape.
 const WORTH: f64 = 5.0;
-/// A pair is led down from so many of the likeliest starts.
+/// A form alone is led down from so many of its likeliest starts, a second one from the likeliest.
 const STARTS: usize = 2;
 
 /// A candidate with its probability among all.
@@ -39,7 +39,8 @@ pub fn candidates(bench: &Bench<'_>) -> Vec<Candidate> {
         let own = one.members[0].form.effect();
         pairs.extend(Form::ALL.into_iter().filter(|f| f.effect() != own && !before(*f)).map(|form| (*one, form)));
     }
-    let walking = singles.iter().find(|fit| fit.walk_m2_s > 0.0).map(|fit| Starts::of(bench, &bench.stage(fit.walk_m2_s)));
+    let walking =
+        singles.iter().find(|fit| fit.walk_m2_s > 0.0).map(|fit| Starts::of(bench, &bench.stage(fit.walk_m2_s)));
     let starts_of = |one: &Fit| walking.as_ref().filter(|_| one.walk_m2_s > 0.0).unwrap_or(&still);
     let pairs: Vec<Fit> =
         pairs.par_iter().filter_map(|(one, other)| with_one_more(bench, one, *other, starts_of(one))).collect();
@@ -88,8 +89,10 @@ struct Starts(Vec<(Form, Vec<f64>, Vec<f64>)>);
 impl Starts {
     fn of(bench: &Bench<'_>, stage: &Stage) -> Self {
         let with = &bench.with;
-        let shapes: Vec<(Form, Vec<f64>)> =
-            Form::ALL.into_iter().flat_map(|form| form.starts(with).into_iter().map(move |shape| (form, shape))).collect();
+        let shapes: Vec<(Form, Vec<f64>)> = Form::ALL
+            .into_iter()
+            .flat_map(|form| form.starts(with).into_iter().map(move |shape| (form, shape)))
+            .collect();
         let whitened = |(form, shape): (Form, Vec<f64>)| {
             let white = form.columns(&shape, with).first().map(|column| stage.filter.whiten(column));
             white.map(|white| (form, shape, white))
@@ -121,11 +124,15 @@ fn starts(bench: &Bench<'_>, fit: &Fit, form: Form, stage: &Stage, known: &Start
         if !kept.iter().any(is_near) {
             kept.push(shape);
         }
-        if kept.len() == STARTS {
+        if kept.len() == most_starts(fit) {
             break;
         }
     }
     kept
+}
+
+fn most_starts(fit: &Fit) -> usize {
+    if fit.members.is_empty() { STARTS } else { 1 }
 }
 
 fn left_on(columns: &[&[f64]], stage: &Stage, fit: &Fit) -> Vec<f64> {
@@ -150,7 +157,7 @@ fn jumps_of(bench: &Bench<'_>, fit: &Fit, stage: &Stage) -> Vec<f64> {
         if found.iter().all(|other| (other - at_s).abs() > 2.0) {
             found.push(at_s);
         }
-        if found.len() == STARTS {
+        if found.len() == most_starts(fit) {
             break;
         }
     }
