@@ -1,11 +1,13 @@
 //! Whether a candidate leaves only noise: its innovations must be white, even, without jumps, and say nothing in step with the lamp.
 
+use std::f64::consts::TAU;
+
 use rustfft::{FftPlanner, num_complex::Complex};
 use serde::Serialize;
 
 use super::fit::{Bench, Fit, Stage};
 use super::search::BESIDE_EDGE_S;
-use super::solve::solve;
+use super::solve::{combined, solve};
 use crate::identify::estimate::chi_squared_tail;
 
 /// A record that leaves only noise fails one of the tests this often.
@@ -18,7 +20,7 @@ const SLOW_PART: f64 = 0.5;
 /// Bands of the spectrum: from the slowest line, each so many times as wide as the one before.
 const BAND_RATIO: usize = 3;
 /// Stretches of which the variance is compared.
-const STRETCHES: usize = 12;
+const STRETCHES: usize = 48;
 /// Of the median of n squares of a normal number, times n, over the square of their median: 1/(2 f(m) m)² of χ² with one degree of freedom.
 const MEDIAN_VARIANCE: f64 = 5.43;
 /// Ends of the stretches of time after an edge of the lamp, each of which may have a level of its own (s).
@@ -62,7 +64,7 @@ pub fn adequacy(bench: &Bench<'_>, fit: &Fit) -> Adequacy {
     let held: Vec<f64> =
         fit.left.iter().zip(&bench.with.grid.count).filter(|(_, count)| **count > 0.0).map(|(v, _)| *v).collect();
     let cell_m = bench.cell_m();
-    let mut tests = spectrum(&held, bench.with.grid.step_s, cell_m);
+    let mut tests = spectrum(bench, stage, &held);
     tests.push(variance(&slow_part(&held), cell_m));
     tests.push(jump(bench, stage, fit));
     tests.extend(in_step(bench, stage, fit));
@@ -73,9 +75,19 @@ pub fn adequacy(bench: &Bench<'_>, fit: &Fit) -> Adequacy {
     all
 }
 
-/// The displacement of which the sum of squares, over the noise's, is `chi2`.
-fn rms_m(chi2: f64, cells: usize, cell_m: f64) -> f64 {
-    cell_m * (chi2.max(0.0) / cells.max(1) as f64).sqrt()
+/// Root mean square of a displacement that swings with a frequency, from what it adds to the sum of squares.
+fn rms_m(bench: &Bench<'_>, stage: &Stage, hz: f64, chi2: f64) -> f64 {
+    let grid = bench.with.grid;
+    let swing: Vec<f64> = (0..grid.len()).map(|cell| (TAU * hz * grid.time_s(cell)).cos()).collect();
+    let power: f64 = stage.filter.whiten(&swing).iter().map(|v| v * v).sum();
+    (0.5 * chi2.max(0.0) / power.max(f64::MIN_POSITIVE)).sqrt()
+}
+
+/// Root mean square of what in a course is neither light nor a level.
+fn rms_beside_light_m(bench: &Bench<'_>, course: &[f64]) -> f64 {
+    let level = vec![1.0; course.len()];
+    let left = solve(&[&level, &bench.base[0]], course, &[]).map_or(0.0, |solution| solution.chi2);
+    (left / course.len() as f64).sqrt()
 }
 
 /// The lines of the spectrum of what is left, the mean first.
@@ -100,13 +112,13 @@ fn slow_part(left: &[f64]) -> Vec<f64> {
 }
 
 /// A line anywhere, and more power than noise has in bands from the slowest on.
-fn spectrum(left: &[f64], step_s: f64, cell_m: f64) -> Vec<Test> {
+fn spectrum(bench: &Bench<'_>, stage: &Stage, left: &[f64]) -> Vec<Test> {
     let values = lines(left);
     let count = values.len() as f64;
     let mean = left.iter().map(|v| v * v).sum::<f64>() / count;
     // each is exponential with mean 1 for white noise
     let power: Vec<f64> = values[1..=slow_lines(values.len()).max(1)].iter().map(|v| v.norm_sqr() / count).collect();
-    let hz = |k: usize| (k + 1) as f64 / (count * step_s);
+    let hz = |k: usize| (k + 1) as f64 / (count * bench.with.grid.step_s);
     let strongest = (0..power.len()).max_by(|a, b| power[*a].total_cmp(&power[*b])).unwrap_or(0);
     let highest = power.get(strongest).copied().unwrap_or(0.0) / mean.max(1.0);
     let line = -f64::exp_m1(power.len() as f64 * f64::ln_1p(-(-highest).exp().min(1.0 - 1e-16)));
@@ -114,7 +126,7 @@ fn spectrum(left: &[f64], step_s: f64, cell_m: f64) -> Vec<Test> {
         looks_for: "a line in the spectrum",
         p_value: line.max(0.0),
         at: Some(hz(strongest)),
-        rms_m: rms_m(2.0 * highest, left.len(), cell_m),
+        rms_m: rms_m(bench, stage, hz(strongest), 2.0 * highest),
     }];
     let (mut from, mut width) = (0, 6);
     let mut worst = Test { looks_for: "slow structure", p_value: 1.0, at: None, rms_m: 0.0 };
@@ -123,8 +135,9 @@ fn spectrum(left: &[f64], step_s: f64, cell_m: f64) -> Vec<Test> {
         let sum: f64 = power[from..from + width].iter().sum();
         let p_value = chi_squared_tail(2.0 * sum, 2.0 * width as f64);
         if p_value < worst.p_value {
-            let rms_m = rms_m(2.0 * (sum - width as f64), left.len(), cell_m);
-            worst = Test { p_value, at: Some(hz(from + width / 2)), rms_m, ..worst };
+            let middle = hz(from + width / 2);
+            let rms_m = rms_m(bench, stage, middle, 2.0 * (sum - width as f64));
+            worst = Test { p_value, at: Some(middle), rms_m, ..worst };
         }
         bands += 1;
         from += width;
@@ -181,29 +194,33 @@ fn in_step(bench: &Bench<'_>, stage: &Stage, fit: &Fit) -> Vec<Test> {
     let (grid, lamp) = (bench.with.grid, bench.with.lamp);
     let members = bench.whitened(stage, &fit.members);
     let plain: Vec<&[f64]> = stage.base.iter().chain(&members).map(Vec::as_slice).collect();
-    let mut after = Vec::new();
+    let mut after: Vec<Vec<f64>> = Vec::new();
     for is_lit in [true, false] {
         for (k, end_s) in AFTER_EDGE_S.iter().enumerate() {
             let start_s = if k == 0 { 0.0 } else { AFTER_EDGE_S[k - 1] };
             let course = lamp.course(grid, |_, i| {
                 f64::from(i.edges > 0 && i.is_lit == is_lit && i.since_s >= start_s && i.since_s < *end_s)
             });
-            after.push(stage.filter.whiten(&course));
+            after.push(course);
         }
     }
-    let cycles: Vec<Vec<f64>> = lamp.each(grid).iter().skip(1).map(|c| stage.filter.whiten(c)).collect();
+    let cycles: Vec<Vec<f64>> = lamp.each(grid).into_iter().skip(1).collect();
     [("a course in step with the lamp", after), ("cycles that differ", cycles)]
         .into_iter()
         .filter(|(_, further)| !further.is_empty())
         .map(|(looks_for, further)| {
-            let all: Vec<&[f64]> = plain.iter().copied().chain(further.iter().map(Vec::as_slice)).collect();
-            let chi2 = solve(&all, &stage.y, &[]).map_or(fit.chi2, |solution| solution.chi2);
-            let gained = fit.chi2 - chi2;
+            let white: Vec<Vec<f64>> = further.iter().map(|course| stage.filter.whiten(course)).collect();
+            let all: Vec<&[f64]> = plain.iter().copied().chain(white.iter().map(Vec::as_slice)).collect();
+            let solution = solve(&all, &stage.y, &[]);
+            let gained = solution.as_ref().map_or(0.0, |solution| fit.chi2 - solution.chi2);
+            let course = solution.map_or_else(Vec::new, |solution| {
+                combined(further.iter().zip(&solution.amplitude[plain.len()..]), grid.len())
+            });
             Test {
                 looks_for,
                 p_value: chi_squared_tail(gained, further.len() as f64),
                 at: None,
-                rms_m: rms_m(gained, grid.held(), bench.cell_m()),
+                rms_m: if course.is_empty() { 0.0 } else { rms_beside_light_m(bench, &course) },
             }
         })
         .collect()
