@@ -99,7 +99,8 @@ fn effects(report: &Report) -> String {
     let mut table =
         Table::with_sentences(["beside the push", "probability", "would be seen from", "", "where it is there"]);
     for found in &report.effects {
-        let smallest = report.detectable.get(found.effect.id()).map_or_else(|| "–".to_owned(), |limit| um(limit.smallest, 2));
+        let smallest =
+            report.detectable.get(found.effect.id()).map_or_else(|| "–".to_owned(), |limit| um(limit.smallest, 2));
         let numbers: Vec<String> = found
             .parameters
             .iter()
