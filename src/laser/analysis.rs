@@ -22,6 +22,10 @@ const MODES: usize = 3;
 /// Jumps beside the lamp's for which the noise is learnt again.
 const JUMPS_BESIDE: usize = 6;
 
+/// Candidates are sought again so often at most.
+const ROUNDS: usize = 2;
+/// −2 ln likelihood that noise must gain to change an answer: its eight numbers at 1 %.
+const GAINED: f64 = 20.0;
 /// An edge that moves by less changes no answer.
 const MOVED_S: f64 = 0.01;
 
@@ -84,7 +88,7 @@ pub fn analyse(record: &LaserRecord, experiment: &Experiment) -> Result<Analysis
     let refuse = |message: String| Error::Table { path: record.path.clone(), line: None, message };
     let bands_hz = bands_hz(experiment);
     let resolution_m = experiment.laser.as_ref().and_then(|l| l.resolution_m).unwrap_or(0.0);
-    let sample_m = sample_noise_m(&record.y_m).max(resolution_m / 12f64.sqrt());
+    let sample_m = sample_noise_m(record).max(resolution_m / 12f64.sqrt());
     let stated = experiment.light.as_ref().map_or(&[][..], |light| &light.on_s);
     let alone = Acting { grid: &grid, lamp: None, jumps_s: Vec::new(), sample_m, slow: Vec::new() };
     let mut begun = alone.begin(&bands_hz);
@@ -111,26 +115,55 @@ pub fn analyse(record: &LaserRecord, experiment: &Experiment) -> Result<Analysis
     acting = acting.with_lamp(lamp.clone());
     noise = acting.learnt(&noise, &bands_hz);
     let no_fit = || refuse("no fit of it converges; check laser.column and its unit".to_owned());
-    let (lamp, found) = searched(&grid, &noise, lamp, &first, is_stated).ok_or_else(no_fit)?;
+    let lasting = Lasting { acting: &acting, bands_hz: &bands_hz, first: &first, is_stated };
+    let (lamp, noise, found) = lasting.searched(noise, lamp).ok_or_else(no_fit)?;
     judged(&grid, &noise, &lamp, found, !is_stated).ok_or_else(no_fit)
 }
 
-/// The candidates, and again where the likeliest moves the lamp's edges: what follows the lamp slowly had been taken for a late edge.
-fn searched(grid: &Grid, noise: &Noise, lamp: Lamp, first: &Lamp, is_stated: bool) -> Option<(Lamp, Vec<Candidate>)> {
-    let setting = |lamp| Setting { grid, lamp, swings: &noise.swings, lasts_s: grid.duration_s() };
-    let bench = Bench::of(setting(&lamp), noise);
-    let found = candidates(&bench);
-    let best = &found.first()?.fit;
-    let beside: Vec<Vec<f64>> = best.members.iter().flat_map(|m| m.form.swung_columns(&m.shape, &bench.with)).collect();
-    let moved = edges::refined(grid, &beside, &noise.with_walk(best.walk_m2_s), first, is_stated);
-    let by_s = moved.edges_s.iter().zip(&lamp.edges_s).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
-    if by_s < MOVED_S {
-        return Some((lamp, found));
+/// What stays the same while candidates, noise and edges are sought in turn.
+struct Lasting<'a> {
+    acting: &'a Acting<'a>,
+    bands_hz: &'a [[f64; 2]],
+    first: &'a Lamp,
+    is_stated: bool,
+}
+
+impl Lasting<'_> {
+    /// The candidates, and again with the noise and the edges that the likeliest leaves: an effect had been taken for noise, or for a late edge.
+    fn searched(&self, mut noise: Noise, mut lamp: Lamp) -> Option<(Lamp, Noise, Vec<Candidate>)> {
+        let grid = self.acting.grid;
+        let found = |noise: &Noise, lamp: &Lamp| {
+            candidates(&Bench::of(Setting { grid, lamp, swings: &noise.swings, lasts_s: grid.duration_s() }, noise))
+        };
+        let mut all = found(&noise, &lamp);
+        for _ in 0..ROUNDS {
+            let Some((moved, learnt)) = self.led_on(&noise, &lamp, &all.first()?.fit) else { break };
+            let again = found(&learnt, &moved);
+            if again.first()?.fit.ln_evidence < all.first()?.fit.ln_evidence {
+                break;
+            }
+            (lamp, noise, all) = (moved, learnt, again);
+        }
+        Some((lamp, noise, all))
     }
-    let again = candidates(&Bench::of(setting(&moved), noise));
-    // edges that are nearer to the truth leave less
-    let better = again.first()?.fit.ln_evidence > found.first()?.fit.ln_evidence;
-    Some(if better { (moved, again) } else { (lamp, found) })
+
+    /// Edges and noise under a fit, where they differ from those that it was made with.
+    fn led_on(&self, noise: &Noise, lamp: &Lamp, best: &Fit) -> Option<(Lamp, Noise)> {
+        let grid = self.acting.grid;
+        let of = |lamp| Setting { grid, lamp, swings: &noise.swings, lasts_s: grid.duration_s() };
+        let with = of(lamp);
+        let beside: Vec<Vec<f64>> = best.members.iter().flat_map(|m| m.form.swung_columns(&m.shape, &with)).collect();
+        let moved = edges::refined(grid, &beside, &noise.with_walk(best.walk_m2_s), self.first, self.is_stated);
+        let by_s = moved.edges_s.iter().zip(&lamp.edges_s).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
+        let moved = if by_s < MOVED_S { lamp.clone() } else { moved };
+        let mut acting = self.acting.clone();
+        acting.jumps_s.clear();
+        acting.slow = std::iter::once(moved.light(grid)).chain(columns_of(&best.members, &of(&moved))).collect();
+        acting.lamp = Some(moved.clone());
+        let learnt = acting.learnt_again(noise, self.bands_hz);
+        let gained = acting.minus_two_ln(noise) - acting.minus_two_ln(&learnt);
+        (by_s >= MOVED_S || gained > GAINED).then_some((moved, learnt))
+    }
 }
 
 fn judged(grid: &Grid, noise: &Noise, lamp: &Lamp, candidates: Vec<Candidate>, lamp_found: bool) -> Option<Analysis> {
@@ -159,10 +192,18 @@ fn judged(grid: &Grid, noise: &Noise, lamp: &Lamp, candidates: Vec<Candidate>, l
     })
 }
 
-/// Standard deviation of a sample's noise from fourth differences, which no swing below a tenth of the rate survives.
-fn sample_noise_m(y_m: &[f64]) -> f64 {
-    let mut squares: Vec<f64> =
-        y_m.windows(5).map(|y| (y[0] - 4.0 * y[1] + 6.0 * y[2] - 4.0 * y[3] + y[4]).powi(2) / 70.0).collect();
+/// Standard deviation of a sample's noise: each against the cubic through its four neighbours at their own times, which no swing below a tenth of the rate survives.
+fn sample_noise_m(record: &LaserRecord) -> f64 {
+    let square = |(t, y): (&[f64], &[f64])| {
+        let share = |k: usize| {
+            let others = [0, 1, 3, 4].into_iter().filter(|j| *j != k);
+            others.map(|j| (t[2] - t[j]) / (t[k] - t[j])).product::<f64>()
+        };
+        let shares = [0, 1, 3, 4].map(|k| (share(k), y[k]));
+        let foreseen: f64 = shares.iter().map(|(share, y)| share * y).sum();
+        (y[2] - foreseen).powi(2) / (1.0 + shares.iter().map(|(share, _)| share * share).sum::<f64>())
+    };
+    let mut squares: Vec<f64> = record.t_s.windows(5).zip(record.y_m.windows(5)).map(square).collect();
     let usual = crate::statistics::median(&mut squares).unwrap_or(0.0);
     // a jump or a gap is no noise; of normal noise one in a million is left out
     let most = if usual > 0.0 { 50.0 * usual } else { f64::INFINITY };

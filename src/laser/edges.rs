@@ -1,6 +1,7 @@
 //! The lamp's edges: found in a record, or led to where the record has them.
 
 use super::filter::{Filter, Noise, Swing};
+use super::forms::FROM_ENDS_S;
 use super::grid::Grid;
 use super::lamp::Lamp;
 use super::learn::Acting;
@@ -40,7 +41,12 @@ pub fn jumps(acting: &Acting<'_>, noise: &Noise, bands_hz: &[[f64; 2]], most: us
             acting.jumps_s.iter().map(|jump| (jump - t_s).abs()).fold(lamp, f64::min)
         };
         let grid = acting.grid;
-        let inside = |cell: &usize| *cell > 2 && near(grid.time_s(*cell)) > 1.0;
+        // level and swing must be known before and after
+        let from_ends_s = |t_s: f64| (t_s - grid.start_s).min(grid.end_s() - t_s);
+        let inside = |cell: &usize| {
+            let t_s = grid.time_s(*cell);
+            near(t_s) > 1.0 && from_ends_s(t_s) > FROM_ENDS_S
+        };
         let best = (0..grid.len()).filter(inside).max_by(|a, b| scan[*a].0.total_cmp(&scan[*b].0));
         let found = best.filter(|cell| scan[*cell].0 > SEEN);
         if let Some(cell) = found {
@@ -55,10 +61,11 @@ pub fn jumps(acting: &Acting<'_>, noise: &Noise, bands_hz: &[[f64; 2]], most: us
             break;
         }
     }
-    let first = acting.before_jumps(noise.swings.len()) + before * 3;
+    let each = Acting::of_jump(noise.swings.len());
+    let first = acting.before_jumps(noise.swings.len()) + before * each;
     let Some((_, solution)) = acting.solution(&noise) else { return (Vec::new(), noise) };
     let jump = |(k, at_s): (usize, &f64)| {
-        let place = first + 3 * k;
+        let place = first + each * k;
         Jump { at_s: *at_s, size_m: solution.amplitude[place], sd_m: solution.covariance[(place, place)].sqrt() }
     };
     let mut all: Vec<Jump> = acting.jumps_s[before..].iter().enumerate().map(jump).collect();
@@ -180,6 +187,7 @@ fn sharp(lamp: &Lamp, grid: &Grid, swings: &[Swing]) -> Vec<Vec<f64>> {
 /// What may follow the lamp slowly, richly enough that none of it is taken for a late edge.
 pub fn slow_answers(lamp: &Lamp, grid: &Grid, swing: &Swing) -> Vec<Vec<f64>> {
     let heat = [0.5, 1.0, 2.0, 4.0, 8.0, 16.0, 40.0].map(|tau_s| lamp.swung_low_pass(grid, tau_s, swing));
-    let lag = [1.0, 4.0, 16.0].map(|tau_s| lamp.warm_up(grid, tau_s));
+    let lag = [1.0, 4.0, 16.0]
+        .map(|tau_s| lamp.swung(grid, &lamp.warm_up(grid, tau_s), &lamp.warm_up_all_jumps(tau_s), tau_s, swing));
     heat.into_iter().chain(lag).collect()
 }

@@ -32,6 +32,8 @@ pub struct Swing {
     pub damping: f64,
     /// Variance that its speed over ω gains, kept up by a random force (m²/s).
     pub drive_m2_s: f64,
+    /// To which side that force drives it where it drives the first swing to the positive one: 1 or −1.
+    pub sense: f64,
 }
 
 impl Swing {
@@ -50,20 +52,6 @@ impl Swing {
     /// Root mean square at which the force keeps the swing: √(q/4δ).
     pub fn kept_up_m(&self) -> f64 {
         (self.drive_m2_s / (4.0 * self.pole()[0])).sqrt()
-    }
-
-    /// Variances of both states and their covariance that the force adds in a time: ∫ exp(Aτ) (0, 1) (0, 1)ᵀ exp(Aᵀτ) dτ.
-    fn driven(&self, step_s: f64) -> [f64; 3] {
-        let [decay, turn] = self.pole();
-        let part_s = step_s / DRIVEN_PARTS as f64;
-        let mut sum = [0.0; 3];
-        for k in 0..DRIVEN_PARTS {
-            let since = (k as f64 + 0.5) * part_s;
-            let size = self.drive_m2_s * part_s * (-2.0 * decay * since).exp();
-            let (s, c) = (turn * since).sin_cos();
-            sum = [sum[0] + size * s * s, sum[1] + size * c * c, sum[2] - size * s * c];
-        }
-        sum
     }
 }
 
@@ -88,6 +76,27 @@ impl Noise {
     /// Number of states.
     pub fn states(&self) -> usize {
         1 + 2 * self.swings.len()
+    }
+
+    /// Covariance that walk and force add to the states in a time: ∫ exp(Aτ) g gᵀ exp(Aᵀτ) dτ. One force, a building that shakes the hinge, drives all swings.
+    fn driven(&self, step_s: f64) -> Matrix {
+        let mut sum = [[0.0; MOST_STATES]; MOST_STATES];
+        sum[0][0] = self.walk_m2_s * step_s;
+        let part_s = step_s / DRIVEN_PARTS as f64;
+        for part in 0..DRIVEN_PARTS {
+            let since_s = (part as f64 + 0.5) * part_s;
+            let mut driven: State = [0.0; MOST_STATES];
+            for (k, swing) in self.swings.iter().enumerate() {
+                let [decay, turn] = swing.pole();
+                let size = swing.sense * (swing.drive_m2_s * part_s).sqrt() * (-decay * since_s).exp();
+                let (s, c) = (turn * since_s).sin_cos();
+                (driven[1 + 2 * k], driven[2 + 2 * k]) = (-size * s, size * c);
+            }
+            for (row, own) in sum.iter_mut().zip(driven) {
+                row.iter_mut().zip(driven).for_each(|(cell, other)| *cell += own * other);
+            }
+        }
+        sum
     }
 }
 
@@ -121,7 +130,7 @@ impl Filter {
             p[k][k] = start;
         }
         let mut filter = Self { states, turns, cells: Vec::with_capacity(grid.len()), ln_determinant: 0.0 };
-        let driven: Vec<[f64; 3]> = noise.swings.iter().map(|swing| swing.driven(grid.step_s)).collect();
+        let driven = noise.driven(grid.step_s);
         for count in &grid.count {
             let seen = |row: &State| row[0] + row[1..states].iter().step_by(2).sum::<f64>();
             let mut gain = [0.0; MOST_STATES];
@@ -142,13 +151,13 @@ impl Filter {
                 filter.ln_determinant += variance.ln();
             }
             filter.cells.push((gain, scale));
-            filter.advance_covariance(&mut p, noise.walk_m2_s * grid.step_s, &driven);
+            filter.advance_covariance(&mut p, &driven);
         }
         filter
     }
 
     /// P ← T P Tᵀ + Q.
-    fn advance_covariance(&self, p: &mut Matrix, walked_m2: f64, driven: &[[f64; 3]]) {
+    fn advance_covariance(&self, p: &mut Matrix, driven: &Matrix) {
         for row in &mut p[..self.states] {
             self.turn(row);
         }
@@ -159,13 +168,8 @@ impl Filter {
                 p[2 + 2 * k][column] = s * a + c * b;
             }
         }
-        p[0][0] += walked_m2;
-        for (k, [own, speed, both]) in driven.iter().enumerate() {
-            let (a, b) = (1 + 2 * k, 2 + 2 * k);
-            p[a][a] += own;
-            p[b][b] += speed;
-            p[a][b] += both;
-            p[b][a] += both;
+        for (row, added) in p.iter_mut().zip(driven) {
+            row.iter_mut().zip(added).for_each(|(cell, more)| *cell += more);
         }
     }
 

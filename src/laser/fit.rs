@@ -112,6 +112,12 @@ impl<'a> Bench<'a> {
         Self { with, noise, base, still, reach_m }
     }
 
+    /// White noise of a mean over a cell.
+    pub fn cell_m(&self) -> f64 {
+        let grid = self.with.grid;
+        self.noise.white_m / (grid.count.iter().sum::<f64>() / grid.held().max(1) as f64).sqrt()
+    }
+
     /// With another walk; what was made already where there is none.
     pub fn stage(&self, walk_m2_s: f64) -> Cow<'_, Stage> {
         if walk_m2_s == 0.0 {

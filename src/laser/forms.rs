@@ -6,7 +6,8 @@
 //! | `lamp_warm_up` | lag | the push lacks exp(−t/τ) after each switch-on, nothing after a switch-off |
 //! | `gas` | pulse, train | a push only while lit, that dies away within a cycle, and from cycle to cycle by the time lit before or by their number |
 //! | `sensor_drift` | line, curve, warming, walk | in no step with the lamp: t; t and t²; 1 − exp(−t/τ) from the record's start; a random walk |
-//! | `tilt` | step, slow, creep | the support or the sensor moves: at once, not at an edge of the lamp, with a swing of its own; or warmed by the lamp within minutes; or creeping from an instant on |
+//! | `tilt` | step, slow, creep | the support or the sensor moves: at once, not at an edge of the lamp, with swings of its own; or warmed by the lamp within minutes; or creeping from an instant on |
+//! | not in the table | log_creep | ln(1 + t/s) after every edge of the lamp, as a film creeps that has no time constant of its own |
 
 use serde::Serialize;
 
@@ -36,10 +37,12 @@ pub enum Effect {
     SensorDrift,
     /// Support or sensor move.
     Tilt,
+    /// Something that is not in the table.
+    Other,
 }
 
 impl Effect {
-    /// All of the table.
+    /// The table.
     pub const ALL: [Self; 5] = [Self::Heat, Self::LampWarmUp, Self::Gas, Self::SensorDrift, Self::Tilt];
 
     /// Its name in files.
@@ -50,6 +53,7 @@ impl Effect {
             Self::Gas => "gas",
             Self::SensorDrift => "sensor_drift",
             Self::Tilt => "tilt",
+            Self::Other => "other",
         }
     }
 
@@ -61,6 +65,7 @@ impl Effect {
             Self::Gas => "gas leaves the lit face",
             Self::SensorDrift => "the sensor drifts",
             Self::Tilt => "the support tilts or the sensor moves",
+            Self::Other => "something that is not in the table",
         }
     }
 }
@@ -80,6 +85,7 @@ pub enum Form {
     Step,
     Slow,
     Creep,
+    LogCreep,
 }
 
 /// A number of a form's shape.
@@ -145,7 +151,7 @@ impl Setting<'_> {
 
 impl Form {
     /// All.
-    pub const ALL: [Self; 11] = [
+    pub const ALL: [Self; 12] = [
         Self::Warmth,
         Self::Lag,
         Self::Pulse,
@@ -157,6 +163,7 @@ impl Form {
         Self::Step,
         Self::Slow,
         Self::Creep,
+        Self::LogCreep,
     ];
 
     /// Of which effect.
@@ -167,6 +174,7 @@ impl Form {
             Self::Pulse | Self::Train => Effect::Gas,
             Self::Line | Self::Curve | Self::Warming | Self::Walk => Effect::SensorDrift,
             Self::Step | Self::Slow | Self::Creep => Effect::Tilt,
+            Self::LogCreep => Effect::Other,
         }
     }
 
@@ -184,6 +192,7 @@ impl Form {
             Self::Step => "step",
             Self::Slow => "slow",
             Self::Creep => "creep",
+            Self::LogCreep => "log_creep",
         }
     }
 
@@ -224,6 +233,7 @@ impl Form {
                 Shape { key: "from_s", unit: "s", is_logarithm: false, bounds: [with.grid.start_s, with.grid.end_s()] },
                 Shape::logarithm("time_constant_s", 0.05 * lasts_s, 3.0 * lasts_s),
             ],
+            Self::LogCreep => vec![Shape::logarithm("span_s", 0.05, 10.0)],
         }
     }
 
@@ -244,7 +254,9 @@ impl Form {
                 .flat_map(|from| between(&shapes[1], 3).into_iter().map(move |tau| vec![from, tau]))
                 .collect(),
             Self::Lag => between(&shapes[0], 9).into_iter().map(|tau| vec![tau]).collect(),
-            Self::Warming | Self::Slow => between(&shapes[0], 5).into_iter().map(|tau| vec![tau]).collect(),
+            Self::Warming | Self::Slow | Self::LogCreep => {
+                between(&shapes[0], 5).into_iter().map(|tau| vec![tau]).collect()
+            }
             Self::Line | Self::Curve | Self::Walk => vec![Vec::new()],
             Self::Step => Vec::new(),
         }
@@ -257,8 +269,17 @@ impl Form {
 
     /// Its columns with the swings that they excite and the lamp's own columns hold otherwise.
     pub fn swung_columns(self, shape: &[f64], with: &Setting<'_>) -> Vec<Vec<f64>> {
+        let Setting { grid, lamp, swings, .. } = *with;
+        let tau_s = shape.first().map_or(1.0, |x| x.exp());
+        let swung = |course: Vec<f64>, jump: Vec<f64>| vec![lamp.swung(grid, &course, &jump, tau_s, &swings[0])];
         match self {
-            Self::Warmth => vec![with.lamp.swung_low_pass(with.grid, shape[0].exp(), &with.swings[0])],
+            Self::Warmth => vec![lamp.swung_low_pass(grid, tau_s, &swings[0])],
+            Self::Lag => swung(lamp.warm_up(grid, tau_s), lamp.warm_up_all_jumps(tau_s)),
+            Self::Pulse => {
+                let store_s = shape[1].exp();
+                swung(lamp.gas(grid, tau_s, store_s), lamp.gas_jumps(tau_s, store_s))
+            }
+            Self::Train => swung(lamp.gas_train(grid, tau_s, shape[1]), lamp.gas_train_jumps(tau_s, shape[1])),
             _ => self.columns(shape, with),
         }
     }
@@ -268,9 +289,9 @@ impl Form {
         match self {
             Self::Walk => 0,
             Self::Curve => 2,
-            Self::Step => 3,
+            Self::Step => 1 + 2 * with.swings.len(),
             Self::Lag | Self::Pulse | Self::Train => 1 + 2 * RINGING.min(with.swings.len()),
-            Self::Warmth | Self::Line | Self::Warming | Self::Slow | Self::Creep => 1,
+            Self::Warmth | Self::Line | Self::Warming | Self::Slow | Self::Creep | Self::LogCreep => 1,
         }
     }
 
@@ -315,10 +336,11 @@ impl Form {
             }
             Self::Walk => Vec::new(),
             Self::Step => {
-                let [cos, sin] = rings_from(&shape[..1], grid, swing);
-                vec![step_at(shape[0], grid), cos, sin]
+                let rings = swings.iter().flat_map(|swing| rings_from(&shape[..1], grid, swing));
+                std::iter::once(step_at(shape[0], grid)).chain(rings).collect()
             }
             Self::Slow => vec![lamp.low_pass(grid, shape[0].exp())],
+            Self::LogCreep => vec![lamp.log_creep(grid, shape[0].exp())],
             Self::Creep => {
                 let (from, tau) = ((shape[0] - grid.start_s) / lasts_s, shape[1].exp() / lasts_s);
                 vec![over_time(&|x| -f64::exp_m1(-(x - from).max(0.0) / tau))]
@@ -335,7 +357,7 @@ mod tests {
     fn every_form_has_as_many_columns_as_it_says() {
         let grid = Grid { start_s: 0.0, step_s: 0.25, y_m: vec![0.0; 400], count: vec![1.0; 400], origin_m: 0.0 };
         let lamp = Lamp { edges_s: vec![10.0, 30.0, 50.0, 70.0] };
-        let swing = |hz| Swing { hz, damping: 0.01, drive_m2_s: 0.0 };
+        let swing = |hz| Swing { hz, damping: 0.01, drive_m2_s: 0.0, sense: 1.0 };
         for swings in [&[swing(1.35)][..], &[swing(1.35), swing(3.1), swing(4.8)]] {
             let with = Setting { grid: &grid, lamp: &lamp, swings, lasts_s: grid.duration_s() };
             for form in Form::ALL {

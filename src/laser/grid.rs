@@ -7,6 +7,9 @@ const RATE_HZ: f64 = 16.0;
 /// Most cells; a longer record gets wider ones.
 const MOST: f64 = 24_000.0;
 
+/// Beside a gap the samples of a cell may lie so far from its middle, of its width.
+const OFF_MIDDLE: f64 = 0.1;
+
 /// Displacements on an even grid.
 #[derive(Debug, Clone)]
 pub struct Grid {
@@ -29,7 +32,8 @@ impl Grid {
         let sample_s = crate::statistics::median_step_s(&record.t_s).unwrap_or(1.0);
         let samples = (1.0 / (RATE_HZ * sample_s)).round().max(1.0).max(((last - first) / sample_s / MOST).ceil());
         let step_s = samples * sample_s;
-        let cells = ((last - first) / step_s).floor() as usize + 1;
+        // whole cells alone
+        let cells = (((last - first) / sample_s + 1.5) / samples).floor() as usize;
         let start_s = first + 0.5 * (samples - 1.0) * sample_s;
         let mut sums = vec![[0.0; 3]; cells];
         let origin_m = crate::statistics::median(&mut record.y_m.clone()).unwrap_or(0.0);
@@ -45,11 +49,17 @@ impl Grid {
             let after = (cell + 1 < cells).then(|| mean(cell + 1))??;
             Some((after - before) / (2.0 * step_s))
         };
-        let y_m = (0..cells).map(|cell| {
+        // beside a gap there is no slope, so samples to one side of a cell's middle do not stand for it
+        let held = |cell: usize| {
             let off_s = sums[cell][1] / sums[cell][0].max(1.0);
-            mean(cell).map_or(0.0, |mean| mean - slope(cell).unwrap_or(0.0) * off_s)
-        });
-        Self { start_s, step_s, y_m: y_m.collect(), count: sums.iter().map(|s| s[0]).collect(), origin_m }
+            match slope(cell) {
+                Some(slope) => mean(cell).map(|mean| mean - slope * off_s),
+                None => mean(cell).filter(|_| off_s.abs() < OFF_MIDDLE * step_s),
+            }
+        };
+        let y_m: Vec<Option<f64>> = (0..cells).map(held).collect();
+        let count = sums.iter().zip(&y_m).map(|(sum, y)| y.map_or(0.0, |_| sum[0])).collect();
+        Self { start_s, step_s, y_m: y_m.into_iter().map(Option::unwrap_or_default).collect(), count, origin_m }
     }
 
     /// Number of cells.

@@ -138,6 +138,32 @@ impl Lamp {
             .collect()
     }
 
+    /// What an oscillator makes of a force that jumps at each edge and dies away with exp(−t/τ): κ times its course, and the swings.
+    pub fn swung(&self, grid: &Grid, course: &[f64], jump: &[f64], tau_s: f64, swing: &Swing) -> Vec<f64> {
+        let carried = swing.carried(tau_s);
+        let quarter = 1.0 / (swing.pole()[1] * tau_s);
+        let [cos, sin] = self.rings_of(grid, swing, jump);
+        course.iter().zip(cos.iter().zip(sin)).map(|(x, (c, s))| carried * (x - c + quarter * s)).collect()
+    }
+
+    /// The jumps of `warm_up` at each edge.
+    pub fn warm_up_all_jumps(&self, tau_s: f64) -> Vec<f64> {
+        let rings = self.warm_up_jumps(tau_s);
+        rings.iter().enumerate().map(|(k, jump)| if k % 2 == 0 { -1.0 } else { *jump }).collect()
+    }
+
+    /// How a film creeps by the logarithm of time: Σ ± ln(1 + t/s)/ln(1 + T/s) since every edge, T the record's length.
+    pub fn log_creep(&self, grid: &Grid, span_s: f64) -> Vec<f64> {
+        let whole = (grid.duration_s() / span_s).ln_1p();
+        self.course(grid, |t_s, i| {
+            let ratio = |pair: &[f64]| {
+                let crept = |edge: f64| (t_s - edge).max(0.0) + span_s;
+                crept(pair[0]) / pair.get(1).map_or(span_s, |off| crept(*off))
+            };
+            self.edges_s[..i.edges].chunks(2).map(ratio).product::<f64>().ln() / whole
+        })
+    }
+
     /// What a lamp that warms up lacks: −exp(−t/τ) since it went on, 0 in the dark.
     pub fn warm_up(&self, grid: &Grid, tau_s: f64) -> Vec<f64> {
         self.course(grid, |_, i| if i.is_lit { -(-i.since_s / tau_s).exp() } else { 0.0 })

@@ -19,7 +19,7 @@ const WHITE_FACTORS: [f64; 2] = [0.97, 2.0];
 /// First step of its logarithm, and sweeps over all numbers that end a descent.
 const WHITE_STEP: f64 = 0.05;
 const SWEEPS: usize = 3;
-/// Where the first swing's frequency stands among the numbers, and turns over the record by which it is tried beside where a descent has ended.
+/// Where the first swing's frequency stands among the numbers, and turns over the record by which each is tried beside where a descent has ended.
 const FIRST_HZ: usize = 2;
 const NEARBY_TURNS: [f64; 8] = [-0.6, -0.4, -0.25, -0.12, 0.12, 0.25, 0.4, 0.6];
 /// The first swing's frequency is looked for at so many places to each side, and with these damping ratios.
@@ -64,7 +64,7 @@ impl Acting<'_> {
         let mut columns = self.lamp.as_ref().map_or_else(Vec::new, rings);
         for jump in &self.jumps_s {
             columns.push(step_at(*jump, self.grid));
-            columns.extend(swings.first().map(|swing| rings_from(&[*jump], self.grid, swing)).into_iter().flatten());
+            columns.extend(swings.iter().flat_map(|swing| rings_from(&[*jump], self.grid, swing)));
         }
         columns
     }
@@ -72,6 +72,11 @@ impl Acting<'_> {
     /// Number of the columns before the jumps'.
     pub fn before_jumps(&self, swings: usize) -> usize {
         self.slow.len() + self.lamp.as_ref().map_or(0, |_| 4 * swings)
+    }
+
+    /// Number of the columns of a jump: its step and its swings.
+    pub fn of_jump(swings: usize) -> usize {
+        1 + 2 * swings
     }
 
     /// The jumps with their swings.
@@ -89,7 +94,8 @@ impl Acting<'_> {
         Some((filter, solution))
     }
 
-    fn minus_two_ln(&self, noise: &Noise) -> f64 {
+    /// −2 ln likelihood of a noise, but for a constant.
+    pub fn minus_two_ln(&self, noise: &Noise) -> f64 {
         self.solution(noise).map_or(f64::INFINITY, |(filter, solution)| solution.chi2 + filter.ln_determinant)
     }
 
@@ -101,7 +107,7 @@ impl Acting<'_> {
         Noise {
             white_m,
             walk_m2_s: 1e-4 * white_m * white_m,
-            swings: vec![Swing { hz, damping: 0.01, drive_m2_s: 1e-3 * drive }],
+            swings: vec![Swing { hz, damping: 0.01, drive_m2_s: 1e-3 * drive, sense: 1.0 }],
         }
     }
 
@@ -115,7 +121,7 @@ impl Acting<'_> {
         let of = |hz: f64, damping: f64| {
             let mut noise = from.clone();
             // kept up by a part of its size: what goes on by itself alone fits nowhere beside the very summit
-            let swing = Swing { hz: hz.clamp(band[0], band[1]), damping, drive_m2_s: 0.0 };
+            let swing = Swing { hz: hz.clamp(band[0], band[1]), damping, drive_m2_s: 0.0, sense: 1.0 };
             let drive_m2_s = 4.0 * swing.pole()[0] * (KEPT_UP * rms_m).powi(2);
             noise.swings[0] = Swing { drive_m2_s, ..swing };
             noise
@@ -146,17 +152,24 @@ impl Acting<'_> {
         let sample_m = self.sample_m;
         let with_white = |white: f64, x: &[f64]| {
             let all: Vec<f64> = std::iter::once(white).chain(x.iter().copied()).collect();
-            decode(&all, bands_hz, sample_m)
+            decode(&all, from, bands_hz, sample_m)
         };
         let (best, mut least) = descend(&coded[1..], &step, most, |x| self.minus_two_ln(&with_white(white, x)));
         let mut all: Vec<f64> = std::iter::once(white).chain(best).collect();
-        let first_hz = all[FIRST_HZ];
-        for turns in NEARBY_TURNS {
-            let mut moved = all.clone();
-            moved[FIRST_HZ] = first_hz + turns / self.grid.duration_s();
-            let lower = self.minus_two_ln(&with_white(moved[0], &moved[1..]));
-            if lower < least {
-                (least, all) = (lower, moved);
+        // the likelihood of each swing's frequency has a summit at every turn missed
+        for k in 0..from.swings.len() {
+            let place = FIRST_HZ + 3 * k;
+            let own_hz = all[place];
+            let left = self.left_of(&with_white(all[0], &all[1..]));
+            let around = strongest_hz(&left, [0.98, 1.02].map(|part| part * own_hz));
+            let nearby = NEARBY_TURNS.map(|turns| own_hz + turns / self.grid.duration_s());
+            for hz in nearby.into_iter().chain([around]) {
+                let mut moved = all.clone();
+                moved[place] = hz;
+                let lower = self.minus_two_ln(&with_white(moved[0], &moved[1..]));
+                if lower < least {
+                    (least, all) = (lower, moved);
+                }
             }
         }
         let mut step: Vec<f64> = std::iter::once(WHITE_STEP).chain(step.iter().map(|s| 0.3 * s)).collect();
@@ -183,19 +196,25 @@ impl Acting<'_> {
                 break;
             }
             let before = self.minus_two_ln(&noise);
-            let of = |x: &[f64]| {
+            let of = |x: &[f64], sense: f64| {
                 let mut with = noise.clone();
                 let damping = x[1].exp().clamp(DAMPING[0], DAMPING[1]);
-                with.swings.push(Swing { hz: x[0].clamp(band[0], band[1]), damping, drive_m2_s: x[2].exp() });
+                with.swings.push(Swing { hz: x[0].clamp(band[0], band[1]), damping, drive_m2_s: x[2].exp(), sense });
                 with
             };
             let left = self.left_of(&noise);
             let start = [strongest_hz(&left, *band), 0.01f64.ln(), (1e-4 * noise.white_m * noise.white_m).ln()];
-            let (best, after) = descend(&start, &[0.02, 0.6, 2.0], EVALUATIONS / 3, |x| self.minus_two_ln(&of(x)));
+            let led = |sense: f64| {
+                let (x, least) =
+                    descend(&start, &[0.02, 0.6, 2.0], EVALUATIONS / 3, |x| self.minus_two_ln(&of(x, sense)));
+                (of(&x, sense), least)
+            };
+            let [one, other] = [led(-1.0), led(1.0)];
+            let (with, after) = if one.1 < other.1 { one } else { other };
             if before - after < FURTHER_SWING {
                 continue;
             }
-            noise = of(&best);
+            noise = with;
         }
         noise
     }
@@ -222,7 +241,8 @@ fn code(noise: &Noise) -> Vec<f64> {
     x
 }
 
-fn decode(x: &[f64], bands_hz: &[[f64; 2]], sample_m: f64) -> Noise {
+/// `from` tells the senses of the swings, which no descent changes.
+fn decode(x: &[f64], from: &Noise, bands_hz: &[[f64; 2]], sample_m: f64) -> Noise {
     let swing = |(k, v): (usize, &[f64])| {
         let within = |band: &[f64; 2]| band[0] <= v[0] && v[0] <= band[1];
         let band = bands_hz.iter().find(|band| within(band)).unwrap_or(&bands_hz[k.min(bands_hz.len() - 1)]);
@@ -230,6 +250,7 @@ fn decode(x: &[f64], bands_hz: &[[f64; 2]], sample_m: f64) -> Noise {
             hz: v[0].clamp(band[0], band[1]),
             damping: v[1].exp().clamp(DAMPING[0], DAMPING[1]),
             drive_m2_s: v[2].exp(),
+            sense: from.swings[k].sense,
         }
     };
     Noise {

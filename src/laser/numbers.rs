@@ -28,9 +28,14 @@ impl Form {
             Self::Curve => &["linear_over_the_record", "quadratic_over_the_record"],
             Self::Step => &["size", "swing_cosine", "swing_sine"],
             Self::Walk => &[],
-            Self::Warmth | Self::Lag | Self::Pulse | Self::Train | Self::Warming | Self::Slow | Self::Creep => {
-                &["size"]
-            }
+            Self::Warmth
+            | Self::Lag
+            | Self::Pulse
+            | Self::Train
+            | Self::Warming
+            | Self::Slow
+            | Self::Creep
+            | Self::LogCreep => &["size"],
         }
     }
 }

@@ -10,6 +10,7 @@ use super::heldout::Heldout;
 use super::numbers::Quantity;
 use super::reflectivity::{Figure, figure};
 use super::verdict::{Remainder, Status};
+use crate::digits::number;
 use crate::experiment::Experiment;
 use crate::identify::estimate::NORMAL_QUANTILE;
 
@@ -267,11 +268,11 @@ impl Report {
                 names(&others)
             ),
             Status::Unknown => {
-                let line = remainder.frequency_hz.map_or(String::new(), |hz| format!(", strongest at {hz:.3} Hz"));
+                let line = remainder.frequency_hz.map_or(String::new(), |hz| format!(" at {hz:.3} Hz"));
                 format!(
-                    "Something is in the record that is not in the table: {:.3} µm rms remain beyond the noise{line}. \
-                     The push's interval is widened for it.",
-                    1e6 * remainder.rms_m
+                    "Something is in the record that is not in the table: {}{line}, {} µm rms. The push's interval is widened for it.",
+                    remainder.like.unwrap_or("more than noise"),
+                    number(1e6 * remainder.rms_m, 2)
                 )
             }
         }

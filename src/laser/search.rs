@@ -10,11 +10,9 @@ use super::solve::{Span, solve};
 const PRIOR_ODDS: f64 = 0.1;
 /// How near to an edge of the lamp no other jump is sought (s).
 pub const BESIDE_EDGE_S: f64 = 1.0;
-/// Pairs are those of the likeliest single forms with every other.
-const LEADING: usize = 4;
 /// A form whose best start takes less than this from the sum of squares cannot pay for its prior, size and shape.
 const WORTH: f64 = 5.0;
-/// A pair is led down from so many of the likeliest starts.
+/// A form alone is led down from so many of its likeliest starts, a second one from the likeliest.
 const STARTS: usize = 2;
 
 /// A candidate with its probability among all.
@@ -29,18 +27,23 @@ pub struct Candidate {
 /// All candidates, likeliest first.
 pub fn candidates(bench: &Bench<'_>) -> Vec<Candidate> {
     let Some(base) = bench.fit(Vec::new()) else { return Vec::new() };
-    let singles: Vec<Fit> = Form::ALL.par_iter().filter_map(|form| with_one_more(bench, &base, *form)).collect();
+    let still = Starts::of(bench, &bench.still);
+    let singles: Vec<Fit> =
+        Form::ALL.par_iter().filter_map(|form| with_one_more(bench, &base, *form, &still)).collect();
     let mut ranked: Vec<&Fit> = singles.iter().collect();
     ranked.sort_by(|a, b| b.ln_evidence.total_cmp(&a.ln_evidence));
     let mut pairs: Vec<(&Fit, Form)> = Vec::new();
-    for one in ranked.into_iter().take(LEADING) {
-        for other in Form::ALL {
-            if other.effect() != one.members[0].form.effect() {
-                pairs.push((one, other));
-            }
-        }
+    for (k, one) in ranked.iter().enumerate() {
+        // forms without a fit of their own come last
+        let before = |form: Form| ranked[..k].iter().any(|better| better.members[0].form == form);
+        let own = one.members[0].form.effect();
+        pairs.extend(Form::ALL.into_iter().filter(|f| f.effect() != own && !before(*f)).map(|form| (*one, form)));
     }
-    let pairs: Vec<Fit> = pairs.par_iter().filter_map(|(one, other)| with_one_more(bench, one, *other)).collect();
+    let walking =
+        singles.iter().find(|fit| fit.walk_m2_s > 0.0).map(|fit| Starts::of(bench, &bench.stage(fit.walk_m2_s)));
+    let starts_of = |one: &Fit| walking.as_ref().filter(|_| one.walk_m2_s > 0.0).unwrap_or(&still);
+    let pairs: Vec<Fit> =
+        pairs.par_iter().filter_map(|(one, other)| with_one_more(bench, one, *other, starts_of(one))).collect();
     let mut best: Vec<Fit> = vec![base];
     for fit in singles.iter().cloned().chain(pairs) {
         let forms = |fit: &Fit| {
@@ -69,10 +72,10 @@ fn weighed(fits: Vec<Fit>) -> Vec<Candidate> {
 }
 
 /// A fit with one more form, from the starts that explain most of what is left.
-fn with_one_more(bench: &Bench<'_>, fit: &Fit, form: Form) -> Option<Fit> {
+fn with_one_more(bench: &Bench<'_>, fit: &Fit, form: Form, known: &Starts) -> Option<Fit> {
     let begins_to_walk = form == Form::Walk && fit.walk_m2_s == 0.0;
     let stage = &bench.stage(if begins_to_walk { bench.noise.walk_m2_s } else { fit.walk_m2_s });
-    let tried = starts(bench, fit, form, stage).into_iter().filter_map(|shape| {
+    let tried = starts(bench, fit, form, stage, known).into_iter().filter_map(|shape| {
         let mut members = fit.members.clone();
         members.push(Member { form, shape });
         bench.fit(members)
@@ -80,23 +83,38 @@ fn with_one_more(bench: &Bench<'_>, fit: &Fit, form: Form) -> Option<Fit> {
     tried.max_by(|a, b| a.ln_evidence.total_cmp(&b.ln_evidence))
 }
 
-fn starts(bench: &Bench<'_>, fit: &Fit, form: Form, stage: &Stage) -> Vec<Vec<f64>> {
+/// The starts of every form on a stage, each with its first column, whitened.
+struct Starts(Vec<(Form, Vec<f64>, Vec<f64>)>);
+
+impl Starts {
+    fn of(bench: &Bench<'_>, stage: &Stage) -> Self {
+        let with = &bench.with;
+        let shapes: Vec<(Form, Vec<f64>)> = Form::ALL
+            .into_iter()
+            .flat_map(|form| form.starts(with).into_iter().map(move |shape| (form, shape)))
+            .collect();
+        let whitened = |(form, shape): (Form, Vec<f64>)| {
+            let white = form.columns(&shape, with).first().map(|column| stage.filter.whiten(column));
+            white.map(|white| (form, shape, white))
+        };
+        Self(shapes.into_par_iter().filter_map(whitened).collect())
+    }
+}
+
+fn starts(bench: &Bench<'_>, fit: &Fit, form: Form, stage: &Stage, known: &Starts) -> Vec<Vec<f64>> {
     if form == Form::Walk {
         return vec![Vec::new()];
     }
     if form == Form::Step {
         return jumps_of(bench, fit, stage).into_iter().map(|at_s| vec![at_s]).collect();
     }
-    let all = form.starts(&bench.with);
     let members = bench.whitened(stage, &fit.members);
     let columns: Vec<&[f64]> = stage.base.iter().chain(&members).map(Vec::as_slice).collect();
     let span = Span::of(&columns, stage.y.len());
     let left = left_on(&columns, stage, fit);
-    let gain = |shape: &Vec<f64>| {
-        let white = stage.filter.whiten(&form.columns(shape, &bench.with)[0]);
-        span.gain(&white, &left)
-    };
-    let mut ranked: Vec<(f64, Vec<f64>)> = all.into_iter().map(|shape| (gain(&shape), shape)).collect();
+    let own = known.0.iter().filter(|(of, ..)| *of == form);
+    let mut ranked: Vec<(f64, Vec<f64>)> =
+        own.map(|(_, shape, white)| (span.gain(white, &left), shape.clone())).collect();
     ranked.sort_by(|a, b| b.0.total_cmp(&a.0));
     ranked.truncate(if ranked.first().is_some_and(|best| best.0 > WORTH) { ranked.len() } else { 0 });
     let mut kept: Vec<Vec<f64>> = Vec::new();
@@ -106,11 +124,15 @@ fn starts(bench: &Bench<'_>, fit: &Fit, form: Form, stage: &Stage) -> Vec<Vec<f6
         if !kept.iter().any(is_near) {
             kept.push(shape);
         }
-        if kept.len() == STARTS {
+        if kept.len() == most_starts(fit) {
             break;
         }
     }
     kept
+}
+
+fn most_starts(fit: &Fit) -> usize {
+    if fit.members.is_empty() { STARTS } else { 1 }
 }
 
 fn left_on(columns: &[&[f64]], stage: &Stage, fit: &Fit) -> Vec<f64> {
@@ -135,7 +157,7 @@ fn jumps_of(bench: &Bench<'_>, fit: &Fit, stage: &Stage) -> Vec<f64> {
         if found.iter().all(|other| (other - at_s).abs() > 2.0) {
             found.push(at_s);
         }
-        if found.len() == STARTS {
+        if found.len() == most_starts(fit) {
             break;
         }
     }

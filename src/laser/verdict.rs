@@ -37,9 +37,11 @@ pub enum Status {
 pub struct Remainder {
     /// The probability that something does.
     pub present: f64,
+    /// What it looks like, where it matters.
+    pub like: Option<&'static str>,
     /// Frequency of the strongest line, where there is one.
     pub frequency_hz: Option<f64>,
-    /// Its root mean square, in cells of the grid.
+    /// Its root mean square.
     pub rms_m: f64,
     /// Innovations over what noise leaves.
     pub over_noise: f64,
@@ -92,7 +94,7 @@ pub fn verdict(bench: &Bench<'_>, candidates: &[Candidate], adequacy: &Adequacy)
     }
     class.sort();
     class.dedup();
-    let stands = adequacy.adequate;
+    let stands = adequacy.adequate && !effects.contains(&Effect::Other);
     let status = match (stands, effects.is_empty(), likely >= CERTAIN && class == effects) {
         (false, _, _) => Status::Unknown,
         (true, true, _) if likely >= 0.5 => Status::Adequate,
@@ -112,18 +114,36 @@ fn remainder(bench: &Bench<'_>, candidates: &[Candidate], adequacy: &Adequacy) -
     let best = &candidates[0].fit;
     let base = candidates.iter().find(|c| c.fit.members.is_empty()).map_or(best.chi2, |c| c.fit.chi2);
     let held = bench.with.grid.held() as f64;
-    let over_noise = (best.chi2 / held).sqrt();
-    let excess = (best.chi2 - held).max(0.0);
-    let cell_m = bench.noise.white_m / (bench.with.grid.count.iter().sum::<f64>() / held).sqrt();
-    let line = adequacy.tests.iter().min_by(|a, b| a.p_value.total_cmp(&b.p_value));
-    let frequency_hz = line.filter(|t| !adequacy.adequate && t.looks_for.contains("spectrum")).and_then(|t| t.at);
+    let left = adequacy.left();
+    let frequency_hz = left.filter(|t| t.looks_for.contains("spectrum")).and_then(|t| t.at);
+    let crept_m = crept_m(bench, best);
+    let found_m = left.map_or(0.0, |test| test.rms_m);
+    let rms_m = found_m.max(crept_m);
+    let chi2 = held * (rms_m / bench.cell_m()).powi(2);
     Remainder {
-        present: 1.0 - adequacy.p_value,
+        present: (1.0 - adequacy.p_value).max(inclusion(candidates, Effect::Other)),
+        like: if crept_m > found_m { Some("a creep with the logarithm of time") } else { left.map(|t| t.looks_for) },
         frequency_hz,
-        rms_m: cell_m * (excess / held).sqrt(),
-        over_noise,
-        share: if base > held { excess / (base - held).max(excess).max(f64::MIN_POSITIVE) } else { 0.0 },
+        rms_m,
+        over_noise: (best.chi2 / held).sqrt(),
+        share: (chi2 / (base - held).max(chi2).max(f64::MIN_POSITIVE)).min(1.0),
     }
+}
+
+/// Root mean square, about its mean, of what a candidate holds that is not in the table.
+fn crept_m(bench: &Bench<'_>, fit: &Fit) -> f64 {
+    let mut place = bench.base.len();
+    let mut sum_m2 = 0.0;
+    for member in &fit.members {
+        if member.form.effect() == Effect::Other {
+            let column = member.form.columns(&member.shape, &bench.with).swap_remove(0);
+            let mean = column.iter().sum::<f64>() / column.len() as f64;
+            let variance = column.iter().map(|v| (v - mean).powi(2)).sum::<f64>() / column.len() as f64;
+            sum_m2 += fit.amplitude[place].powi(2) * variance;
+        }
+        place += member.form.count(&bench.with);
+    }
+    sum_m2.sqrt()
 }
 
 /// The measurement that splits a class.
@@ -153,12 +173,18 @@ impl Verdict {
     pub fn push(&self, bench: &Bench<'_>, candidates: &[Candidate], cycles_m: &[[f64; 2]]) -> [f64; 2] {
         let [push, sd] = mixed_push(candidates);
         if self.status != Status::Unknown {
-            return [push, sd];
+            // what remains, though it does not matter, may be part of the push
+            return [push, sd.hypot(self.remainder.rms_m)];
         }
-        let walking = bench.fit_on(&bench.stage(bench.noise.walk_m2_s), Vec::new());
+        let walking = bench.fit_on(&bench.stage(bench.noise.walk_m2_s), candidates[0].fit.members.clone());
         let [other, other_sd] = walking.map_or([push, sd], |fit| fit.push());
         let over = self.remainder.over_noise.max(1.0);
-        [push, [over * sd, other_sd, (push - other).abs(), scatter_m(cycles_m)].into_iter().fold(0.0, f64::max)]
+        [
+            push,
+            [(over * sd).hypot(self.remainder.rms_m), other_sd, (push - other).abs(), scatter_m(cycles_m)]
+                .into_iter()
+                .fold(0.0, f64::max),
+        ]
     }
 }
 
