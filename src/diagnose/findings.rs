@@ -45,7 +45,7 @@ impl<'a> Findings<'a> {
     pub fn named(&self) -> &Refit<'a> {
         match self.verdict.status {
             Status::Adequate => self.posterior.base(),
-            _ => self.posterior.of(&self.verdict.effects).unwrap_or(self.posterior.best()),
+            _ => self.posterior.best(),
         }
     }
 

@@ -273,8 +273,8 @@ pub struct LawSettings {
     pub nothing_left: f64,
     /// A term whose effect on the angles has this cosine with that of another, or of a name, is the same under another name (judgement).
     pub the_same: f64,
-    /// A term of the grammar whose torque along the motion has this cosine with that of a law of the table is that law (judgement: they differ by a seventh; the linear
-    /// and the quadratic drag of a swing that does not decay have 0.98).
+    /// A term of the grammar with the shape of a law of the table, whose torque along the motion has this cosine with that law's, is that law (judgement: they differ
+    /// by less than a third; friction that is gone at a fifth of the largest speed has 0.5).
     pub the_same_law: f64,
     /// The foremost terms, each of which is paired with every one that promises less (cost).
     pub paired: usize,
@@ -438,7 +438,7 @@ impl Default for LawSettings {
         Self {
             nothing_left: 1e-3,
             the_same: 0.999,
-            the_same_law: 0.99,
+            the_same_law: 0.95,
             paired: 12,
             fewest: 2,
             most: 6,

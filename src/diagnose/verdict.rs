@@ -78,7 +78,11 @@ impl Verdict {
             let leaves_little = left_of_excess(best, posterior.base()) < settings.prior.imitated_down_to;
             let predicts = proof.is_some_and(|proof| proof.leaves() <= settings.verdict.proven);
             let likely = posterior.likelier_than_not(settings);
-            let stand = !likely.is_empty() && (leaves_little || predicts);
+            // where another law takes the place of the name that explains most, the others may complete what is not there
+            let leading = posterior.by_what_they_explain(best).first().copied();
+            let is_replaced =
+                posterior.needed.iter().any(|own| Some(own.0) == leading && own.1 < settings.verdict.even);
+            let stand = !likely.is_empty() && !is_replaced && (leaves_little || predicts);
             return if stand {
                 Self::standing(&likely, posterior, marks, settings)
             } else {

@@ -98,8 +98,14 @@ impl Findings<'_> {
         let Some(left) = fit.residuals(0) else { return String::new() };
         let rms = |values: &[f64]| (values.iter().map(|v| v * v).sum::<f64>() / values.len().max(1) as f64).sqrt();
         let over_noise = fit.over_noise();
+        let others = |effect: &&Effect| !self.verdict.effects.contains(effect);
+        let beside: Vec<Effect> = fit.hypothesis.effects.iter().filter(others).copied().collect();
+        let with = match &beside[..] {
+            [] => "That".to_owned(),
+            some => format!("Together with {}, less sure, that", words(some)),
+        };
         let mut words = format!(
-            " That takes {} of what the base model leaves beyond the noise; {} mrad remain, {} times the noise",
+            " {with} takes {} of what the base model leaves beyond the noise; {} mrad remain, {} times the noise",
             percent_of_all(self.explained()),
             number(1e3 * rms(&left.rmse_rad), 2),
             number(over_noise, 2)

@@ -117,11 +117,27 @@ pub fn needed(order: &[Described<'_>], best: &Refit<'_>, effect: Effect, the_sam
     let weights = normalised(&order.iter().map(|own| -own.length).collect::<Vec<f64>>());
     let own = torque_of_effect(best, effect);
     let is_it = |term: &Term| {
+        if !is_of_kind(term, effect) {
+            return false;
+        }
         let torques = own.as_ref().zip(torque_of_term(best, term));
         torques.is_some_and(|(own, other)| own.dot(&other) > the_same_law * own.norm() * other.norm())
     };
     let has_it = |own: &Described<'_>| own.fit.hypothesis.has(effect) || own.terms.iter().any(is_it);
     order.iter().zip(weights).filter(|(own, _)| has_it(own)).map(|(_, weight)| weight).sum()
+}
+
+/// Whether a term has the state and the shape of an effect's law: dry friction may weaken with speed.
+fn is_of_kind(term: &Term, effect: Effect) -> bool {
+    let shapes: &[&str] = match effect {
+        Effect::HingeCoulomb | Effect::JointHysteretic => &["sign", "sign that fades with speed"],
+        Effect::HingeViscous | Effect::AirLinear | Effect::HingeStiffness => &["in proportion"],
+        Effect::AirQuadratic => &["square with its sign"],
+        Effect::JointCubicStiffness => &["cube"],
+        _ => &[],
+    };
+    let of_angle = matches!(effect, Effect::HingeStiffness | Effect::JointCubicStiffness);
+    shapes.contains(&term.shape) && (term.state == "angle") == of_angle
 }
 
 /// The torques on the links along a fit's motion, one instant after another.

@@ -11,7 +11,7 @@
 //! P(name | something remains) = Σ exp(−L) of the fits with it / Σ exp(−L) of all
 //! ```
 //!
-//! A term whose torque along the motion is that of a name's law, but for a tenth, is that law: dry friction that reverses smoothly is dry friction.
+//! A term that has the shape of a name's law, and nearly its torque along the motion, is that law: dry friction that reverses smoothly is dry friction.
 //! 5. Of the shortest the one stands that leaves least of what was not fitted, or nearly so, if that is clearly less than the names do.
 //!
 //! | file | holds |

@@ -143,11 +143,6 @@ impl<'a> Search<'a, '_> {
         // the small swings at the end part the losses
         let whole = self.context.on(&self.prepared.records);
         let asked = asked_for(&whole, self.base(), &self.effects, self.context.settings.search.asked);
-        if std::env::var("WEAK").is_ok() {
-            for a in &asked {
-                eprintln!("asked {:?} {:.4} {:?}", a.hypothesis.effects, a.leaves, a.start);
-            }
-        }
         asked.into_iter().map(|asked| Proposal::Asked(asked, self.base())).collect()
     }
 
