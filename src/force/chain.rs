@@ -28,7 +28,7 @@ impl LitChain {
     /// The chain, with the spring that the strip's hinge has; none where the strip is clamped, which a chain cannot be.
     ///
     /// # Errors
-    /// [`Error::Simulation`].
+    /// [`crate::Error::Simulation`].
     pub fn of(setup: &Setup) -> Result<Option<Self>> {
         let mut experiment = setup.experiment.clone();
         if experiment.rig.support == Support::Clamped {
@@ -47,7 +47,7 @@ impl LitChain {
     /// How far light moves a point along x (m).
     ///
     /// # Errors
-    /// [`Error::Simulation`].
+    /// [`crate::Error::Simulation`].
     pub fn moved_m(&self, beam: &Beam, s_m: f64) -> Result<f64> {
         let lit_rad = self.model.rest_rad(self.dark_rad.clone(), |theta, torque, stiffness| {
             add_push(self.model.chain(), beam, theta, torque, stiffness);

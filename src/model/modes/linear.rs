@@ -26,7 +26,7 @@ impl Linearised {
     /// and dry friction are left out.
     ///
     /// # Errors
-    /// [`Error::Simulation`] when the specimen cannot swing or has no rest position near the vertical.
+    /// [`crate::Error::Simulation`] when the specimen cannot swing or has no rest position near the vertical.
     pub fn of(experiment: &Experiment) -> Result<Self> {
         let model = ForwardModel::still(experiment)?;
         let (n, hidden) = (model.chain().count(), model.rates() - model.chain().count());
