@@ -155,10 +155,10 @@ impl Answer {
         let verdict = &findings.verdict;
         let settings = findings.context.settings;
         // the format gives two names; what a rig has beside them stands by itself
-        let mut explaining = findings.posterior.by_what_they_explain(findings.posterior.best());
-        explaining.retain(|effect| verdict.effects.contains(effect));
-        explaining.extend(verdict.effects.iter().filter(|effect| !findings.posterior.best().hypothesis.has(**effect)));
-        let main: Vec<Effect> = explaining.into_iter().take(settings.search.main_effects).collect();
+        let explaining = findings.named_effects();
+        let others = verdict.effects.iter().filter(|effect| !explaining.contains(effect));
+        let explaining_first = explaining.iter().filter(|effect| verdict.effects.contains(effect)).chain(others);
+        let main: Vec<Effect> = explaining_first.take(settings.search.main_effects).copied().collect();
         let (effects, further_effects) = verdict.effects.iter().partition(|effect| main.contains(effect));
         Self {
             status: verdict.status,
@@ -170,10 +170,7 @@ impl Answer {
             uncertified: findings.posterior.uncertified.clone(),
             class_probability: verdict.class_probability,
             unknown_probability: verdict.unknown,
-            inclusion: Effect::ALL
-                .iter()
-                .map(|effect| (effect.id(), findings.posterior.inclusion(*effect, settings)))
-                .collect(),
+            inclusion: findings.posterior.inclusions(settings).into_iter().map(|(e, p)| (e.id(), p)).collect(),
             remainder: Remainder::of(findings),
             law: findings.learnt.as_ref().and_then(LearntLaw::of),
             statement: findings.verdict_statement(),

@@ -73,7 +73,7 @@ impl<'a> FitContext<'a> {
     }
 
     /// The problem of a hypothesis, and its variables from another fit and some given values.
-    fn start(&self, hypothesis: &Hypothesis, near: &Refit<'_>, start: &Start) -> Option<(Problem<'a>, Vec<f64>)> {
+    pub fn start(&self, hypothesis: &Hypothesis, near: &Refit<'_>, start: &Start) -> Option<(Problem<'a>, Vec<f64>)> {
         let problem = self.problem(hypothesis, &self.noise_of(near)).ok()?;
         let mut x = problem.start_values().ok()?;
         for (value, parameter) in x.iter_mut().zip(&problem.free) {
@@ -125,37 +125,33 @@ impl<'a> FitContext<'a> {
     pub fn refit_along(&self, hypothesis: &Hypothesis, leader: &Refit<'_>, start: &Start) -> Option<Refit<'a>> {
         let motions: Vec<Vec<Vec<f64>>> =
             (0..self.records.len()).map(|record| states_along(leader, record)).collect::<Option<_>>()?;
-        self.drawn_along(hypothesis, leader, start, |_, record, row| motions[record][row].clone())
+        self.drawn_along(hypothesis, leader, start, |record, row| motions[record][row].clone())
     }
 
     /// A fit from given coefficients and the starts that the recordings show; where that motion falls out of step, along the recorded motion.
     pub fn refit_along_recording(&self, hypothesis: &Hypothesis, near: &Refit<'_>, start: &Start) -> Option<Refit<'a>> {
-        let seen = |reach_s: f64, record: usize, row: usize| -> Vec<f64> {
-            let seen = self.records[record].state_near(row, reach_s);
-            [0, 1].iter().flat_map(|part| seen.iter().map(move |state| state[*part])).collect()
-        };
         let (problem, mut x) = self.start(hypothesis, near, start)?;
         x.truncate(problem.free.len());
         let reach_s = STATE_NEAR / problem.model(0, &x).ok()?.0.pace_rad_s();
-        x.extend((0..self.records.len()).flat_map(|record| seen(reach_s, record, 0)));
+        let seen = |record: usize, row: usize| self.records[record].start_near(row, reach_s);
+        x.extend((0..self.records.len()).flat_map(|record| seen(record, 0)));
         let straight = self.descend(hypothesis, problem, x, self.settings.descent.few_steps);
         let in_step = straight.filter(|fit| fit.left_share() < self.settings.misfit.out_of_step);
         in_step.or_else(|| self.drawn_along(hypothesis, near, start, seen))
     }
 
-    /// Stretches that begin in given states (by how far around a row to look, recording and row), drawn together into one motion.
+    /// Stretches that begin in the states at given rows of the recordings, drawn together into one motion.
     fn drawn_along(
         &self,
         hypothesis: &Hypothesis,
         near: &Refit<'_>,
         start: &Start,
-        state: impl Fn(f64, usize, usize) -> Vec<f64>,
+        state: impl Fn(usize, usize) -> Vec<f64>,
     ) -> Option<Refit<'a>> {
         let (mut problem, x) = self.start(hypothesis, near, start)?;
         let (noise, accuracy) = (problem.noise.clone(), problem.accuracy);
         let parameters = &x[..problem.free.len()];
-        let reach_s = STATE_NEAR / problem.model(0, parameters).ok()?.0.pace_rad_s();
-        let x = shooting_along(&mut problem, parameters, |record, row| state(reach_s, record, row)).ok()?.x;
+        let x = shooting_along(&mut problem, parameters, state).ok()?.x;
         (problem.noise, problem.accuracy) = (noise, accuracy);
         self.descend_by(self.descent(self.settings.descent.most_steps), hypothesis, problem, x)
     }

@@ -156,6 +156,8 @@ pub struct Entry {
     /// The part of its own torque by which its law may be wrong before something unknown is suspected beside it. That of a hysteresis is larger: how it goes
     /// over from spring to slip has as many forms as there are authors.
     pub law_error: f64,
+    /// Shapes of the grammar's terms that are this law, of the angle where it goes with the position, of the rate elsewhere.
+    pub shapes: &'static [&'static str],
     /// Whether it can stop a swing, at an instant that no derivative foretells.
     pub can_stop: bool,
     /// What a problem needs beyond its coefficients being free.
@@ -197,13 +199,30 @@ impl SetUp<'_> {
     }
 }
 
+/// Shapes of springs and dampers.
+const PROPORTIONAL: &[&str] = &["in proportion"];
+/// Shapes of dry friction, which may weaken with speed.
+const DRY: &[&str] = &["sign", "sign that fades with speed"];
 /// Of a law that is right to this part of its torque.
 const EXACT: f64 = 0.002;
 
 const fn entry(parameters: &'static [Parameter], place: Place, acts: Acts, words: &'static str) -> Entry {
     let (cost, needs, law_error) = (Cost::Ordinary, Needs::Nothing, EXACT);
     let set_up: fn(&mut SetUp<'_>) = |_| {};
-    Entry { id: "", parameters, place, phase: None, cost, acts, needs, law_error, can_stop: false, set_up, words }
+    Entry {
+        id: "",
+        parameters,
+        place,
+        phase: None,
+        cost,
+        acts,
+        needs,
+        law_error,
+        shapes: &[],
+        can_stop: false,
+        set_up,
+        words,
+    }
 }
 
 const fn position(entry: Entry) -> Entry {
@@ -241,11 +260,19 @@ static TABLE: [Entry; 17] = {
                 "a lag of θ2 behind θ1 (rolling shutter, filter)",
             ))
         },
-        velocity(entry(&[P::HingeViscous], Hinge, Loss, "viscous friction of the hinge")),
-        Entry { can_stop: true, ..velocity(entry(&[P::HingeCoulomb], Hinge, Loss, "dry friction of the hinge")) },
-        position(entry(&[P::HingeStiffness], Hinge, Pace, "a spring at the hinge")),
+        Entry {
+            shapes: PROPORTIONAL,
+            ..velocity(entry(&[P::HingeViscous], Hinge, Loss, "viscous friction of the hinge"))
+        },
+        Entry {
+            can_stop: true,
+            shapes: DRY,
+            ..velocity(entry(&[P::HingeCoulomb], Hinge, Loss, "dry friction of the hinge"))
+        },
+        Entry { shapes: PROPORTIONAL, ..position(entry(&[P::HingeStiffness], Hinge, Pace, "a spring at the hinge")) },
         Entry {
             needs: Needs::Joint,
+            shapes: &["cube"],
             ..position(entry(&[P::JointCubicStiffness], Joint, Pace, "a joint whose stiffness changes with the bend"))
         },
         Entry {
@@ -260,8 +287,14 @@ static TABLE: [Entry; 17] = {
             needs: Needs::Spring,
             ..position(entry(&[P::RestCurl], Joint, Otherwise, "a strip that is curled at rest"))
         },
-        velocity(entry(&[P::AirLinear], Air, Loss, "air drag in proportion to speed")),
-        velocity(entry(&[P::AirQuadratic], Air, Loss, "air drag in proportion to speed squared")),
+        Entry {
+            shapes: PROPORTIONAL,
+            ..velocity(entry(&[P::AirLinear], Air, Loss, "air drag in proportion to speed"))
+        },
+        Entry {
+            shapes: &["square with its sign"],
+            ..velocity(entry(&[P::AirQuadratic], Air, Loss, "air drag in proportion to speed squared"))
+        },
         position(entry(&[P::AddedMass], Air, Pace, "air that swings along")),
         entry(&[P::SideForce], Air, Otherwise, "a steady side force (light, a draught)"),
         Entry {

@@ -28,8 +28,6 @@ pub struct Candidate<'a> {
     pub if_named: f64,
     /// Posterior of these names, whatever remains beside them: what they stand for is not asked.
     pub in_layers: f64,
-    /// The odds that these names are what has been filmed, and stand for nothing else.
-    pub genuine: f64,
 }
 
 /// Hypotheses beside the unknown.
@@ -100,7 +98,6 @@ pub fn weigh<'a>(fits: Vec<Refit<'a>>, effects: usize, settings: &Settings) -> P
             probability: probability[place],
             if_named: if_named[place],
             in_layers: in_layers[place],
-            genuine: genuine[place],
         })
         .collect();
     // where the unknown takes all, or next to all, their order among themselves still counts
@@ -234,7 +231,7 @@ impl<'a> Posterior<'a> {
 
     /// How probable an effect is, over all sets of names that hold it, whatever remains beside them: as the fits of the table say, and where something remains as
     /// the laws say that may stand in its place.
-    pub fn inclusion(&self, effect: Effect, settings: &Settings) -> f64 {
+    fn inclusion(&self, effect: Effect, settings: &Settings) -> f64 {
         let others: Vec<&Refit<'_>> = self.candidates.iter().map(|c| &c.fit).collect();
         let genuine = |fit: &Refit<'_>| {
             let explaining = self.by_what_they_explain(fit);
@@ -250,13 +247,9 @@ impl<'a> Posterior<'a> {
         needed.map_or(of_table, beside)
     }
 
-    /// The effects that are more probable than not, the most probable first: the median probability model (Barbieri and Berger, Annals of Statistics 32 (2004)
-    /// 870), which of all sets predicts best where none takes all.
-    pub fn likelier_than_not(&self, settings: &Settings) -> Vec<(Effect, f64)> {
-        let all = Effect::ALL.into_iter().map(|effect| (effect, self.inclusion(effect, settings)));
-        let mut likely: Vec<(Effect, f64)> = all.filter(|own| own.1 > settings.verdict.even).collect();
-        likely.sort_by(|a, b| b.1.total_cmp(&a.1));
-        likely
+    /// How probable each effect of the table is.
+    pub fn inclusions(&self, settings: &Settings) -> Vec<(Effect, f64)> {
+        Effect::ALL.into_iter().map(|effect| (effect, self.inclusion(effect, settings))).collect()
     }
 
     /// A fit's effects, the one that explains most first: without which it would be worst.

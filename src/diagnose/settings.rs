@@ -121,7 +121,7 @@ pub struct SearchSettings {
     pub inertia_share: f64,
     /// … and its centre of mass to this one (judgement: balanced on an edge, to a few millimetres in a tenth of a metre).
     pub com_share: f64,
-    /// Sets of each number of laws that are fitted because the recorded motion asks for them (cost).
+    /// Sets of the largest number of laws that is worth its coefficients which are fitted because the recorded motion asks for them (cost).
     pub asked: usize,
     /// Fits from which pairs are built (cost).
     pub pair_seeds: usize,

@@ -18,7 +18,7 @@ pub enum Taken {
 impl Taken {
     /// How a search takes the file at first: at its word, and loosely only if much is left then; loosely at once where there is no time for both.
     pub fn at_first(experiment: &Experiment, marks: usize, is_dear: bool) -> Self {
-        if is_dear && has_slack(experiment, marks) { Self::Loosely } else { Self::AtItsWord }
+        if is_dear && lacks_a_damper(experiment, marks) { Self::Loosely } else { Self::AtItsWord }
     }
 }
 
@@ -37,16 +37,15 @@ pub fn base_of(
     let mut beliefs = Vec::new();
     if !experiment.specimen.links.is_empty() {
         let model = ForwardModel::of(experiment)?;
-        let uncertain: &[Parameter] = match marks {
-            1 => &[Parameter::FirstInertia],
-            _ => &[Parameter::FirstInertia, Parameter::FirstCom, Parameter::SecondInertia, Parameter::SecondCom],
-        };
-        for parameter in uncertain {
-            let value = model.value(*parameter).unwrap_or(0.0);
-            let is_inertia = matches!(parameter, Parameter::FirstInertia | Parameter::SecondInertia);
-            let share = if is_inertia { settings.inertia_share } else { settings.com_share };
-            base.push(*parameter);
-            beliefs.push(Belief { parameter: *parameter, value, sd: share * value.abs().max(1e-12) });
+        let (inertia, com) = (settings.inertia_share, settings.com_share);
+        let first = [(Parameter::FirstInertia, inertia), (Parameter::FirstCom, com)];
+        let second = [(Parameter::SecondInertia, inertia), (Parameter::SecondCom, com)];
+        // of one link only the pace is seen
+        let uncertain = if marks == 1 { first[..1].to_vec() } else { [first, second].concat() };
+        for (parameter, share) in uncertain {
+            let value = model.value(parameter).unwrap_or(0.0);
+            base.push(parameter);
+            beliefs.push(Belief { parameter, value, sd: share * value.abs().max(1e-12) });
         }
     }
     Ok((base, beliefs))
@@ -55,13 +54,13 @@ pub fn base_of(
 /// The base model's parameters with the geometry as stated.
 pub fn stated(experiment: &Experiment, marks: usize, taken: Taken) -> Vec<Parameter> {
     let mut base = base_parameters(experiment, marks);
-    if taken == Taken::AtItsWord && has_slack(experiment, marks) {
+    if taken == Taken::AtItsWord && lacks_a_damper(experiment, marks) {
         base.retain(|parameter| *parameter != Parameter::HingeViscous);
     }
     base
 }
 
 /// Whether the file of a single link, which has no joint, states no damper: neither the hinge's nor a C.
-pub fn has_slack(experiment: &Experiment, marks: usize) -> bool {
+pub fn lacks_a_damper(experiment: &Experiment, marks: usize) -> bool {
     marks == 1 && !experiment.model.states_damping && experiment.model.effects.hinge_viscous.is_none()
 }

@@ -3,6 +3,7 @@
 use super::effect::Effect;
 use super::heldout::HeldOut;
 use super::posterior::{Candidate, Posterior, left_of_excess};
+use super::refit::Refit;
 use super::settings::Settings;
 
 /// What the recordings say.
@@ -77,14 +78,15 @@ impl Verdict {
             let best = posterior.best();
             let leaves_little = left_of_excess(best, posterior.base()) < settings.prior.imitated_down_to;
             let predicts = proof.is_some_and(|proof| proof.leaves() <= settings.verdict.proven);
-            let likely = posterior.likelier_than_not(settings);
+            let inclusions = posterior.inclusions(settings);
+            let is_likely = inclusions.iter().any(|own| own.1 > settings.verdict.even);
             // where another law takes the place of the name that explains most, the others may complete what is not there
             let leading = posterior.by_what_they_explain(best).first().copied();
             let is_replaced =
                 posterior.needed.iter().any(|own| Some(own.0) == leading && own.1 < settings.verdict.even);
-            let stand = !likely.is_empty() && !is_replaced && (leaves_little || predicts);
+            let stand = is_likely && !is_replaced && (leaves_little || predicts);
             return if stand {
-                Self::standing(&likely, posterior, marks, settings)
+                Self::standing(&inclusions, best, marks, settings)
             } else {
                 nothing(Status::Unknown, unknown)
             };
@@ -101,16 +103,16 @@ impl Verdict {
         self.status == Status::Unknown || self.unknown >= self.class_probability && !names_stand
     }
 
-    /// Names beside which something remains, and the class of what the recordings do not tell from them.
-    fn standing(likely: &[(Effect, f64)], posterior: &Posterior<'_>, marks: usize, settings: &Settings) -> Self {
-        let least = likely.iter().map(|own| own.1).fold(1.0, f64::min);
-        let is_clear = least >= settings.verdict.alone && posterior.best().is_certified(&settings.certificate);
-        let mut effects: Vec<Effect> = likely.iter().map(|own| own.0).collect();
-        effects.sort_unstable();
+    /// Names beside which something remains: the effects that are more probable than not, which is the median probability model (Barbieri and Berger, Annals of
+    /// Statistics 32 (2004) 870), that of all sets predicts best where none takes all; and the class of what the recordings do not tell from them.
+    fn standing(inclusions: &[(Effect, f64)], best: &Refit<'_>, marks: usize, settings: &Settings) -> Self {
+        let from = |least: f64| inclusions.iter().filter(move |own| own.1 > least);
+        let least = from(settings.verdict.even).map(|own| own.1).fold(1.0, f64::min);
+        let is_clear = least >= settings.verdict.alone && best.is_certified(&settings.certificate);
+        let effects: Vec<Effect> = from(settings.verdict.even).map(|own| own.0).collect();
         let mut class = effects.clone();
         if !is_clear {
-            let possible = |effect: &Effect| posterior.inclusion(*effect, settings) > settings.verdict.told_apart;
-            class.extend(Effect::ALL.into_iter().filter(|effect| !effects.contains(effect)).filter(possible));
+            class.extend(from(settings.verdict.told_apart).map(|own| own.0).filter(|effect| !effects.contains(effect)));
         }
         Self {
             status: if is_clear { Status::Identified } else { Status::Ambiguous },

@@ -88,6 +88,12 @@ impl Record {
         self.theta_rad.iter().map(|angles| angles[rows.clone()].iter().flatten().count()).sum()
     }
 
+    /// Angles at a row, then their rates ([`Self::state_near`]).
+    pub fn start_near(&self, row: usize, reach_s: f64) -> Vec<f64> {
+        let near = self.state_near(row, reach_s);
+        [0, 1].iter().flat_map(|part| near.iter().map(move |state| state[*part])).collect()
+    }
+
     /// Angle and rate of each link at a row, from a cubic through the values nearby; the rms of what the cubic leaves comes third.
     /// Where nothing was measured nearby, the nearest value at rest.
     pub fn state_near(&self, row: usize, reach_s: f64) -> Vec<[f64; 3]> {

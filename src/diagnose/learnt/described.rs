@@ -4,7 +4,7 @@ use nalgebra::DVector;
 use rayon::prelude::*;
 
 use super::super::context::FitContext;
-use super::super::effect::Effect;
+use super::super::effect::{Effect, Phase};
 use super::super::evidence::{Scatter, normalised};
 use super::super::grammar::Term;
 use super::super::hypothesis::Hypothesis;
@@ -112,65 +112,75 @@ fn described(fitted: Vec<(Vec<Term>, Refit<'_>)>) -> Option<Vec<Described<'_>>> 
     Some(order)
 }
 
-/// The probability of a name among all descriptions: of those that have it, and of those with a term that does what it does.
-pub fn needed(order: &[Described<'_>], best: &Refit<'_>, effect: Effect, the_same_law: f64) -> f64 {
+/// The probability of each name of a fit among all descriptions: of those that have it, and of those with a term that does what it does.
+pub fn needed(order: &[Described<'_>], best: &Refit<'_>, the_same_law: f64) -> Vec<(Effect, f64)> {
     let weights = normalised(&order.iter().map(|own| -own.length).collect::<Vec<f64>>());
-    let own = torque_of_effect(best, effect);
-    let is_it = |term: &Term| {
-        if !is_of_kind(term, effect) {
-            return false;
-        }
-        let torques = own.as_ref().zip(torque_of_term(best, term));
-        torques.is_some_and(|(own, other)| own.dot(&other) > the_same_law * own.norm() * other.norm())
+    let along = Along::of(best);
+    let of_name = |effect: &Effect| {
+        let own = along.as_ref().and_then(|along| along.of_effect(best, *effect));
+        let is_it = |term: &Term| {
+            if !is_of_kind(term, *effect) {
+                return false;
+            }
+            let torques = own.as_ref().zip(along.as_ref().and_then(|along| along.of_term(term)));
+            torques.is_some_and(|(own, other)| own.dot(&other) > the_same_law * own.norm() * other.norm())
+        };
+        let has_it = |own: &Described<'_>| own.fit.hypothesis.has(*effect) || own.terms.iter().any(is_it);
+        let with = order.iter().zip(&weights).filter(|(own, _)| has_it(own));
+        (*effect, with.map(|(_, weight)| weight).sum())
     };
-    let has_it = |own: &Described<'_>| own.fit.hypothesis.has(effect) || own.terms.iter().any(is_it);
-    order.iter().zip(weights).filter(|(own, _)| has_it(own)).map(|(_, weight)| weight).sum()
+    best.hypothesis.effects.iter().map(of_name).collect()
 }
 
-/// Whether a term has the state and the shape of an effect's law: dry friction may weaken with speed.
+/// Whether a term has the state and the shape of an effect's law.
 fn is_of_kind(term: &Term, effect: Effect) -> bool {
-    let shapes: &[&str] = match effect {
-        Effect::HingeCoulomb | Effect::JointHysteretic => &["sign", "sign that fades with speed"],
-        Effect::HingeViscous | Effect::AirLinear | Effect::HingeStiffness => &["in proportion"],
-        Effect::AirQuadratic => &["square with its sign"],
-        Effect::JointCubicStiffness => &["cube"],
-        _ => &[],
-    };
-    let of_angle = matches!(effect, Effect::HingeStiffness | Effect::JointCubicStiffness);
-    shapes.contains(&term.shape) && (term.state == "angle") == of_angle
+    let entry = effect.entry();
+    entry.shapes.contains(&term.shape) && (term.state == "angle") == (entry.phase == Some(Phase::Position))
 }
 
-/// The torques on the links along a fit's motion, one instant after another.
-fn along(fit: &Refit<'_>, torque: impl Fn(&ForwardModel, &Motion, &mut [f64])) -> Option<DVector<f64>> {
-    let mut all = Vec::new();
-    for record in 0..fit.problem.records.len() {
-        let (model, swing, true_s) = fit.motion(record)?;
-        let links = model.chain().count();
-        for t_s in true_s {
-            let state = swing.at(t_s);
-            let motion = model.motion(t_s, &state.theta_rad, &state.omega_rad_s);
-            let mut q = vec![0.0; model.rates()];
-            torque(&model, &motion, &mut q);
-            all.extend_from_slice(&q[..links]);
-        }
+/// A fit's motion through every recording, row after row.
+struct Along(Vec<(ForwardModel, Vec<Motion>)>);
+
+impl Along {
+    fn of(fit: &Refit<'_>) -> Option<Self> {
+        let of_record = |record: usize| {
+            let (model, swing, true_s) = fit.motion(record)?;
+            let at = |t_s: &f64| {
+                let state = swing.at(*t_s);
+                model.motion(*t_s, &state.theta_rad, &state.omega_rad_s)
+            };
+            let motions = true_s.iter().map(at).collect();
+            Some((model, motions))
+        };
+        (0..fit.problem.records.len()).map(of_record).collect::<Option<_>>().map(Self)
     }
-    Some(DVector::from_vec(all))
-}
 
-/// Of an effect of a fit, in the direction in which it acts.
-fn torque_of_effect(fit: &Refit<'_>, effect: Effect) -> Option<DVector<f64>> {
-    let parameter = effect.parameters()[0];
-    let sign = fit.value(parameter)?.signum();
-    along(fit, |model, motion, q| {
-        let mut partials = Partials::zero(model.chain().count(), model.rates());
-        model.partials(motion, &mut partials);
-        model.sensitivity(parameter, motion, &partials, q);
-        q.iter_mut().for_each(|q| *q *= sign);
-    })
-}
+    /// Torques on the links, one instant after another.
+    fn torques(&self, torque: impl Fn(&ForwardModel, &Motion, &mut [f64])) -> DVector<f64> {
+        let mut all = Vec::new();
+        for (model, motion) in self.0.iter().flat_map(|(model, motions)| motions.iter().map(move |m| (model, m))) {
+            let mut q = vec![0.0; model.rates()];
+            torque(model, motion, &mut q);
+            all.extend_from_slice(&q[..model.chain().count()]);
+        }
+        DVector::from_vec(all)
+    }
 
-/// Of a term with its coefficients.
-fn torque_of_term(fit: &Refit<'_>, term: &Term) -> Option<DVector<f64>> {
-    let formula = Formula::of(&term.law)?;
-    along(fit, |model, motion, q| formula.add_torque(model.chain(), motion, q))
+    /// Of an effect of the fit, in the direction in which it acts.
+    fn of_effect(&self, fit: &Refit<'_>, effect: Effect) -> Option<DVector<f64>> {
+        let parameter = effect.parameters()[0];
+        let sign = fit.value(parameter)?.signum();
+        Some(self.torques(|model, motion, q| {
+            let mut partials = Partials::zero(model.chain().count(), model.rates());
+            model.partials(motion, &mut partials);
+            model.sensitivity(parameter, motion, &partials, q);
+            q.iter_mut().for_each(|q| *q *= sign);
+        }))
+    }
+
+    /// Of a term with its coefficients.
+    fn of_term(&self, term: &Term) -> Option<DVector<f64>> {
+        let formula = Formula::of(&term.law)?;
+        Some(self.torques(|model, motion, q| formula.add_torque(model.chain(), motion, q)))
+    }
 }

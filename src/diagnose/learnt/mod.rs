@@ -46,9 +46,6 @@ pub fn beside<'a>(
     let is_worth = posterior.remains > context.settings.verdict.even && !context.is_strip();
     let order = if is_worth { descriptions(context, posterior.best()) } else { None };
     let Some(order) = order else { return (Needed::new(), None) };
-    let best = posterior.best();
-    let the_same_law = context.settings.law.the_same_law;
-    let of_name = |effect: &Effect| (*effect, needed(&order, best, *effect, the_same_law));
-    let needed = best.hypothesis.effects.iter().map(of_name).collect();
+    let needed = needed(&order, posterior.best(), context.settings.law.the_same_law);
     (needed, proof.and_then(|proof| best_proven(context, &order, proof, from_s)))
 }

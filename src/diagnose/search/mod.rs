@@ -32,7 +32,7 @@ use super::refit::{Refit, least, least_chi2, merged};
 use super::rods;
 use super::screen::{Score, Screen};
 use super::settings::Settings;
-use super::taken::{Taken, has_slack};
+use super::taken::{Taken, lacks_a_damper};
 use crate::error::Result;
 use crate::experiment::Experiment;
 use crate::fit::whitening::RecordNoise;
@@ -179,8 +179,8 @@ impl<'a, 'p> Search<'a, 'p> {
         let enough = self.up_to(self.context.settings.search.shares.certified);
         let loosened = || {
             (self.context.work.done() < enough).then_some(())?;
-            let has_slack = has_slack(self.context.experiment, self.context.marks());
-            (!self.is_loose && has_slack && self.leaves_more_than_noise()).then_some(())?;
+            let lacks_a_damper = lacks_a_damper(self.context.experiment, self.context.marks());
+            (!self.is_loose && lacks_a_damper && self.leaves_more_than_noise()).then_some(())?;
             let (experiment, settings) = (self.context.experiment, self.context.settings);
             let mut loosened =
                 Self::of_base_model(self.prepared, experiment, Taken::Loosely, settings, self.progress).ok()?;

@@ -53,23 +53,21 @@ pub struct Asked {
 pub fn asked_for(context: &FitContext<'_>, base: &Refit<'_>, effects: &[Effect], each: usize) -> Vec<Asked> {
     let laws: Vec<Effect> = effects.iter().copied().filter(|effect| has_torque(*effect)).collect();
     let of_all = Hypothesis { effects: laws.clone(), dropped: None };
-    let Ok(problem) = context.problem(&of_all, &base.problem.noise) else { return Vec::new() };
+    let Some((problem, x)) = context.start(&of_all, base, &[]) else { return Vec::new() };
+    let values = &x[..problem.free.len()];
+    let Ok((model, camera)) = problem.model(0, values) else { return Vec::new() };
     let value = |p: &Parameter| base.value(*p).unwrap_or(0.0);
-    let known: Vec<Parameter> = context.base.iter().copied().filter(|p| !is_of_camera(*p)).collect();
+    let known: Vec<Parameter> = context.base.iter().copied().filter(|p| camera.value(*p).is_none()).collect();
     let allowed = known.iter().copied().chain(OF_CAMERA.map(|(parameter, _)| parameter));
     let columns: Vec<Parameter> = allowed.chain(laws.iter().map(|law| law.parameters()[0])).collect();
-    let start = |p: &Parameter| if known.contains(p) { value(p) } else { start_of(&problem, *p) };
-    let values: Vec<f64> = problem.free.iter().map(start).collect();
-    let Some(blocks) = weighed(context, &problem, &values, &columns) else { return Vec::new() };
+    let modes_hz = modes_hz(&problem, values);
+    let Some(blocks) = modes_hz.and_then(|hz| weighed(context, &model, hz, &columns)) else { return Vec::new() };
     let of_column = |p: &Parameter| {
         let of_camera = OF_CAMERA.iter().find(|(parameter, _)| parameter == p).map(|(_, sd)| (0.0, *sd));
         let belief = context.beliefs.iter().find(|belief| belief.parameter == *p);
         let belief = belief.map(|belief| (belief.value, belief.sd));
-        Column {
-            from: if known.contains(p) { value(p) } else { 0.0 },
-            is_not_negative: p.is_not_negative(),
-            belief: belief.or(of_camera),
-        }
+        let from = if of_camera.is_some() { 0.0 } else { value(p) };
+        Column { from, is_not_negative: p.is_not_negative(), belief: belief.or(of_camera) }
     };
     let squares = LeastSquares::of(blocks, columns.iter().map(of_column).collect());
     let asked = |set: Set| {
@@ -88,38 +86,24 @@ fn has_torque(effect: Effect) -> bool {
     matches!(entry.cost, Cost::Ordinary | Cost::Corners) && entry.acts != Acts::Motion && entry.place != Place::Camera
 }
 
-fn is_of_camera(parameter: Parameter) -> bool {
-    matches!(
-        parameter,
-        Parameter::TimeBase
-            | Parameter::DroppedFrames
-            | Parameter::CameraTilt
-            | Parameter::AngleGain
-            | Parameter::DifferentialLag
-    )
-}
-
-/// A law that is off has no torque; what only shapes a law keeps its value.
-fn start_of(problem: &Problem<'_>, parameter: Parameter) -> f64 {
-    let believed = problem.beliefs.iter().find(|belief| belief.parameter == parameter);
-    if parameter.is_proportional() { 0.0 } else { believed.map_or(0.0, |belief| belief.value) }
-}
-
 /// Torques and powers of all recordings, and their derivatives with some parameters; `None` where the frames do not show the motion.
-fn weighed(context: &FitContext<'_>, problem: &Problem<'_>, values: &[f64], of: &[Parameter]) -> Option<Vec<Block>> {
-    let (model, _) = problem.model(0, values).ok()?;
+fn weighed(
+    context: &FitContext<'_>,
+    model: &ForwardModel,
+    [slowest_hz, fastest_hz]: [f64; 2],
+    of: &[Parameter],
+) -> Option<Vec<Block>> {
     let n = model.chain().count();
     if n != context.marks() {
         return None;
     }
-    let [slowest_hz, fastest_hz] = modes_hz(problem, values)?;
     let (half_s, period_s) = (HALF_WIDTH / fastest_hz, 1.0 / slowest_hz);
     let yield_rad = context.yield_rad().0;
     let (mut by_link, mut power) = (vec![Vec::new(); n], Vec::new());
     for record in context.records {
-        let instants = instants(&model, record, half_s, yield_rad);
+        let instants = instants(model, record, half_s, yield_rad);
         let torques: Vec<(f64, DMatrix<f64>)> =
-            instants.iter().map(|motion| (motion.t_s, torques(&model, motion, of))).collect();
+            instants.iter().map(|motion| (motion.t_s, torques(model, motion, of))).collect();
         for (link, rows) in by_link.iter_mut().enumerate() {
             bumps(&torques, half_s, |_, torques| torques.row(link).transpose(), rows);
         }
