@@ -42,7 +42,14 @@ impl Case {
                 theta_rad[link].push(Some(angle_rad + noise.sample(&mut random)));
             }
         }
-        Record { path: "simulated".into(), relative_sd: vec![vec![1.0; rows]; links], t_s, theta_rad, in_step: 0.0 }
+        Record {
+            path: "simulated".into(),
+            relative_sd: vec![vec![1.0; rows]; links],
+            t_s,
+            theta_rad,
+            in_step: 0.0,
+            continues: false,
+        }
     }
 }
 

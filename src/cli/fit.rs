@@ -10,7 +10,7 @@ use super::table::{Table, number, paragraph};
 use crate::error::{Error, Result};
 use crate::experiment::Experiment;
 use crate::fit::{self, Fit, Pace, Record, Seen, Verdict};
-use crate::model::{ForwardModel, Parameter};
+use crate::model::{Chain, ForwardModel, Parameter};
 use crate::output::OutputFile;
 use crate::progress::Progress;
 
@@ -103,7 +103,8 @@ impl FitArgs {
 /// The parameters a fit leaves free: those of the base model, with the user's changes.
 fn free_parameters(experiment: &Experiment, marks: usize, more: &[String], fix: &[String]) -> Result<Vec<Parameter>> {
     let stated = experiment.model.law.iter().flat_map(|law| law.coefficients().map(|(parameter, _)| parameter));
-    let known: Vec<Parameter> = Parameter::ALL.into_iter().chain(stated).collect();
+    let of_links = Chain::of(&experiment.specimen)?.parameters();
+    let known: Vec<Parameter> = Parameter::ALL.into_iter().chain(of_links).chain(stated).collect();
     let parse = |id: &String| {
         let nearest = || {
             known

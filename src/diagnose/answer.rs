@@ -188,7 +188,7 @@ impl Proof {
         Some(Self {
             from_s: held_out.from_s,
             recording: findings.context.records[held_out.record].path.clone(),
-            whole_recording: findings.context.records.len() > 1,
+            whole_recording: findings.context.recordings() > 1,
             baseline_rmse_rad: held_out.baseline.rmse_rad.clone(),
             augmented_rmse_rad: of_learnt.unwrap_or_else(|| named_rmse_rad.clone()),
             named_rmse_rad,
@@ -205,12 +205,12 @@ impl Drawn {
             let after = if named.hypothesis.effects.is_empty() { &held_out.baseline } else { &held_out.augmented };
             Some((held_out.baseline.left.clone()?, after.left.clone()?, Some(held_out.from_s)))
         });
-        let fitted = || Some((base.residuals(0)?, named.residuals(0)?, None));
+        let fitted = || Some((base.residuals_of_first()?, named.residuals_of_first()?, None));
         let (before, after, border_s) = predicted.or_else(fitted)?;
         let effects = named.hypothesis.effects.clone();
         let learnt = findings.learnt.as_ref().and_then(|learnt| match border_s {
             Some(_) => learnt.prediction.left.clone(),
-            None => learnt.fit.residuals(0),
+            None => learnt.fit.residuals_of_first(),
         });
         Some(Self {
             learnt,
@@ -232,5 +232,5 @@ fn quantities(fit: &Refit<'_>, of: &[Parameter]) -> Vec<(Parameter, Quantity)> {
 }
 
 fn rmse_rad(fit: &Refit<'_>) -> Vec<f64> {
-    fit.residuals(0).map(|left| left.rmse_rad).unwrap_or_default()
+    fit.residuals_of_first().map(|left| left.rmse_rad).unwrap_or_default()
 }

@@ -118,6 +118,16 @@ impl<'a> FitContext<'a> {
         self.base.contains(&Parameter::BendingStiffness)
     }
 
+    /// Whether a recording is cut in pieces with starts of their own.
+    pub fn is_in_pieces(&self) -> bool {
+        self.records.iter().any(|record| record.continues)
+    }
+
+    /// Number of recordings.
+    pub fn recordings(&self) -> usize {
+        self.records.iter().filter(|record| !record.continues).count()
+    }
+
     /// Number of angles.
     pub fn marks(&self) -> usize {
         self.records.first().map_or(0, Record::links)

@@ -9,7 +9,7 @@ use crate::experiment::Experiment;
 use crate::fit::descent::Descent;
 use crate::fit::shooting::{STATE_NEAR, multiple_shooting, shooting_along};
 use crate::fit::whitening::RecordNoise;
-use crate::fit::{Problem, straight};
+use crate::fit::{Problem, Record, straight};
 use crate::model::Parameter;
 use crate::model::observe::{chord_angles_rad, chord_slopes};
 
@@ -97,11 +97,12 @@ impl<'a> FitContext<'a> {
     /// The noise by which a fit was judged, of these recordings.
     pub fn noise_of(&self, fit: &Refit<'_>) -> Vec<RecordNoise> {
         let of = &fit.problem;
-        if of.records.iter().map(|record| &record.path).eq(self.records.iter().map(|record| &record.path)) {
-            return of.noise.clone();
-        }
-        let place = |path: &std::path::Path| of.records.iter().position(|own| own.path == path).unwrap_or(0);
-        self.records.iter().map(|record| of.noise[place(&record.path)].clone()).collect()
+        let place = |record: &Record| {
+            let of_same = || of.records.iter().enumerate().filter(|(_, own)| own.path == record.path);
+            let same_start = of_same().find(|(_, own)| own.t_s.first() == record.t_s.first());
+            same_start.or_else(|| of_same().next()).map_or(0, |(place, _)| place)
+        };
+        self.records.iter().map(|record| of.noise[place(record)].clone()).collect()
     }
 
     /// Fits a hypothesis from the start values of the experiment, by multiple shooting first: for a base model whose motion is out of step.

@@ -130,8 +130,14 @@ mod tests {
     fn a_law_of_no_size_is_none_however_much_is_left_without_it() {
         let t_s: Vec<f64> = (0..30).map(|k| k as f64 / 30.0).collect();
         let theta_rad = vec![vec![Some(0.1); 30]; 2];
-        let records =
-            [Record { path: "made".into(), theta_rad, relative_sd: vec![vec![1.0; 30]; 2], t_s, in_step: 0.0 }];
+        let records = [Record {
+            path: "made".into(),
+            theta_rad,
+            relative_sd: vec![vec![1.0; 30]; 2],
+            t_s,
+            in_step: 0.0,
+            continues: false,
+        }];
         let scatter = Scatter { of_values: 5.0, of_all: 5.0 };
         let needed = |torque_n_m: f64| {
             ln_evidence(&with_friction(&records, torque_n_m), scatter, |_| 1e6, &PriorSettings::default(), 9.0)

@@ -8,7 +8,7 @@ use super::misfit::{is_beyond_noise, leaves_more_than_noise};
 use super::posterior::{Posterior, weigh};
 use super::refit::Refit;
 use super::search::horizon::continued_alone;
-use crate::fit::{Belief, Problem, Record, Residuals, residuals_of};
+use crate::fit::{Belief, Problem, Record, Residuals, recordings, residuals_of};
 
 /// A frozen coefficient may move by this part of itself.
 const FROZEN: f64 = 1e-9;
@@ -76,6 +76,7 @@ pub fn predicted(context: &FitContext<'_>, fit: &Refit<'_>, from_s: Option<f64>)
     let fit = plain(fit);
     match border(context, from_s)? {
         Border::Row(rows, _) => along(context, &fit, rows),
+        Border::Piece(pieces, _) => beyond(context, &fit, pieces),
         Border::Record(last) => across(context, &fit, last),
     }
 }
@@ -91,6 +92,7 @@ fn held_out(
     let (baseline, augmented) = rayon::join(|| predicted(context, null, from_s), of_fits);
     let (record, from_s) = match border(context, from_s) {
         Some(Border::Row(_, border_s)) => (0, border_s),
+        Some(Border::Piece(_, border_s)) => (0, border_s),
         Some(Border::Record(last)) => (last, context.records[last].t_s[0]),
         None => return vec![None; fits.len()],
     };
@@ -104,17 +106,24 @@ fn held_out(
 enum Border {
     /// A single recording from this row, and this stamp, on.
     Row(usize, f64),
-    /// This one of several recordings.
+    /// A single recording in pieces, so many of which are fitted, up to this stamp.
+    Piece(usize, f64),
+    /// This one of several recordings, or its first piece.
     Record(usize),
 }
 
 fn border(context: &FitContext<'_>, from_s: Option<f64>) -> Option<Border> {
-    if context.records.len() > 1 {
-        return Some(Border::Record(context.records.len() - 1));
+    if context.recordings() > 1 {
+        return recordings(context.records).last().map(|pieces| Border::Record(pieces.start));
     }
-    let record = context.records.first()?;
-    let (first_s, last_s) = (record.t_s[0], record.t_s[record.len() - 1]);
+    let (record, last) = (context.records.first()?, context.records.last()?);
+    let (first_s, last_s) = (record.t_s[0], last.t_s[last.len() - 1]);
     let border_s = from_s.unwrap_or(first_s + context.settings.verdict.fitted * (last_s - first_s));
+    if context.is_in_pieces() {
+        // whole pieces are fitted
+        let fitted = context.records.partition_point(|piece| piece.t_s[0] <= border_s).checked_sub(1)?;
+        return (fitted > 0).then(|| Border::Piece(fitted, context.records[fitted].t_s[0]));
+    }
     let rows = record.t_s.partition_point(|t| *t < border_s);
     let is_long = |rows: usize| rows >= crate::series::FEWEST_ROWS;
     (is_long(rows) && is_long(record.len() - rows)).then_some(Border::Row(rows, border_s))
@@ -141,13 +150,32 @@ fn along(context: &FitContext<'_>, fit: &Refit<'_>, rows: usize) -> Option<Predi
     Some(Prediction { rmse_rad, left: residuals_of(&whole, &refitted.x, 0).ok() })
 }
 
+/// The pieces up to the border are fitted; from the last of them on all is predicted as one motion.
+fn beyond(context: &FitContext<'_>, fit: &Refit<'_>, pieces: usize) -> Option<Prediction> {
+    let early = context.on(&context.records[..pieces]);
+    let (mut near, free, starts) = (fit.clone(), fit.problem.free.len(), 2 * fit.problem.shapes());
+    near.x.truncate(free + pieces * starts);
+    let fitted = early.refit(&fit.hypothesis, &near, &[])?;
+    let last = pieces - 1;
+    let rest = [Record::joined(&context.records[last..])?];
+    let onwards = context.on(&rest);
+    let hypothesis = Hypothesis { dropped: fit.hypothesis.dropped.filter(|d| d.0 < last), ..fit.hypothesis.clone() };
+    let problem = onwards.problem(&hypothesis, &onwards.noise_of(fit)).ok()?;
+    let x = [&fitted.x[..free], &fitted.x[free + last * starts..]].concat();
+    let rmse_rad = errors(&problem.predict(0, &x, false).ok()?.values, &rest[0], context.records[last].len())?;
+    let before = (0..last).map(|piece| fitted.residuals(piece));
+    let left = before.chain([residuals_of(&problem, &x, 0).ok()]).collect::<Option<_>>().and_then(Residuals::joined);
+    Some(Prediction { rmse_rad, left })
+}
+
 fn across(context: &FitContext<'_>, fit: &Refit<'_>, last: usize) -> Option<Prediction> {
     let others = context.on(&context.records[..last]);
-    let alone = context.on(&context.records[last..]);
-    let starts = 2 * fit.problem.shapes();
+    let whole = [Record::joined(&context.records[last..])?];
+    let alone = context.on(&whole);
+    let (starts, start) = (2 * fit.problem.shapes(), fit.problem.start_of(last));
     let hypothesis = Hypothesis { dropped: fit.hypothesis.dropped.filter(|d| d.0 < last), ..fit.hypothesis.clone() };
     let mut near = fit.clone();
-    near.x.truncate(fit.x.len() - starts);
+    near.x.truncate(start);
     let fitted = others.refit(&hypothesis, &near, &[])?;
     // on the last one only the start is free
     let frozen: Vec<Belief> = (fitted.problem.free.iter().zip(&fitted.x))
@@ -156,12 +184,12 @@ fn across(context: &FitContext<'_>, fit: &Refit<'_>, last: usize) -> Option<Pred
     let alone = FitContext { beliefs: frozen, ..alone };
     let noise = vec![fit.problem.noise[last].clone()];
     let problem = Problem { records: alone.records, noise, ..fitted.problem.clone() };
-    let mut start = Refit { problem, ..fitted.clone() };
-    start.x.truncate(fitted.problem.free.len());
-    start.x.extend_from_slice(&fit.x[fit.x.len() - starts..]);
+    let mut begun = Refit { problem, ..fitted.clone() };
+    begun.x.truncate(fitted.problem.free.len());
+    begun.x.extend_from_slice(&fit.x[start..start + starts]);
     let hypothesis = Hypothesis { dropped: None, ..hypothesis };
-    let seen = alone.refit(&hypothesis, &start, &[])?;
-    let rmse_rad = errors(&seen.problem.predict(0, &seen.x, false).ok()?.values, &context.records[last], 0)?;
+    let seen = alone.refit(&hypothesis, &begun, &[])?;
+    let rmse_rad = errors(&seen.problem.predict(0, &seen.x, false).ok()?.values, &whole[0], 0)?;
     Some(Prediction { rmse_rad, left: None })
 }
 

@@ -5,7 +5,7 @@ use super::posterior::Posterior;
 use super::refit::Refit;
 use super::settings::Settings;
 use super::unknowns::place_of_all;
-use crate::fit::{Residuals, Verdict};
+use crate::fit::{Residuals, Verdict, recordings};
 
 /// Where something unknown acts: sought around the base model, near the effect that explains most.
 pub fn place_of_unknown(posterior: &Posterior<'_>, settings: &Settings) -> Option<Place> {
@@ -28,9 +28,12 @@ pub struct Departure {
 
 /// The departure of the base model.
 pub fn departure(null: &Refit<'_>) -> Departure {
-    for record in 0..null.problem.records.len() {
-        let Some(residuals) = null.residuals(record) else { continue };
-        let Ok((model, _)) = null.problem.model(record, &null.x[..null.problem.free.len()]) else { continue };
+    for pieces in recordings(null.problem.records) {
+        let first = pieces.start;
+        let residuals =
+            pieces.map(|piece| null.residuals(piece)).collect::<Option<Vec<_>>>().and_then(Residuals::joined);
+        let Some(residuals) = residuals else { continue };
+        let Ok((model, _)) = null.problem.model(first, &null.x[..null.problem.free.len()]) else { continue };
         let window_s = std::f64::consts::TAU / model.pace_rad_s();
         let verdict = Verdict::of(&residuals, window_s);
         let wrong: Vec<_> = verdict.windows.iter().filter(|w| w.links.iter().any(|l| l.misfit)).collect();

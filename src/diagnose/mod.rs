@@ -4,7 +4,7 @@
 //! |---|---|---|
 //! | 1 | the recordings are prepared: outliers, noise, where the base model's descent starts | [`preparation`] |
 //! | 2 | the base model is fitted | [`taken`], [`base`], [`context`], [`refit`], [`descents`], [`noise`], [`learnt_noise`] |
-//! | 3 | what it lacks is sought: effects are proposed, fitted, kept | [`mod@search`], [`screen`], [`weak_form`], [`misfit`], [`laws`] |
+//! | 3 | what it lacks is sought: effects are proposed, fitted, kept | [`mod@search`], [`screen`], [`stretches`], [`misfit`], [`laws`] |
 //! | 4 | a strip's rods are counted | [`rods`] |
 //! | 5 | the hypotheses are weighed, beside something that is not in the table | [`posterior`], [`evidence`], [`bag`], [`unknowns`], [`latent`], [`basis_law`] |
 //! | 6 | in doubt the search goes on, and they are weighed again | [`mod@search`], [`search::horizon`] |
@@ -49,11 +49,12 @@ pub mod rods;
 pub mod screen;
 pub mod search;
 pub mod settings;
+pub mod stretches;
 pub mod taken;
 pub mod torque;
 pub mod unknowns;
 pub mod verdict;
-pub mod weak_form;
+
 pub mod words;
 
 use std::sync::OnceLock;
@@ -64,6 +65,7 @@ use crate::fit::Record;
 use crate::progress::Progress;
 use findings::Findings;
 use posterior::Posterior;
+use preparation::Prepared;
 use search::Search;
 
 pub use adequacy::Detectable;
@@ -95,7 +97,7 @@ pub fn diagnose(
     options: &Options,
     progress: &dyn Progress,
 ) -> Result<Diagnosis> {
-    let (settings, counted) = (&options.settings, OnceLock::new());
+    let (settings, counted, pieces) = (&options.settings, OnceLock::new(), OnceLock::new());
     // 1. the recordings
     progress.begin("preparation", None);
     let prepared = preparation::prepare(records, experiment, settings)?;
@@ -108,7 +110,7 @@ pub fn diagnose(
     // 4. a strip's rods
     let search = search.recounted(&counted)?;
     // 5. how probable each hypothesis is, and 6. in doubt, further
-    let (search, posterior) = weighed(search, settings, progress);
+    let (search, posterior) = weighed(search, &pieces, settings, progress);
     let Search { context, effects, fits, rounds, undecided, .. } = search;
     // 7. what was not fitted
     progress.begin("proof", None);
@@ -143,6 +145,7 @@ pub fn diagnose(
 /// followed from the beginning.)
 fn weighed<'a, 'p>(
     search: Search<'a, 'p>,
+    pieces: &'a OnceLock<Prepared>,
     settings: &Settings,
     progress: &dyn Progress,
 ) -> (Search<'a, 'p>, Posterior<'a>) {
@@ -155,7 +158,7 @@ fn weighed<'a, 'p>(
     match at_once {
         Some(posterior) if is_strip || posterior.unknown <= settings.verdict.even => (search, posterior),
         _ => {
-            let search = search.doubted();
+            let search = search.doubted(pieces);
             let posterior = weigh(&search);
             (search, posterior)
         }

@@ -8,10 +8,15 @@ use crate::experiment::Experiment;
 use crate::fit::noise::noise_rad;
 use crate::fit::problem::step_error_rad;
 use crate::fit::search::{End, best_end, seen_starts};
+use crate::fit::shooting::STATE_NEAR;
 use crate::fit::whitening::{Colour, RecordNoise};
 use crate::fit::{Problem, Record, Seen, refuse_another_pace};
 use crate::model::{Parameter, Work};
 use crate::progress::Silent;
+use crate::series::FEWEST_ROWS;
+
+/// Of fewer pieces none would be left to be predicted.
+const FEWEST_PIECES: usize = 3;
 
 /// What the recordings, cleaned of outliers, are held against.
 pub struct Prepared {
@@ -36,6 +41,40 @@ pub struct Prepared {
 }
 
 impl Prepared {
+    /// The same with every recording cut in pieces of some swings at a pace, integrated as exactly as is worth it where models leave far more than noise; `None`
+    /// where that makes fewer than three of each.
+    pub fn in_pieces(&self, settings: &Settings, pace_rad_s: f64) -> Option<Self> {
+        let (swings, beyond) = (settings.search.piece_swings, settings.noise.beyond);
+        let least_rad = self.noise.iter().flat_map(|own| &own.sd_rad).copied().fold(f64::INFINITY, f64::min);
+        let (length_s, reach_s) = (swings * std::f64::consts::TAU / pace_rad_s, STATE_NEAR / pace_rad_s);
+        let (mut records, mut noise, mut starts) = (Vec::new(), Vec::new(), Vec::new());
+        for (record, own_noise) in self.records.iter().zip(&self.noise) {
+            let pieces = record.cut(((record.t_s[record.len() - 1] - record.t_s[0]) / length_s) as usize);
+            if pieces.len() < FEWEST_PIECES || pieces.iter().any(|piece| piece.len() < FEWEST_ROWS) {
+                return None;
+            }
+            let mut row = 0;
+            for piece in pieces {
+                starts.extend(record.start_near(row, reach_s));
+                row += piece.len();
+                noise.push(own_noise.clone());
+                records.push(piece);
+            }
+        }
+        let begun = |x: &[f64]| [&x[..self.base.len()], &starts].concat();
+        Some(Self {
+            part: 1.0,
+            begun: begun(&self.begun),
+            ended: begun(&self.ended),
+            experiment: self.experiment.clone(),
+            base: self.base.clone(),
+            work: self.work.clone(),
+            step_error_rad: step_error_rad(beyond * least_rad),
+            records,
+            noise,
+        })
+    }
+
     /// How a search takes the file at first.
     pub fn taken_at_first(&self) -> Taken {
         let marks = self.records.first().map_or(0, Record::links);

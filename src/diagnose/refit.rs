@@ -6,7 +6,7 @@ use super::hypothesis::Hypothesis;
 use super::settings::CertificateSettings;
 use crate::fit::descent::{Ending, Outcome};
 use crate::fit::problem::stacked;
-use crate::fit::{Problem, Residuals, residuals_of};
+use crate::fit::{Problem, Residuals, recordings, residuals_of};
 use crate::model::{Camera, ForwardModel, Parameter, State, Trajectory};
 
 /// A hypothesis fitted to the recordings, with the noise by which it was judged.
@@ -137,7 +137,13 @@ impl<'a> Refit<'a> {
         (left / whole.max(1e-300)).sqrt()
     }
 
-    /// What it leaves of a recording.
+    /// What it leaves of the first recording, in however many pieces.
+    pub fn residuals_of_first(&self) -> Option<Residuals> {
+        let pieces = recordings(self.problem.records).into_iter().next()?;
+        Residuals::joined(pieces.map(|piece| self.residuals(piece)).collect::<Option<_>>()?)
+    }
+
+    /// What it leaves of a record.
     pub fn residuals(&self, record: usize) -> Option<Residuals> {
         residuals_of(&self.problem, &self.x, record).ok()
     }
@@ -258,8 +264,14 @@ mod tests {
     fn only_starts_that_end_at_the_best_count_together() {
         let theta_rad = vec![vec![Some(0.1); 30]; 2];
         let t_s = (0..30).map(f64::from).collect();
-        let records =
-            [Record { path: "none".into(), t_s, theta_rad, relative_sd: vec![vec![1.0; 30]; 2], in_step: 0.0 }];
+        let records = [Record {
+            path: "none".into(),
+            t_s,
+            theta_rad,
+            relative_sd: vec![vec![1.0; 30]; 2],
+            in_step: 0.0,
+            continues: false,
+        }];
         let met = |own: f64, other: f64| {
             let mut fit = leaving(&records, own, 1);
             fit.meet(leaving(&records, other, 2), 0.2);

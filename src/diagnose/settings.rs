@@ -117,10 +117,15 @@ pub struct SearchSettings {
     pub early_swings: f64,
     /// … unless that is next to the whole (cost).
     pub part_worth: f64,
+    /// Where every model leaves far more than noise, recordings are cut in pieces of so many swings (judgement: enough to tell
+    /// losses and clocks, see `fewest_swings`, and few enough for a small error of the model not to add up to a swing).
+    pub piece_swings: f64,
     /// An inertia of a general link is known to this share (judgement: from a drawing)…
     pub inertia_share: f64,
     /// … and its centre of mass to this one (judgement: balanced on an edge, to a few millimetres in a tenth of a metre).
     pub com_share: f64,
+    /// The distance of its two pivots to this one (judgement: a millimetre in a fifth of a metre, with a ruler).
+    pub length_share: f64,
     /// Sets of the largest number of laws that is worth its coefficients which are fitted because the recorded motion asks for them (cost).
     pub asked: usize,
     /// Fits from which pairs are built (cost).
@@ -274,7 +279,7 @@ pub struct LawSettings {
     /// A term whose effect on the angles has this cosine with that of another, or of a name, is the same under another name (judgement).
     pub the_same: f64,
     /// A term of the grammar with the shape of a law of the table, whose torque along the motion has this cosine with that law's, is that law (judgement: they differ
-    /// by less than a third; friction that is gone at a fifth of the largest speed has 0.5).
+    /// by less than half; friction that is gone at a fifth of the largest speed has 0.5).
     pub the_same_law: f64,
     /// The foremost terms, each of which is paired with every one that promises less (cost).
     pub paired: usize,
@@ -331,8 +336,10 @@ impl Default for SearchSettings {
             evaluations: 3000.0,
             early_swings: 12.0,
             part_worth: 0.6,
+            piece_swings: 8.0,
             inertia_share: 0.1,
             com_share: 0.02,
+            length_share: 0.005,
             asked: 3,
             pair_seeds: 6,
             dear_seeds: 3,
@@ -438,7 +445,7 @@ impl Default for LawSettings {
         Self {
             nothing_left: 1e-3,
             the_same: 0.999,
-            the_same_law: 0.95,
+            the_same_law: 0.9,
             paired: 12,
             fewest: 2,
             most: 6,

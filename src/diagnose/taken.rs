@@ -4,7 +4,7 @@ use super::settings::SearchSettings;
 use crate::error::Result;
 use crate::experiment::Experiment;
 use crate::fit::{Belief, base_parameters};
-use crate::model::{ForwardModel, Parameter};
+use crate::model::{Chain, OfLink, Parameter};
 
 /// How a file that states no damper for a single link is taken.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -22,8 +22,9 @@ impl Taken {
     }
 }
 
-/// The base model's parameters and what is known of them. Inertias and centres of mass of general links were measured, and so are free within what such measurements
-/// are worth: an inertia that is off by a hundredth would otherwise pass for a clock or a spring.
+/// The base model's parameters and what is known of them. Inertias, centres of mass and lengths of general links were measured, and so are free within what such
+/// measurements are worth: an inertia that is off by a hundredth would otherwise pass for a clock or a spring. Of one link they all change the pace alone, but an inertia
+/// may be stated as zero.
 ///
 /// # Errors
 /// [`crate::error::Error::Simulation`] for a specimen that cannot swing.
@@ -36,16 +37,17 @@ pub fn base_of(
     let mut base = stated(experiment, marks, taken);
     let mut beliefs = Vec::new();
     if !experiment.specimen.links.is_empty() {
-        let model = ForwardModel::of(experiment)?;
-        let (inertia, com) = (settings.inertia_share, settings.com_share);
-        let first = [(Parameter::FirstInertia, inertia), (Parameter::FirstCom, com)];
-        let second = [(Parameter::SecondInertia, inertia), (Parameter::SecondCom, com)];
-        // of one link only the pace is seen
-        let uncertain = if marks == 1 { first[..1].to_vec() } else { [first, second].concat() };
-        for (parameter, share) in uncertain {
-            let value = model.value(parameter).unwrap_or(0.0);
+        let chain = Chain::of(&experiment.specimen)?;
+        let share = |of: OfLink| match of {
+            OfLink::Inertia => settings.inertia_share,
+            OfLink::Com => settings.com_share,
+            OfLink::Length => settings.length_share,
+        };
+        for parameter in chain.parameters() {
+            let Parameter::Link(_, of) = parameter else { continue };
+            let value = chain.value(parameter).unwrap_or(0.0);
             base.push(parameter);
-            beliefs.push(Belief { parameter, value, sd: share * value.abs().max(1e-12) });
+            beliefs.push(Belief { parameter, value, sd: share(of) * value.abs().max(1e-12) });
         }
     }
     Ok((base, beliefs))

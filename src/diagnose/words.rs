@@ -95,7 +95,7 @@ impl Findings<'_> {
         if !(certainly || self.posterior.remains > self.context.settings.verdict.even) {
             return String::new();
         }
-        let Some(left) = fit.residuals(0) else { return String::new() };
+        let Some(left) = fit.residuals_of_first() else { return String::new() };
         let rms = |values: &[f64]| (values.iter().map(|v| v * v).sum::<f64>() / values.len().max(1) as f64).sqrt();
         let over_noise = fit.over_noise();
         let others = |effect: &&Effect| !self.verdict.effects.contains(effect);

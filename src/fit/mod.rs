@@ -49,7 +49,7 @@ pub use interval::Estimate;
 pub use pace::{Pace, refuse_another_pace};
 pub use predict::Prediction;
 pub use problem::{Belief, Problem};
-pub use record::Record;
+pub use record::{Record, recordings};
 pub use seen::Seen;
 pub use verdict::Verdict;
 
@@ -117,6 +117,29 @@ impl Residual {
     pub fn left_rad(&self) -> f64 {
         self.measured_rad - self.predicted_rad
     }
+}
+
+impl Residuals {
+    fn of(values: Vec<Vec<Residual>>, noise_rad: Vec<f64>) -> Self {
+        let rmse_rad = values.iter().map(|own| rms(own.iter().map(Residual::left_rad))).collect();
+        Self { values, rmse_rad, noise_rad }
+    }
+
+    /// Those of pieces of one recording, together; `None` of none.
+    pub fn joined(pieces: Vec<Self>) -> Option<Self> {
+        let links = pieces.first()?.values.len();
+        let noise_rad = (0..links).map(|link| rms(pieces.iter().map(|piece| piece.noise_rad[link]))).collect();
+        let mut values = vec![Vec::new(); links];
+        for piece in pieces {
+            values.iter_mut().zip(piece.values).for_each(|(all, own)| all.extend(own));
+        }
+        Some(Self::of(values, noise_rad))
+    }
+}
+
+fn rms(values: impl ExactSizeIterator<Item = f64>) -> f64 {
+    let count = values.len().max(1) as f64;
+    (values.map(|v| v * v).sum::<f64>() / count).sqrt()
 }
 
 impl Fit {
@@ -245,8 +268,5 @@ pub(crate) fn residuals_of(problem: &Problem<'_>, x: &[f64], index: usize) -> Re
             values[value.link].push(Residual { t_s, measured_rad, predicted_rad, rate_rad_s });
         }
     }
-    let rms =
-        |of: &Vec<Residual>| (of.iter().map(|r| r.left_rad().powi(2)).sum::<f64>() / of.len().max(1) as f64).sqrt();
-    let rmse_rad = values.iter().map(rms).collect();
-    Ok(Residuals { rmse_rad, values, noise_rad: problem.noise[index].sd_rad.clone() })
+    Ok(Residuals::of(values, problem.noise[index].sd_rad.clone()))
 }

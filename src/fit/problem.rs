@@ -315,13 +315,7 @@ fn switch_on(experiment: &mut Experiment, parameter: Parameter) {
         effect.get_or_insert(0.0);
     };
     match parameter {
-        Parameter::JointStiffness
-        | Parameter::JointDamping
-        | Parameter::FirstInertia
-        | Parameter::FirstCom
-        | Parameter::SecondInertia
-        | Parameter::SecondCom
-        | Parameter::Law(_) => {}
+        Parameter::JointStiffness | Parameter::JointDamping | Parameter::Link(..) | Parameter::Law(_) => {}
         Parameter::RestCurl => on(&mut effects.rest_curl),
         Parameter::BendingStiffness => on(&mut effects.distributed_flexibility),
         Parameter::JointCubicStiffness => on(&mut effects.joint_cubic_stiffness),

@@ -24,6 +24,8 @@ pub struct Record {
     pub relative_sd: Vec<Vec<f64>>,
     /// Errors in step with the swing that each angle may have, as a share of its noise: none where the table holds nothing but angles.
     pub in_step: f64,
+    /// Whether it goes on where the record before it ends: a piece of the same recording, with a start of its own.
+    pub continues: bool,
 }
 
 impl Record {
@@ -48,19 +50,47 @@ impl Record {
             theta_rad: series.theta_rad.clone(),
             relative_sd,
             in_step: if series.tracked { TRACKED_IN_STEP } else { 0.0 },
+            continues: false,
         })
     }
 
     /// The rows before one.
     #[must_use]
     pub fn until(&self, row: usize) -> Self {
+        self.rows(0..row)
+    }
+
+    /// Some rows.
+    fn rows(&self, rows: Range<usize>) -> Self {
         Self {
             path: self.path.clone(),
-            t_s: self.t_s[..row].to_vec(),
-            theta_rad: self.theta_rad.iter().map(|column| column[..row].to_vec()).collect(),
-            relative_sd: self.relative_sd.iter().map(|column| column[..row].to_vec()).collect(),
+            t_s: self.t_s[rows.clone()].to_vec(),
+            theta_rad: self.theta_rad.iter().map(|column| column[rows.clone()].to_vec()).collect(),
+            relative_sd: self.relative_sd.iter().map(|column| column[rows.clone()].to_vec()).collect(),
             in_step: self.in_step,
+            continues: self.continues,
         }
+    }
+
+    /// So many pieces of about as many rows each.
+    pub fn cut(&self, count: usize) -> Vec<Self> {
+        let border = |piece: usize| piece * self.len() / count.max(1);
+        let piece = |k: usize| Self { continues: self.continues || k > 0, ..self.rows(border(k)..border(k + 1)) };
+        (0..count.max(1)).map(piece).collect()
+    }
+
+    /// Pieces put together again; nothing of none.
+    pub fn joined(pieces: &[Self]) -> Option<Self> {
+        let (first, others) = pieces.split_first()?;
+        let mut whole = first.clone();
+        for piece in others {
+            whole.t_s.extend_from_slice(&piece.t_s);
+            let columns = whole.theta_rad.iter_mut().zip(&piece.theta_rad);
+            columns.for_each(|(whole, piece)| whole.extend_from_slice(piece));
+            let columns = whole.relative_sd.iter_mut().zip(&piece.relative_sd);
+            columns.for_each(|(whole, piece)| whole.extend_from_slice(piece));
+        }
+        Some(whole)
     }
 
     /// The largest angle of any link, to either side.
@@ -119,6 +149,18 @@ impl Record {
             })
             .collect()
     }
+}
+
+/// Which records are pieces of one recording, for each recording.
+pub fn recordings(records: &[Record]) -> Vec<Range<usize>> {
+    let mut found: Vec<Range<usize>> = Vec::new();
+    for (place, record) in records.iter().enumerate() {
+        match found.last_mut() {
+            Some(last) if record.continues => last.end = place + 1,
+            _ => found.push(place..place + 1),
+        }
+    }
+    found
 }
 
 /// Value, slope and residual rms at zero of the cubic (or the highest lower power) through some points.

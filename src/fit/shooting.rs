@@ -267,7 +267,17 @@ mod tests {
             t_s.iter().map(|t| swing.at(*t)).map(|s| [s.theta_rad, s.omega_rad_s].concat()).collect();
         let theta_rad = (0..2).map(|link| states.iter().map(|s| Some(s[link])).collect()).collect();
         let rows = t_s.len();
-        (Record { path: "made".into(), t_s, theta_rad, relative_sd: vec![vec![1.0; rows]; 2], in_step: 0.0 }, states)
+        (
+            Record {
+                path: "made".into(),
+                t_s,
+                theta_rad,
+                relative_sd: vec![vec![1.0; rows]; 2],
+                in_step: 0.0,
+                continues: false,
+            },
+            states,
+        )
     }
 
     #[test]

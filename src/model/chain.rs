@@ -4,7 +4,7 @@ use std::ops::Range;
 
 use nalgebra::DMatrix;
 
-use super::{Motion, Parameter, Partials};
+use super::{Motion, OfLink, Parameter, Partials};
 use crate::error::{Error, Result};
 use crate::experiment::{Inertia, Link, Specimen};
 
@@ -23,6 +23,8 @@ use crate::experiment::{Inertia, Link, Specimen};
 #[derive(Debug, Clone, PartialEq)]
 pub struct Chain {
     links: Vec<Link>,
+    /// L: the links' lengths, unless they were set.
+    next_pivot_m: Vec<f64>,
     /// a, without the cosines.
     inertia_kg_m2: DMatrix<f64>,
     /// h.
@@ -42,7 +44,8 @@ impl Chain {
             return Err(Error::Simulation { detail: "the specimen has no link; give specimen.link_lengths_m".into() });
         }
         let n = links.len();
-        let (inertia_kg_m2, static_moment_kg_m) = coefficients(&links);
+        let next_pivot_m: Vec<f64> = links.iter().map(|link| link.length_m).collect();
+        let (inertia_kg_m2, static_moment_kg_m) = coefficients(&links, &next_pivot_m);
         let scaled = DMatrix::from_fn(n, n, |i, j| {
             inertia_kg_m2[(i, j)] / (inertia_kg_m2[(i, i)] * inertia_kg_m2[(j, j)]).sqrt()
         });
@@ -53,7 +56,7 @@ impl Chain {
             });
         }
         let (joint_ratios, groups) = (vec![1.0; n - 1], (0..n).map(|i| i..i + 1).collect());
-        Ok(Self { links, inertia_kg_m2, static_moment_kg_m, joint_ratios, groups })
+        Ok(Self { links, next_pivot_m, inertia_kg_m2, static_moment_kg_m, joint_ratios, groups })
     }
 
     /// The strip cut into `pieces` equal rods for each length between marks: with EI/ℓ at every joint it approaches the continuous strip.
@@ -145,57 +148,74 @@ impl Chain {
         &self.groups
     }
 
-    /// The value of a parameter of a link.
-    pub fn value(&self, parameter: Parameter) -> Option<f64> {
-        match parameter {
-            Parameter::FirstInertia => self.links.first().map(|l| l.inertia_kg_m2),
-            Parameter::FirstCom => self.links.first().map(|l| l.com_m),
-            Parameter::SecondInertia => self.links.get(1).map(|l| l.inertia_kg_m2),
-            Parameter::SecondCom => self.links.get(1).map(|l| l.com_m),
-            _ => None,
-        }
+    /// The parameters of the links. Where the last one ends changes nothing.
+    pub fn parameters(&self) -> Vec<Parameter> {
+        let last = self.count() - 1;
+        let of_link = |link: usize| {
+            let number = u8::try_from(link).ok();
+            let of = [OfLink::Inertia, OfLink::Com, OfLink::Length]
+                .into_iter()
+                .filter(move |of| *of != OfLink::Length || link < last);
+            of.filter_map(move |of| number.map(|number| Parameter::Link(number, of)))
+        };
+        (0..=last).flat_map(of_link).collect()
     }
 
-    /// Sets a parameter of a link; others are left alone.
+    /// The value of a parameter of a link.
+    pub fn value(&self, parameter: Parameter) -> Option<f64> {
+        let Parameter::Link(link, of) = parameter else { return None };
+        let link = usize::from(link);
+        self.links.get(link).map(|own| match of {
+            OfLink::Inertia => own.inertia_kg_m2,
+            OfLink::Com => own.com_m,
+            OfLink::Length => self.next_pivot_m[link],
+        })
+    }
+
+    /// Sets a parameter of a link; others are left alone. Marks, and air, stay at the lengths of the file.
     pub fn set(&mut self, parameter: Parameter, value: f64) {
-        let of_first = matches!(parameter, Parameter::FirstInertia | Parameter::FirstCom);
-        let Some(link) = self.links.get_mut(usize::from(!of_first)) else { return };
-        match parameter {
-            Parameter::FirstInertia | Parameter::SecondInertia => link.inertia_kg_m2 = value,
-            Parameter::FirstCom | Parameter::SecondCom => link.com_m = value,
-            _ => return,
+        let Parameter::Link(link, of) = parameter else { return };
+        let link = usize::from(link);
+        let Some(own) = self.links.get_mut(link) else { return };
+        match of {
+            OfLink::Inertia => own.inertia_kg_m2 = value,
+            OfLink::Com => own.com_m = value,
+            OfLink::Length => self.next_pivot_m[link] = value,
         }
-        (self.inertia_kg_m2, self.static_moment_kg_m) = coefficients(&self.links);
+        (self.inertia_kg_m2, self.static_moment_kg_m) = coefficients(&self.links, &self.next_pivot_m);
     }
 
     /// Adds the derivative of the chain's torques with a parameter of a link. They are linear in a and h, so it is their value for
     ///
     /// ```text
-    /// ∂aᵢᵢ/∂Iᵢ = 1      ∂aᵢᵢ/∂cᵢ = 2mᵢcᵢ,  ∂aᵢⱼ/∂cᵢ = Lⱼmᵢ for j < i,  ∂hᵢ/∂cᵢ = mᵢ
+    /// ∂aᵢᵢ/∂Iᵢ = 1
+    /// ∂aᵢᵢ/∂cᵢ = 2mᵢcᵢ,  ∂aᵢⱼ/∂cᵢ = Lⱼmᵢ for j < i,  ∂hᵢ/∂cᵢ = mᵢ
+    /// ∂aᵢᵢ/∂Lᵢ = 2LᵢM,   ∂aᵢⱼ/∂Lᵢ = LⱼM for j < i, hⱼ for j > i,  ∂hᵢ/∂Lᵢ = M = Σ_{k>i} mₖ
     /// ```
     ///
     /// `field_m_s2` is what acts on every mass, sideways and down.
     pub fn add_sensitivity(&self, parameter: Parameter, field_m_s2: [f64; 2], motion: &Motion, q: &mut [f64]) {
-        let (i, of_com) = match parameter {
-            Parameter::FirstInertia => (0, false),
-            Parameter::FirstCom => (0, true),
-            Parameter::SecondInertia => (1, false),
-            Parameter::SecondCom => (1, true),
-            _ => return,
+        let Parameter::Link(link, of) = parameter else { return };
+        let i = usize::from(link);
+        let Some(own) = self.links.get(i) else { return };
+        // a mass at an arm that becomes longer
+        let (mass_kg, arm_m) = match of {
+            OfLink::Inertia => {
+                q[i] -= motion.acceleration[i];
+                return;
+            }
+            OfLink::Com => (own.mass_kg, own.com_m),
+            OfLink::Length => (mass_below_kg(&self.links, i), self.next_pivot_m[i]),
         };
-        let Some(link) = self.links.get(i) else { return };
-        if !of_com {
-            q[i] -= motion.acceleration[i];
-            return;
-        }
-        let mass_kg = link.mass_kg;
         let pull_m_s2 = field_m_s2[0] * motion.cos[i] - field_m_s2[1] * motion.sin[i];
-        q[i] += mass_kg * (pull_m_s2 - 2.0 * link.com_m * motion.acceleration[i]);
+        q[i] += mass_kg * (pull_m_s2 - 2.0 * arm_m * motion.acceleration[i]);
         for j in 0..i {
-            let a = self.links[j].length_m * mass_kg;
-            let (sin, cos) = (motion.sin_difference(i, j), motion.cos_difference(i, j));
-            q[i] -= a * (cos * motion.acceleration[j] + sin * motion.rate[j] * motion.rate[j]);
-            q[j] -= a * (cos * motion.acceleration[i] - sin * motion.rate[i] * motion.rate[i]);
+            add_pair(self.next_pivot_m[j] * mass_kg, (i, j), motion, q);
+        }
+        if of == OfLink::Length {
+            for j in i + 1..self.count() {
+                add_pair(self.static_moment_kg_m[j], (i, j), motion, q);
+            }
         }
     }
 
@@ -204,9 +224,7 @@ impl Chain {
         for i in 0..self.count() {
             q[i] -= gravity_m_s2 * self.static_moment_kg_m[i] * motion.sin[i] + self.a(i, i) * motion.acceleration[i];
             for j in 0..i {
-                let (a, sin, cos) = (self.a(i, j), motion.sin_difference(i, j), motion.cos_difference(i, j));
-                q[i] -= a * (cos * motion.acceleration[j] + sin * motion.rate[j] * motion.rate[j]);
-                q[j] -= a * (cos * motion.acceleration[i] - sin * motion.rate[i] * motion.rate[i]);
+                add_pair(self.a(i, j), (i, j), motion, q);
             }
         }
     }
@@ -242,18 +260,28 @@ impl Chain {
     }
 }
 
-/// a and h of some links.
-fn coefficients(links: &[Link]) -> (DMatrix<f64>, Vec<f64>) {
+/// Subtracts what a coefficient a of two links' common inertia asks of both.
+fn add_pair(a: f64, (i, j): (usize, usize), motion: &Motion, q: &mut [f64]) {
+    let (sin, cos) = (motion.sin_difference(i, j), motion.cos_difference(i, j));
+    q[i] -= a * (cos * motion.acceleration[j] + sin * motion.rate[j] * motion.rate[j]);
+    q[j] -= a * (cos * motion.acceleration[i] - sin * motion.rate[i] * motion.rate[i]);
+}
+
+fn mass_below_kg(links: &[Link], i: usize) -> f64 {
+    links[i + 1..].iter().map(|l| l.mass_kg).sum()
+}
+
+/// a and h of some links, the next one's pivot so far below each one's own.
+fn coefficients(links: &[Link], next_pivot_m: &[f64]) -> (DMatrix<f64>, Vec<f64>) {
     let n = links.len();
-    let mass_below = |i: usize| links[i + 1..].iter().map(|l| l.mass_kg).sum::<f64>();
     let static_moment_kg_m: Vec<f64> =
-        (0..n).map(|i| links[i].mass_kg * links[i].com_m + links[i].length_m * mass_below(i)).collect();
+        (0..n).map(|i| links[i].mass_kg * links[i].com_m + next_pivot_m[i] * mass_below_kg(links, i)).collect();
     let inertia_kg_m2 = DMatrix::from_fn(n, n, |i, j| {
         if i == j {
-            let Link { length_m, mass_kg, com_m, inertia_kg_m2 } = links[i];
-            inertia_kg_m2 + mass_kg * com_m * com_m + mass_below(i) * length_m * length_m
+            let Link { mass_kg, com_m, inertia_kg_m2, .. } = links[i];
+            inertia_kg_m2 + mass_kg * com_m * com_m + mass_below_kg(links, i) * next_pivot_m[i] * next_pivot_m[i]
         } else {
-            links[i.min(j)].length_m * static_moment_kg_m[i.max(j)]
+            next_pivot_m[i.min(j)] * static_moment_kg_m[i.max(j)]
         }
     });
     (inertia_kg_m2, static_moment_kg_m)

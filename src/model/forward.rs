@@ -111,8 +111,7 @@ impl ForwardModel {
 
     /// Every coefficient with its value.
     pub fn parameters(&self) -> Vec<(Parameter, f64)> {
-        let of_links = [Parameter::FirstInertia, Parameter::FirstCom, Parameter::SecondInertia, Parameter::SecondCom];
-        let of_links = of_links.into_iter().filter_map(|p| self.chain.value(p).map(|value| (p, value)));
+        let of_links = self.chain.parameters().into_iter().filter_map(|p| self.chain.value(p).map(|value| (p, value)));
         self.effects.iter().flat_map(|e| e.parameters()).chain(of_links).collect()
     }
 

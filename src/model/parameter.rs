@@ -30,6 +30,17 @@ fn kept(text: &str) -> &'static str {
     text
 }
 
+/// What of a general link was measured before it swung.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub enum OfLink {
+    /// Inertia about the centre of mass.
+    Inertia,
+    /// Distance of the centre of mass from the pivot.
+    Com,
+    /// Distance of the next link's pivot.
+    Length,
+}
+
 /// A coefficient of the equations of motion, or of the camera.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub enum Parameter {
@@ -67,14 +78,8 @@ pub enum Parameter {
     SupportCosine,
     /// Frequency of the pivot's motion.
     SupportFrequency,
-    /// Inertia of the first link about its centre of mass.
-    FirstInertia,
-    /// Distance of the first link's centre of mass from its pivot.
-    FirstCom,
-    /// Inertia of the second link about its centre of mass.
-    SecondInertia,
-    /// Distance of the second link's centre of mass from its pivot.
-    SecondCom,
+    /// Of a link, the uppermost being 0.
+    Link(u8, OfLink),
     /// ε of the camera's clock.
     TimeBase,
     /// Time of the frames missing at one instant.
@@ -110,10 +115,9 @@ impl Parameter {
             Self::SupportSine => "support_motion.sine_m",
             Self::SupportCosine => "support_motion.cosine_m",
             Self::SupportFrequency => "support_motion.frequency_hz",
-            Self::FirstInertia => "links.1.inertia_kg_m2",
-            Self::FirstCom => "links.1.com_m",
-            Self::SecondInertia => "links.2.inertia_kg_m2",
-            Self::SecondCom => "links.2.com_m",
+            Self::Link(link, OfLink::Inertia) => kept(&format!("links.{}.inertia_kg_m2", link + 1)),
+            Self::Link(link, OfLink::Com) => kept(&format!("links.{}.com_m", link + 1)),
+            Self::Link(link, OfLink::Length) => kept(&format!("links.{}.length_m", link + 1)),
             Self::TimeBase => "time_base",
             Self::DroppedFrames => "dropped_frames",
             Self::CameraTilt => "camera_tilt",
@@ -136,8 +140,8 @@ impl Parameter {
             Self::AirQuadratic => "kg/m2",
             Self::AddedMass => "kg/m",
             Self::SideForce => "m/s2",
-            Self::SupportSine | Self::SupportCosine | Self::FirstCom | Self::SecondCom => "m",
-            Self::FirstInertia | Self::SecondInertia => "kg m2",
+            Self::SupportSine | Self::SupportCosine | Self::Link(_, OfLink::Com | OfLink::Length) => "m",
+            Self::Link(_, OfLink::Inertia) => "kg m2",
             Self::SupportFrequency => "Hz",
             Self::TimeBase | Self::AngleGain => "1",
             Self::DroppedFrames | Self::DifferentialLag => "s",
@@ -195,15 +199,12 @@ impl Parameter {
             | Self::AirQuadratic
             | Self::AddedMass
             | Self::SupportFrequency
-            | Self::FirstInertia
-            | Self::FirstCom
-            | Self::SecondInertia
-            | Self::SecondCom => true,
+            | Self::Link(..) => true,
         }
     }
 
-    /// Every parameter but those of stated laws.
-    pub const ALL: [Self; 26] = [
+    /// Every parameter but those of links and of stated laws.
+    pub const ALL: [Self; 22] = [
         Self::JointStiffness,
         Self::JointDamping,
         Self::RestCurl,
@@ -221,10 +222,6 @@ impl Parameter {
         Self::SupportSine,
         Self::SupportCosine,
         Self::SupportFrequency,
-        Self::FirstInertia,
-        Self::FirstCom,
-        Self::SecondInertia,
-        Self::SecondCom,
         Self::TimeBase,
         Self::DroppedFrames,
         Self::CameraTilt,

@@ -12,6 +12,7 @@ use super::super::refit::Refit;
 use super::super::screen::Projection;
 use super::super::settings::LawSettings;
 use crate::experiment::LawPlace;
+use crate::fit::recordings;
 use crate::model::effects::Effect as _;
 use crate::model::effects::formula::Formula;
 use crate::model::{Motion, Parameter};
@@ -40,7 +41,7 @@ pub fn candidates(
     left_out.extend(names.iter().map(|effect| vec![*effect]));
     left_out.extend((names.len() > 1).then(|| names.clone()));
     let lower = best.problem.lower();
-    let (apart, alone) = (told_apart(&columns, settings.the_same), best.problem.records.len() == 1);
+    let (apart, alone) = (told_apart(&columns, settings.the_same), recordings(best.problem.records).len() == 1);
     let promise = |out: &Vec<Effect>| {
         let parameters: Vec<Parameter> = out.iter().flat_map(|effect| effect.parameters()).copied().collect();
         let gone: Vec<usize> = parameters.iter().filter_map(|parameter| best.place(*parameter)).collect();

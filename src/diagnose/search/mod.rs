@@ -42,7 +42,7 @@ use proposal::Proposal;
 use rounds::{Learns, Round, Tried};
 
 /// Proposals fitted together, between two looks at the budget.
-const TOGETHER: usize = 8;
+const TOGETHER: usize = 4;
 
 /// What a round came to.
 #[derive(Debug, Clone, Copy, PartialEq, serde::Serialize)]
@@ -131,8 +131,11 @@ impl<'a, 'p> Search<'a, 'p> {
         }
     }
 
-    /// Searches for what the base model lacks, the file taken at its word.
+    /// Searches for what the base model lacks, the file taken at its word. Whole recordings that are dear and far from the model are left to their pieces.
     pub fn run(&mut self) {
+        if self.prepared.part < 1.0 && self.leaves_more_than_noise() && self.pieces().is_some() {
+            return;
+        }
         self.begin();
         self.allow_errors_in_step();
         self.allow(self.context.settings.search.shares.certified);
@@ -172,10 +175,38 @@ impl<'a, 'p> Search<'a, 'p> {
         self
     }
 
-    /// Searches on: with the file taken loosely where it may be doubted, from the beginning of the recordings on where far more than noise is left, and with more
+    /// The recordings in pieces; `None` of a strip, whose marks do not show where its rods begin, and where they are too short.
+    fn pieces(&self) -> Option<Prepared> {
+        let (model, _) = self.base().problem.model(0, &[]).ok()?;
+        let cut = || self.prepared.in_pieces(self.context.settings, model.pace_rad_s());
+        (!self.context.is_strip() && !self.context.is_in_pieces()).then(cut).flatten()
+    }
+
+    /// A search of the recordings in pieces, each with a start of its own. Where every model leaves far more than noise, the sum of squares of a whole recording says
+    /// how the model's small errors add up, and has many false minima; that of pieces says what each law does within a few swings.
+    fn in_pieces(&self, kept: &'a OnceLock<Prepared>) -> Option<Self> {
+        let pieces = self.pieces().filter(|_| self.leaves_more_than_noise())?;
+        let (experiment, settings) = (self.context.experiment, self.context.settings);
+        let taken = match lacks_a_damper(experiment, self.context.marks()) {
+            true => Taken::Loosely,
+            false => Taken::AtItsWord,
+        };
+        let mut search =
+            Self::of_base_model(kept.get_or_init(|| pieces), experiment, taken, settings, self.progress).ok()?;
+        // what the stretches ask for is where the search for more and fewer effects begins
+        search.allow(settings.search.shares.usual);
+        search.round(Round::Asked, &mut Tried::default());
+        search.learn_noise();
+        if search.fits.len() == 1 {
+            search.begin();
+        }
+        Some(search)
+    }
+
+    /// Searches on: with the recordings in pieces where far more than noise is left, or, where they are too short for that, with the file taken loosely where it may be doubted, from the beginning of the recordings on where far more than noise is left, and with more
     /// effects. A strip's fits are too dear for it.
     #[must_use]
-    pub fn doubted(self) -> Self {
+    pub fn doubted(self, pieces: &'a OnceLock<Prepared>) -> Self {
         let enough = self.up_to(self.context.settings.search.shares.certified);
         let loosened = || {
             (self.context.work.done() < enough).then_some(())?;
@@ -187,7 +218,7 @@ impl<'a, 'p> Search<'a, 'p> {
             loosened.begin();
             Some(loosened)
         };
-        let mut search = match loosened() {
+        let mut search = match self.in_pieces(pieces).or_else(loosened) {
             Some(loosened) => loosened.after(self),
             None => self,
         };
@@ -236,11 +267,15 @@ impl<'a, 'p> Search<'a, 'p> {
     fn further(&mut self) {
         self.judge_by(&without_errors_in_step(&self.base().problem.noise), 0);
         let mut tried = Tried::default();
-        if self.part == 1.0 && self.leaves_more_than_noise() {
+        if self.part == 1.0 && !self.context.is_in_pieces() && self.leaves_more_than_noise() {
             self.round(Round::FromTheBeginning, &mut tried);
         }
         for turn in 0..self.context.settings.search.turns {
             let led = tried.more.len();
+            if turn == 0 && self.context.is_in_pieces() {
+                // the stretches have asked for as many laws as are worth it
+                self.round(Round::OneFewer, &mut tried);
+            }
             self.round(Round::OneMore, &mut tried);
             if turn > 0 && tried.more.len() == led {
                 break;

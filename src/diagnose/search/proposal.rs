@@ -6,7 +6,7 @@ use super::super::hypothesis::Hypothesis;
 use super::super::laws::{self, law_of};
 use super::super::refit::{Certificate, Refit};
 use super::super::screen::{Score, Screen};
-use super::super::weak_form::Asked;
+use super::super::stretches::Asked;
 use super::beside::Beside;
 use super::horizon;
 use crate::fit::Record;
@@ -142,9 +142,11 @@ fn instead<'a>(context: &FitContext<'a>, fit: &Refit<'a>, effect: Effect, others
 fn without<'a>(context: &FitContext<'a>, fit: &Refit<'a>, effect: Effect) -> Option<Refit<'a>> {
     let fewer = Refit { hypothesis: fit.hypothesis.without(effect), ..fit.clone() };
     let near = context.refit(&fewer.hypothesis, &fewer, &[]);
-    let continued = horizon::continued_alone(context, &fewer);
+    // pieces are too short to fall out of step
+    let continued = (!context.is_in_pieces()).then(|| horizon::continued_alone(context, &fewer)).flatten();
     let best = near.into_iter().chain(continued).min_by(|a, b| a.chi2.total_cmp(&b.chi2))?;
-    if best.converged { Some(best) } else { context.go_on(&best, context.settings.descent.most_steps) }
+    let is_dear = context.is_in_pieces() && best.hypothesis.has_corners();
+    if best.converged || is_dear { Some(best) } else { context.go_on(&best, context.settings.descent.most_steps) }
 }
 
 /// A fit with fewer effects and another one instead, where that promises most of what the one left out would from there.
@@ -154,7 +156,9 @@ fn in_its_place<'a>(
     fewer: &Refit<'a>,
     effects: &[Effect],
 ) -> Vec<Refit<'a>> {
-    let scores = Screen::at(context, fewer).map(|screen| laws::scores(&screen, effects)).unwrap_or_default();
+    let cheap: Vec<Effect> =
+        effects.iter().copied().filter(|own| !context.is_in_pieces() || !own.has_corners()).collect();
+    let scores = Screen::at(context, fewer).map(|screen| laws::scores(&screen, &cheap)).unwrap_or_default();
     let (own, others): (Vec<Score>, Vec<Score>) =
         scores.into_iter().partition(|score| fit.hypothesis.has(score.effect));
     let promised = own.iter().map(|score| score.gain).fold(0.0, f64::max);

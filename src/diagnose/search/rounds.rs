@@ -8,7 +8,7 @@ use super::super::laws;
 use super::super::misfit::{Misfit, leaves_more_than_noise, needs};
 use super::super::refit::{Refit, best, best_of_each_count, least, least_chi2};
 use super::super::screen::{Score, Screen};
-use super::super::weak_form::asked_for;
+use super::super::stretches::asked_for;
 use super::Search;
 use super::beside::Beside;
 use super::proposal::{Proposal, comes_to_rest};
@@ -323,13 +323,17 @@ impl<'a> Search<'a, '_> {
         more.map(Proposal::Beside).collect()
     }
 
-    /// Pairs have been sought from every side, and where far more than noise is left nothing does as well: only of three is another put in the place of one.
+    /// Pairs have been sought from every side, and where far more than noise is left nothing does as well: only of three, and of what pieces of the recordings led
+    /// to, is another put in the place of one.
     fn one_fewer(&self, tried: &mut Tried) -> Vec<Proposal<'_, 'a>> {
         let settings = self.context.settings;
         let seeds = not_yet(best_of_each_count(&self.fits, settings.search.most_coefficients), &mut tried.fewer);
         let rivals = |seed: &'_ Refit<'a>| -> &[Effect] {
             let many = seed.hypothesis.effects.len() > settings.search.main_effects;
-            if many && !leaves_more_than_noise(seed, &settings.noise) { &self.effects } else { &[] }
+            let near_noise = many && !leaves_more_than_noise(seed, &settings.noise);
+            // corners are dear, and what stands beside them has been asked for
+            let of_pieces = self.context.is_in_pieces() && !seed.hypothesis.has_corners();
+            if near_noise || of_pieces { &self.effects } else { &[] }
         };
         let of = |seed| {
             let others = rivals(seed);

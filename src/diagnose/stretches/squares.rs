@@ -1,18 +1,13 @@
-//! Least squares of weighed torques, for every set of laws.
+//! Least squares of what stretches leave, for every set of laws.
 
 use nalgebra::{DMatrix, DVector};
 
-/// How often the kinds of rows are put over what is left of them.
-const REWEIGHTED: usize = 4;
 /// Most laws of one set.
 const MOST_LAWS: usize = 3;
 
-/// Weighed torques of one kind: a row a bump, the base model's first, then the derivatives with each parameter.
-pub type Block = DMatrix<f64>;
-
 /// A parameter among the least squares.
 pub struct Column {
-    /// The value around which the torques are linear.
+    /// The value around which the motion is linear.
     pub from: f64,
     pub is_not_negative: bool,
     /// Value and standard deviation, where something is known.
@@ -29,7 +24,7 @@ pub struct Set {
     pub chi2: f64,
 }
 
-/// Sums of squares of the weighed torques, each kind over what all laws together leave of it.
+/// Sums of squares of what the stretches leave, over what all laws together leave: the base model's residual, then the derivatives with each parameter.
 pub struct LeastSquares {
     /// XᵀX, in units in which its diagonal is one.
     normal: DMatrix<f64>,
@@ -40,49 +35,30 @@ pub struct LeastSquares {
     /// Norms of the columns of X.
     sizes: Vec<f64>,
     columns: Vec<Column>,
-    rows: usize,
+    independent: usize,
 }
 
 impl LeastSquares {
-    /// Of some kinds of rows.
-    pub fn of(mut blocks: Vec<Block>, columns: Vec<Column>) -> Self {
-        let rms = |block: &Block, change: &[f64]| {
-            let left = block.column(0) + block.columns(1, change.len()) * DVector::from_column_slice(change);
-            (left.norm_squared() / left.len() as f64).sqrt()
-        };
+    /// Of the rows of all stretches, which hold so many values that do not go together.
+    pub fn of(stretches: &[DMatrix<f64>], columns: Vec<Column>, independent: usize) -> Self {
         let count = columns.len();
-        let raw: Vec<f64> = blocks.iter().map(|block| rms(block, &vec![0.0; count])).collect();
-        let mut scale = raw.clone();
-        let mut squares = Self::summed(&mut blocks, &scale, columns);
-        let all: Vec<usize> = (0..count).collect();
-        for _ in 0..REWEIGHTED {
-            let Some((solution, _)) = squares.solved(&all) else { break };
-            let change: Vec<f64> = solution.iter().zip(&squares.columns).map(|(value, own)| value - own.from).collect();
-            // the blocks are over their scale
-            let left: Vec<f64> = blocks.iter().map(|block| rms(block, &change)).collect();
-            let factor: Vec<f64> =
-                left.iter().zip(&scale).zip(&raw).map(|((l, s), raw)| (l * s).max(1e-3 * raw) / s).collect();
-            scale.iter_mut().zip(&factor).for_each(|(scale, factor)| *scale *= factor);
-            squares = Self::summed(&mut blocks, &factor, squares.columns);
-        }
-        squares
-    }
-
-    /// The sums, the blocks first put over some scale.
-    fn summed(blocks: &mut [Block], scale: &[f64], columns: Vec<Column>) -> Self {
-        let count = columns.len();
-        blocks.iter_mut().zip(scale).for_each(|(block, scale)| *block /= scale.max(1e-300));
         let mut all = DMatrix::<f64>::zeros(count + 1, count + 1);
-        blocks.iter().for_each(|block| all += block.tr_mul(block));
+        stretches.iter().for_each(|rows| all += rows.tr_mul(rows));
         let sizes: Vec<f64> = (1..=count).map(|k| all[(k, k)].sqrt().max(1e-300)).collect();
-        Self {
+        let raw = Self {
             normal: DMatrix::from_fn(count, count, |a, b| all[(a + 1, b + 1)] / (sizes[a] * sizes[b])),
             right: DVector::from_fn(count, |a, _| -all[(a + 1, 0)] / sizes[a]),
             whole: all[(0, 0)],
             sizes,
             columns,
-            rows: blocks.iter().map(|block| block.nrows()).sum(),
-        }
+            independent,
+        };
+        // what all laws leave is the variance
+        let everything: Vec<usize> = (0..count).collect();
+        let least = raw.solved(&everything).map_or(raw.whole, |(_, chi2)| chi2).max(1e-9 * raw.whole);
+        let scale = (least / independent.max(1) as f64).sqrt().max(1e-300);
+        let sizes = raw.sizes.iter().map(|size| size / scale).collect();
+        Self { right: raw.right / scale, whole: raw.whole / (scale * scale), sizes, ..raw }
     }
 
     /// Values of some columns' parameters, and χ². What would fall below zero, and may not, is zero.
@@ -155,9 +131,9 @@ impl LeastSquares {
             };
             let mut solved: Vec<Set> = sets.iter().filter_map(solved).collect();
             solved.sort_by(|a, b| a.chi2.total_cmp(&b.chi2));
-            // Schwarz's criterion; neighbouring bumps overlap by half
+            // Schwarz's criterion
             let Some(least) = solved.first().map(|set| set.chi2) else { break };
-            if 0.5 * (before - least) < (0.5 * self.rows as f64).ln() {
+            if before - least < (self.independent.max(2) as f64).ln() {
                 break;
             }
             before = least;
@@ -183,7 +159,7 @@ mod tests {
         };
         let block = DMatrix::from_fn(rows, 5, |k, column| if column == 0 { torque(k) } else { wave(k, column as f64) });
         let column = |from: f64| Column { from, is_not_negative: true, belief: None };
-        let squares = LeastSquares::of(vec![block], vec![column(1.0), column(0.0), column(0.0), column(0.0)]);
+        let squares = LeastSquares::of(&[block], vec![column(1.0), column(0.0), column(0.0), column(0.0)], rows);
         let sets = squares.best_sets(1, 1);
         let best = &sets[0];
         assert_eq!(best.laws, [0, 2]);

@@ -1,0 +1,153 @@
+//! Short stretches: which laws the recordings ask for within a swing or two.
+//!
+//! The recordings are cut in stretches so short that no model falls out of step, each with the start that the recording shows. The motion of the base model through
+//! each of them is linear enough in everything else: with r what it leaves and J, S its derivatives with the coefficients β of all laws and with the start s,
+//!
+//! ```text
+//! r + J (β − β₀) + S (s − s₀) = e        over all stretches
+//! ```
+//!
+//! and least squares, the starts projected out, give the coefficients of any set of laws at once. No small error of the model adds up over a recording: so it points
+//! to sets of laws that a search beside a poor base model does not come by. What the laws do over many swings is not seen: it proposes, and proves nothing.
+//!
+//! | file | holds |
+//! |---|---|
+//! | `squares` | least squares for every set of laws |
+
+mod squares;
+
+use nalgebra::DMatrix;
+
+use super::context::FitContext;
+use super::effect::{Acts, Cost, Effect, Place};
+use super::hypothesis::Hypothesis;
+use super::refit::Refit;
+use crate::fit::shooting::STATE_NEAR;
+use crate::fit::{Problem, Record};
+use crate::model::Parameter;
+use crate::series::FEWEST_ROWS;
+use squares::{Column, LeastSquares, Set};
+
+/// Swings of a stretch: a loss is told from a spring within one.
+const SWINGS: f64 = 1.5;
+/// Of what a model that is wrong leaves of a stretch, so many values an angle go together with no others: about its harmonics.
+const VALUES_EACH: usize = 6;
+/// Errors of the camera or the encoder that every set may have beside its laws, with their standard deviations: an offset (rad) and a gain.
+const OF_CAMERA: [(Effect, Parameter, f64); 2] =
+    [(Effect::CameraTilt, Parameter::CameraTilt, 0.01), (Effect::AngleGain, Parameter::AngleGain, 0.02)];
+/// Linearised so often, each time at what the best set of laws makes of the base model's parameters.
+const PASSES: usize = 2;
+
+/// A set of laws that the stretches ask for.
+#[derive(Debug, Clone)]
+pub struct Asked {
+    /// The laws.
+    pub hypothesis: Hypothesis,
+    /// Their coefficients, and the base model's.
+    pub start: Vec<(Parameter, f64)>,
+}
+
+/// The sets of laws that leave least, those of most laws first: `each` of the largest number that is worth its coefficients, and the best of every smaller one.
+///
+/// Empty where the frames do not resolve a swing.
+pub fn asked_for(context: &FitContext<'_>, base: &Refit<'_>, effects: &[Effect], each: usize) -> Vec<Asked> {
+    sets(context, base, effects, each).unwrap_or_default()
+}
+
+fn sets(context: &FitContext<'_>, base: &Refit<'_>, effects: &[Effect], each: usize) -> Option<Vec<Asked>> {
+    let (model, _) = base.problem.model(0, &base.x[..base.problem.free.len()]).ok()?;
+    let stretches = cut(context.records, SWINGS * std::f64::consts::TAU / model.pace_rad_s())?;
+    let short = context.on(&stretches);
+    let laws: Vec<Effect> = effects.iter().copied().filter(|effect| is_told(*effect, effects)).collect();
+    let of_camera = OF_CAMERA.iter().filter(|own| effects.contains(&own.0));
+    let all = of_camera.clone().map(|own| own.0).chain(laws.iter().copied()).collect();
+    let hypothesis = Hypothesis { effects: all, dropped: None };
+    let problem = short.problem(&hypothesis, &short.noise_of(base)).ok()?;
+    let known: Vec<Parameter> = context.base.clone();
+    let allowed = known.iter().copied().chain(of_camera.map(|own| own.1));
+    let columns: Vec<Parameter> = allowed.chain(laws.iter().map(|law| law.parameters()[0])).collect();
+    let reach_s = STATE_NEAR / model.pace_rad_s();
+    let mut values: Vec<(Parameter, f64)> = known.iter().map(|p| (*p, base.value(*p).unwrap_or(0.0))).collect();
+    let beside = columns.len() - laws.len();
+    let mut found = Vec::new();
+    for _ in 0..PASSES {
+        let squares = linearised(&problem, &values, &columns, reach_s)?;
+        found = squares.best_sets(beside, each);
+        let Some(best) = found.first() else { break };
+        values.iter_mut().zip(&best.values).for_each(|(own, value)| own.1 = *value);
+    }
+    // corners are dear, and nothing is lost with the second best of those that have them
+    let has_corners = |set: &Set| set.laws.iter().any(|law| laws[*law].has_corners());
+    let mut with_corners: Vec<usize> = Vec::new();
+    found.retain(|set| {
+        let count = set.laws.len();
+        let is_second = has_corners(set) && with_corners.contains(&count);
+        with_corners.extend(has_corners(set).then_some(count));
+        !is_second
+    });
+    let asked = |set: Set| {
+        let effects: Vec<Effect> = set.laws.iter().map(|law| laws[*law]).collect();
+        let of_set = effects.iter().map(|effect| effect.parameters()[0]);
+        let of_laws = of_set.zip(set.values[beside..].iter().copied());
+        let start = known.iter().copied().zip(set.values.iter().copied()).chain(of_laws).collect();
+        Asked { hypothesis: Hypothesis { effects, dropped: None }, start }
+    };
+    Some(found.into_iter().map(asked).collect())
+}
+
+/// Whether an effect is a law that acts at every instant by a torque in proportion to its coefficient, and that no error of the camera among some effects does as
+/// well: a steady force sideways tilts the swing, as a tilted camera does, and an error of measurement is not to be blamed on physics.
+fn is_told(effect: Effect, effects: &[Effect]) -> bool {
+    let entry = effect.entry();
+    let is_imitated = effect == Effect::SideForce && effects.contains(&Effect::CameraTilt);
+    let acts_always = matches!(entry.cost, Cost::Ordinary | Cost::Corners) && entry.acts != Acts::Motion;
+    acts_always && entry.place != Place::Camera && !is_imitated
+}
+
+/// The recordings in stretches of some length; `None` where the frames are too few for it.
+fn cut(records: &[Record], length_s: f64) -> Option<Vec<Record>> {
+    let count = |record: &Record| (((record.t_s[record.len() - 1] - record.t_s[0]) / length_s) as usize).max(1);
+    let stretches: Vec<Record> = records.iter().flat_map(|record| record.cut(count(record))).collect();
+    stretches.iter().all(|stretch| stretch.len() >= FEWEST_ROWS).then_some(stretches)
+}
+
+/// What the base model leaves of all stretches with some values, and its derivatives, the starts projected out.
+fn linearised(
+    problem: &Problem<'_>,
+    values: &[(Parameter, f64)],
+    columns: &[Parameter],
+    reach_s: f64,
+) -> Option<LeastSquares> {
+    let mut x = problem.start_values().ok()?;
+    for (value, parameter) in x.iter_mut().zip(&problem.free) {
+        let given = values.iter().find(|(known, _)| known == parameter).map(|(_, value)| *value);
+        let is_law = parameter.is_proportional() && columns.contains(parameter);
+        *value = given.unwrap_or(if is_law { 0.0 } else { *value });
+    }
+    x.extend(problem.records.iter().flat_map(|stretch| stretch.start_near(0, reach_s)));
+    let places: Vec<usize> =
+        columns.iter().map(|own| problem.free.iter().position(|free| free == own)).collect::<Option<_>>()?;
+    let free = problem.free.len();
+    let mut rows = Vec::new();
+    for block in problem.blocks(&x)?.into_iter().filter(|block| block.robust) {
+        let mut own = DMatrix::zeros(block.residual.len(), columns.len() + 1);
+        own.column_mut(0).copy_from(&block.residual);
+        places.iter().enumerate().for_each(|(k, place)| own.column_mut(k + 1).copy_from(&block.slopes.column(*place)));
+        let starts = block.slopes.columns(free, block.slopes.ncols() - free).into_owned();
+        let of_starts = starts.qr().q();
+        own -= &of_starts * of_starts.tr_mul(&own);
+        rows.push(own);
+    }
+    let independent = problem.records.len() * problem.marks() * VALUES_EACH;
+    let known = |p: &Parameter| {
+        let of_camera = OF_CAMERA.iter().find(|own| own.1 == *p).map(|own| (0.0, own.2));
+        let belief = problem.beliefs.iter().find(|belief| belief.parameter == *p);
+        belief.map(|belief| (belief.value, belief.sd)).or(of_camera)
+    };
+    let column = |(p, place): (&Parameter, &usize)| Column {
+        from: x[*place],
+        is_not_negative: p.is_not_negative(),
+        belief: known(p),
+    };
+    Some(LeastSquares::of(&rows, columns.iter().zip(&places).map(column).collect(), independent))
+}
