@@ -13,7 +13,10 @@ use super::sought::{Candidate, candidates};
 use crate::experiment::Law;
 use crate::model::effects::Effect as _;
 use crate::model::effects::formula::Formula;
-use crate::model::{ForwardModel, Motion, Partials};
+use crate::model::{ForwardModel, Motion, Parameter, Partials};
+
+/// Scales of a term's state to begin with, over those that it had beside a name.
+const SCALED: [f64; 3] = [1.0, 0.7, 1.4];
 
 /// Terms that were fitted beside some effects, with the length of the description.
 pub struct Described<'a> {
@@ -41,7 +44,39 @@ pub fn descriptions<'a>(context: &FitContext<'a>, best: &Refit<'a>) -> Option<Ve
     let ended = |(candidate, fit): (Candidate, Refit<'a>)| ended(context, candidate, fit);
     let fitted: Vec<(Vec<Term>, Refit<'a>)> =
         foremost(begun, count).into_par_iter().with_max_len(1).map(ended).chain([(Vec::new(), best.clone())]).collect();
-    described(fitted)
+    let mut order = described(fitted)?;
+    // a term that is nearly right makes names superfluous that were needed without it
+    for _ in 0..best.hypothesis.effects.len() {
+        let without_one = without_a_name(context, &order[0]);
+        let none_shorter = without_one.is_empty();
+        let shortest = order[0].fit.hypothesis.clone();
+        let all = order.into_iter().map(|own| (own.terms, own.fit)).chain(without_one);
+        order = described(all.collect())?;
+        if none_shorter || order[0].fit.hypothesis == shortest {
+            break;
+        }
+    }
+    Some(order)
+}
+
+/// A description with terms without each of its names, from where it stands, and from there with the scales of the terms' states smaller and larger: a threshold
+/// or a width has false minima.
+fn without_a_name<'a>(context: &FitContext<'a>, own: &Described<'a>) -> Vec<(Vec<Term>, Refit<'a>)> {
+    let with = with_laws(context, &own.terms);
+    let names = if own.terms.is_empty() { &[][..] } else { &own.fit.hypothesis.effects };
+    // a term's amplitude comes first
+    let scales: Vec<Parameter> =
+        own.terms.iter().flat_map(|term| term.law.coefficients().skip(1)).map(|(parameter, _)| parameter).collect();
+    let fewer = |name: &Effect| {
+        let hypothesis = own.fit.hypothesis.without(*name);
+        let from = |factor: f64| {
+            let start: Vec<_> = scales.iter().filter_map(|p| Some((*p, factor * own.fit.value(*p)?))).collect();
+            with.begin(&hypothesis, &own.fit, &start)
+        };
+        let begun = SCALED.map(from).into_iter().flatten().min_by(|a, b| a.chi2.total_cmp(&b.chi2))?;
+        Some(ended(context, Candidate { terms: own.terms.clone(), hypothesis, gain: 0.0 }, begun))
+    };
+    names.par_iter().with_max_len(1).filter_map(fewer).collect()
 }
 
 /// The context of fits with some laws more.
