@@ -269,7 +269,7 @@ fn one_link_lacks_a_damper_where_its_file_states_none() {
 #[test]
 fn a_spring_at_the_hinge_is_not_taken_for_a_wrong_inertia() {
     let folder = Folder::new();
-    let angles = folder.swing(ONE_LINK, "hinge_stiffness = 5e-3\n");
+    let angles = folder.swing(ONE_LINK, "hinge_stiffness = 2e-2\n");
     let report = folder.diagnosis(&angles, ONE_LINK, &[]);
     assert!(names(&report["verdict"]["class"]).contains(&"hinge_stiffness"), "{:#}", report["verdict"]);
 }

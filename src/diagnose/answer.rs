@@ -1,5 +1,6 @@
 //! All that was found → the answer.
 
+use super::context::FitContext;
 use super::effect::{Effect, Place};
 use super::findings::Findings;
 use super::latent::Latent;
@@ -8,13 +9,14 @@ use super::misfit::is_beyond_noise;
 use super::posterior::{Candidate, left_of_excess};
 use super::refit::Refit;
 use super::report::{
-    Answer, Baseline, Diagnosis, Drawn, Hypothetical, Lacking, Limits, Location, Proof, Quantity, Remainder, Trust,
-    Unknown,
+    Answer, Baseline, Diagnosis, Drawn, Hypothetical, Lacking, Limits, Location, Pieces, Proof, Quantity, Remainder,
+    Trust, Unknown,
 };
 use super::settings::CertificateSettings;
 use super::torque::MissingTorque;
 use super::verdict::Status;
 use super::{energy, locate};
+use crate::fit::Record;
 use crate::model::Parameter;
 
 /// Candidates written.
@@ -57,8 +59,18 @@ impl Diagnosis {
             detectable: Limits(findings.adequacy.detectable.clone()),
             search: findings.rounds.clone(),
             undecided: findings.undecided.clone(),
+            pieces: Pieces::of(&findings.context),
             drawn: Drawn::of(findings),
         }
+    }
+}
+
+impl Pieces {
+    fn of(context: &FitContext<'_>) -> Option<Self> {
+        let count = context.records.len();
+        let length_s = |record: &Record| record.t_s[record.len() - 1] - record.t_s[0];
+        let whole_s: f64 = context.records.iter().map(length_s).sum();
+        context.is_in_pieces().then(|| Self { count, length_s: whole_s / count as f64 })
     }
 }
 

@@ -155,11 +155,14 @@ fn beyond(context: &FitContext<'_>, fit: &Refit<'_>, pieces: usize) -> Option<Pr
     let early = context.on(&context.records[..pieces]);
     let (mut near, free, starts) = (fit.clone(), fit.problem.free.len(), 2 * fit.problem.shapes());
     near.x.truncate(free + pieces * starts);
-    let fitted = early.refit(&fit.hypothesis, &near, &[])?;
+    let within = |pieces: usize| fit.hypothesis.dropped.filter(move |dropped| dropped.0 < pieces);
+    near.hypothesis = Hypothesis { dropped: within(pieces), ..fit.hypothesis.clone() };
+    let fitted = early.refit(&near.hypothesis, &near, &[])?;
     let last = pieces - 1;
     let rest = [Record::joined(&context.records[last..])?];
     let onwards = context.on(&rest);
-    let hypothesis = Hypothesis { dropped: fit.hypothesis.dropped.filter(|d| d.0 < last), ..fit.hypothesis.clone() };
+    let in_last = within(pieces).filter(|dropped| dropped.0 == last).map(|(_, at_s)| (0, at_s));
+    let hypothesis = Hypothesis { dropped: in_last, ..fit.hypothesis.clone() };
     let problem = onwards.problem(&hypothesis, &onwards.noise_of(fit)).ok()?;
     let x = [&fitted.x[..free], &fitted.x[free + last * starts..]].concat();
     let rmse_rad = errors(&problem.predict(0, &x, false).ok()?.values, &rest[0], context.records[last].len())?;

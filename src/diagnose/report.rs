@@ -39,9 +39,20 @@ pub struct Diagnosis {
     pub search: Vec<RoundEnd>,
     /// Rounds of the search that its budget did not allow.
     pub undecided: Vec<&'static str>,
+    /// The pieces of the recordings that were fitted, where these were cut: number and mean length.
+    pub pieces: Option<Pieces>,
     /// What a figure shows.
     #[serde(skip)]
     pub drawn: Option<Drawn>,
+}
+
+/// Pieces of recordings.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Pieces {
+    /// Of all recordings.
+    pub count: usize,
+    /// Mean.
+    pub length_s: f64,
 }
 
 /// The base model beside the first recording.

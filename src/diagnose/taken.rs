@@ -23,8 +23,7 @@ impl Taken {
 }
 
 /// The base model's parameters and what is known of them. Inertias, centres of mass and lengths of general links were measured, and so are free within what such
-/// measurements are worth: an inertia that is off by a hundredth would otherwise pass for a clock or a spring. Of one link they all change the pace alone, but an inertia
-/// may be stated as zero.
+/// measurements are worth: an inertia that is off by a hundredth would otherwise pass for a clock or a spring.
 ///
 /// # Errors
 /// [`crate::error::Error::Simulation`] for a specimen that cannot swing.
@@ -40,6 +39,8 @@ pub fn base_of(
         let chain = Chain::of(&experiment.specimen)?;
         let share = |of: OfLink| match of {
             OfLink::Inertia => settings.inertia_share,
+            // a single weight on a thread hangs where a ruler says
+            OfLink::Com if chain.count() == 1 => settings.length_share,
             OfLink::Com => settings.com_share,
             OfLink::Length => settings.length_share,
         };

@@ -3,6 +3,7 @@
 use std::fmt::Write;
 
 use crate::cli::table::{Table, number, paragraph};
+use crate::diagnose::report::Pieces;
 use crate::diagnose::words::names;
 use crate::diagnose::{Detectable, Diagnosis, Status};
 
@@ -21,6 +22,12 @@ pub(super) fn page(diagnosis: &Diagnosis) -> String {
     if !diagnosis.undecided.is_empty() {
         let rounds = diagnosis.undecided.join(", ");
         text.push_str(&paragraph("", &format!("The search's budget did not allow these rounds: {rounds}.")));
+    }
+    if let Some(Pieces { count, length_s }) = diagnosis.pieces {
+        let pieces = format!(
+            "Fitted were {count} pieces of {length_s:.1} s, each with a start of its own: every model errs by more than the noise, and over a whole recording small errors add up."
+        );
+        text.push_str(&paragraph("", &pieces));
     }
     text.push('\n');
     // where the names stand although more is missing, they are weighed among themselves
