@@ -154,7 +154,14 @@ mod tests {
             Some(swing(*t) + NOISE_RAD * noise)
         };
         let theta_rad = vec![t_s.iter().map(noisy).collect()];
-        Record { path: "swing".into(), relative_sd: vec![vec![1.0; t_s.len()]], t_s, theta_rad, in_step: 0.0 }
+        Record {
+            path: "swing".into(),
+            relative_sd: vec![vec![1.0; t_s.len()]],
+            t_s,
+            theta_rad,
+            in_step: 0.0,
+            continues: false,
+        }
     }
 
     fn is_noise(record: &Record, tolerance: f64) {
