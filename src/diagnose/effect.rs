@@ -281,6 +281,7 @@ static TABLE: [Entry; 17] = {
             needs: Needs::Joint,
             law_error: 0.05,
             set_up: |problem| problem.yields(),
+            shapes: DRY,
             ..velocity(entry(&[P::HysteresisTorque, P::HysteresisYield], Joint, Loss, "hysteresis of the joint"))
         },
         Entry {

@@ -278,8 +278,8 @@ pub struct LawSettings {
     pub nothing_left: f64,
     /// A term whose effect on the angles has this cosine with that of another, or of a name, is the same under another name (judgement).
     pub the_same: f64,
-    /// A term of the grammar with the shape of a law of the table, whose torque along the motion has this cosine with that law's, is that law (judgement: they differ
-    /// by less than half; friction that is gone at a fifth of the largest speed has 0.5).
+    /// A term of the grammar with the shape of a law of the table, whose torque along the motion has this cosine with that law's, is that law (judgement: it is then
+    /// more than half of the term, by squares; friction that is gone at a fifth of the largest speed has 0.5).
     pub the_same_law: f64,
     /// The foremost terms, each of which is paired with every one that promises less (cost).
     pub paired: usize,
@@ -445,7 +445,7 @@ impl Default for LawSettings {
         Self {
             nothing_left: 1e-3,
             the_same: 0.999,
-            the_same_law: 0.9,
+            the_same_law: 0.71,
             paired: 12,
             fewest: 2,
             most: 6,

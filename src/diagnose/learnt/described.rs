@@ -182,7 +182,7 @@ impl Along {
             let (model, swing, true_s) = fit.motion(record)?;
             let at = |t_s: &f64| {
                 let state = swing.at(*t_s);
-                model.motion(*t_s, &state.theta_rad, &state.omega_rad_s)
+                model.motion(*t_s, &state.theta_rad, &[state.omega_rad_s, state.hidden].concat())
             };
             let motions = true_s.iter().map(at).collect();
             Some((model, motions))
