@@ -497,10 +497,13 @@ fn a_real_arm_has_dry_friction_and_quadratic_drag_beside_its_viscous_hinge() {
     let named = verdict["effects"].as_array().unwrap();
     for loss in ["hinge_coulomb", "air_quadratic"] {
         assert!(named.iter().any(|name| name == loss), "{verdict:#}");
+        assert!(verdict["inclusion"][loss].as_f64().unwrap() > 0.9, "{verdict:#}");
     }
+    // no model is right to the noise, so pieces with starts of their own are fitted
+    assert!(report["pieces"]["count"].as_u64().unwrap() > 2, "{}", report["pieces"]);
     let [before, after] =
         ["baseline_rmse_rad", "augmented_rmse_rad"].map(|model| report["heldout"][model][0].as_f64().unwrap());
-    assert!(after < 0.5 * before, "{}", report["heldout"]);
+    assert!(after < 0.25 * before, "{}", report["heldout"]);
 }
 
 #[test]

@@ -16,7 +16,7 @@ use super::settings::CertificateSettings;
 use super::torque::MissingTorque;
 use super::verdict::Status;
 use super::{energy, locate};
-use crate::fit::Record;
+use crate::fit::{Record, recordings};
 use crate::model::Parameter;
 
 /// Candidates written.
@@ -25,8 +25,9 @@ const WRITTEN: usize = 25;
 impl Remainder {
     fn of(findings: &Findings<'_>) -> Self {
         let named = findings.named();
-        let rms_rad = rmse_rad(named);
-        let over_noise = rms_rad.iter().zip(&named.problem.noise[0].sd_rad).map(|(rms, noise)| rms / noise).collect();
+        let left = named.residuals_of_first();
+        let (rms_rad, noise_rad) = left.map(|left| (left.rmse_rad, left.noise_rad)).unwrap_or_default();
+        let over_noise = rms_rad.iter().zip(&noise_rad).map(|(rms, noise)| rms / noise).collect();
         let locate::Departure { goes_with, frequency_hz, .. } = findings.remaining;
         let present = findings.posterior.remains;
         Self {
@@ -81,7 +82,7 @@ impl Baseline {
         Self {
             parameters: quantities(base, &base.problem.free).into_iter().map(|(p, q)| (p.id(), q)).collect(),
             rmse_rad: rmse_rad(base),
-            noise_rad: noise.sd_rad.clone(),
+            noise_rad: noise_rad(base, 0),
             noise_correlation: noise.colour.iter().map(|colour| colour.rho).collect(),
             noise_share_correlated: noise.colour.iter().map(|colour| colour.share).collect(),
             noise_correlation_across: noise.across,
@@ -204,7 +205,7 @@ impl Proof {
             baseline_rmse_rad: held_out.baseline.rmse_rad.clone(),
             augmented_rmse_rad: of_learnt.unwrap_or_else(|| named_rmse_rad.clone()),
             named_rmse_rad,
-            noise_rad: findings.posterior.base().problem.noise[held_out.record].sd_rad.clone(),
+            noise_rad: noise_rad(findings.posterior.base(), held_out.record),
         })
     }
 }
@@ -241,6 +242,12 @@ fn quantities(fit: &Refit<'_>, of: &[Parameter]) -> Vec<(Parameter, Quantity)> {
         (*p, Quantity { value: fit.value(*p), sd: covariance[(i, i)].sqrt(), unit: p.unit() })
     };
     of.iter().enumerate().map(one).collect()
+}
+
+/// Noise of the recording that begins with a record.
+fn noise_rad(fit: &Refit<'_>, first: usize) -> Vec<f64> {
+    let pieces = recordings(fit.problem.records).into_iter().find(|pieces| pieces.start == first);
+    pieces.and_then(|pieces| fit.residuals_of(pieces)).map(|left| left.noise_rad).unwrap_or_default()
 }
 
 fn rmse_rad(fit: &Refit<'_>) -> Vec<f64> {

@@ -30,9 +30,7 @@ pub struct Departure {
 pub fn departure(null: &Refit<'_>) -> Departure {
     for pieces in recordings(null.problem.records) {
         let first = pieces.start;
-        let residuals =
-            pieces.map(|piece| null.residuals(piece)).collect::<Option<Vec<_>>>().and_then(Residuals::joined);
-        let Some(residuals) = residuals else { continue };
+        let Some(residuals) = null.residuals_of(pieces) else { continue };
         let Ok((model, _)) = null.problem.model(first, &null.x[..null.problem.free.len()]) else { continue };
         let window_s = std::f64::consts::TAU / model.pace_rad_s();
         let verdict = Verdict::of(&residuals, window_s);

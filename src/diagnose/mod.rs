@@ -7,7 +7,7 @@
 //! | 3 | what it lacks is sought: effects are proposed, fitted, kept | [`mod@search`], [`screen`], [`stretches`], [`misfit`], [`laws`] |
 //! | 4 | a strip's rods are counted | [`rods`] |
 //! | 5 | the hypotheses are weighed, beside something that is not in the table | [`posterior`], [`evidence`], [`bag`], [`unknowns`], [`latent`], [`basis_law`] |
-//! | 6 | in doubt the search goes on, and they are weighed again | [`mod@search`], [`search::horizon`] |
+//! | 6 | in doubt the search goes on, in pieces of the recordings where these are long enough, and they are weighed again | [`mod@search`], [`preparation`], [`search::horizon`] |
 //! | 7 | what was not fitted is predicted | [`heldout`] |
 //! | 8 | what the names leave is learnt, as a law that no table holds | [`learnt`], [`grammar`] |
 //! | 9 | the base model is judged, and what could have been seen; the verdict: the answer, its class, what would decide | [`adequacy`], [`verdict`] |
@@ -175,7 +175,7 @@ mod tests {
     fn imports() -> BTreeMap<String, BTreeSet<String>> {
         let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("src/diagnose");
         let mut files = Vec::new();
-        for folder in ["", "laws", "learnt", "search"] {
+        for folder in ["", "laws", "learnt", "search", "stretches"] {
             for entry in fs::read_dir(root.join(folder)).unwrap() {
                 let path = entry.unwrap().path();
                 let file = path.file_stem().unwrap().to_str().unwrap().to_owned();

@@ -1,5 +1,7 @@
 //! A hypothesis fitted to whole recordings.
 
+use std::ops::Range;
+
 use nalgebra::{DMatrix, DVector};
 
 use super::hypothesis::Hypothesis;
@@ -139,7 +141,11 @@ impl<'a> Refit<'a> {
 
     /// What it leaves of the first recording, in however many pieces.
     pub fn residuals_of_first(&self) -> Option<Residuals> {
-        let pieces = recordings(self.problem.records).into_iter().next()?;
+        self.residuals_of(recordings(self.problem.records).into_iter().next()?)
+    }
+
+    /// What it leaves of the pieces of a recording.
+    pub fn residuals_of(&self, pieces: Range<usize>) -> Option<Residuals> {
         Residuals::joined(pieces.map(|piece| self.residuals(piece)).collect::<Option<_>>()?)
     }
 
@@ -150,12 +156,12 @@ impl<'a> Refit<'a> {
 
     /// What it leaves of the angles, over their noise: root mean squares, of the worst recording.
     pub fn over_noise(&self) -> f64 {
-        let of = |record: usize| {
-            let Some(left) = self.residuals(record) else { return 0.0 };
+        let of = |pieces: Range<usize>| {
+            let Some(left) = self.residuals_of(pieces) else { return 0.0 };
             let squares = left.rmse_rad.iter().zip(&left.noise_rad).map(|(left, noise)| (left / noise).powi(2));
             (squares.sum::<f64>() / left.rmse_rad.len().max(1) as f64).sqrt()
         };
-        (0..self.problem.records.len()).map(of).fold(0.0, f64::max)
+        recordings(self.problem.records).into_iter().map(of).fold(0.0, f64::max)
     }
 
     /// Number of values.

@@ -126,7 +126,7 @@ pub struct SearchSettings {
     pub com_share: f64,
     /// The distance of its two pivots to this one (judgement: a millimetre in a fifth of a metre, with a ruler).
     pub length_share: f64,
-    /// Sets of the largest number of laws that is worth its coefficients which are fitted because the recorded motion asks for them (cost).
+    /// Sets of the largest number of laws that is worth its coefficients which are fitted because short stretches ask for them (cost).
     pub asked: usize,
     /// Fits from which pairs are built (cost).
     pub pair_seeds: usize,

@@ -185,3 +185,31 @@ fn relative(sd_rad: &[Option<f64>]) -> Vec<f64> {
     // a stated error of next to nothing must not outweigh everything else
     sd_rad.iter().map(|sd| sd.map_or(1.0, |sd| (sd / median).clamp(0.3, 30.0))).collect()
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn record(rows: usize) -> Record {
+        Record {
+            path: "made".into(),
+            t_s: (0..rows).map(|row| 0.1 * row as f64).collect(),
+            theta_rad: vec![(0..rows).map(|row| (row % 7 > 0).then_some(row as f64)).collect(); 2],
+            relative_sd: vec![vec![1.0; rows]; 2],
+            in_step: 0.25,
+            continues: false,
+        }
+    }
+
+    #[test]
+    fn pieces_are_the_recording_again_when_joined_and_are_counted_as_one() {
+        let whole = record(103);
+        let pieces = whole.cut(4);
+        assert_eq!(pieces.iter().map(Record::len).collect::<Vec<_>>(), [25, 26, 26, 26]);
+        assert_eq!(pieces.iter().map(|piece| piece.continues).collect::<Vec<_>>(), [false, true, true, true]);
+        assert_eq!(Record::joined(&pieces), Some(whole));
+        let with_another = [pieces.as_slice(), &record(20).cut(2)].concat();
+        assert_eq!(recordings(&with_another), [0..4, 4..6]);
+        assert_eq!(Record::joined(&[]), None);
+    }
+}

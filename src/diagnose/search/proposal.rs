@@ -34,7 +34,7 @@ pub enum Proposal<'f, 'a> {
     Restart(&'f Refit<'a>),
     /// A restart along the motion of another fit, which follows the recordings: the hypothesis cannot fall out of step with them.
     Along(Hypothesis, &'f Refit<'a>),
-    /// A set of laws that the recorded motion itself asks for, along that motion.
+    /// A set of laws that short stretches ask for, along the recorded motion.
     Asked(Asked, &'f Refit<'a>),
     /// A hypothesis from a fit that has fewer of its effects, the others being nothing: it cannot leave more than that one does.
     Nested(Hypothesis, &'f Refit<'a>),

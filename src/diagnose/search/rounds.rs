@@ -16,7 +16,7 @@ use super::proposal::{Proposal, comes_to_rest};
 /// One round.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Round {
-    /// Sets of laws that the recorded motion itself asks for, where the base model leaves far more than noise.
+    /// Sets of laws that short stretches of the recordings ask for, where the base model leaves far more than noise.
     Asked,
     /// Every effect alone, beside the base model.
     Singles,
@@ -76,7 +76,7 @@ impl Round {
     /// The name, of which progress tells.
     pub fn name(self) -> &'static str {
         match self {
-            Self::Asked => "balance of torques",
+            Self::Asked => "short stretches",
             Self::Singles => "effects",
             Self::DearSingles => "dear effects",
             Self::FromTheLeader => "from the best",

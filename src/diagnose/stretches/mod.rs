@@ -151,3 +151,55 @@ fn linearised(
     };
     Some(LeastSquares::of(&rows, columns.iter().zip(&places).map(column).collect(), independent))
 }
+
+#[cfg(test)]
+mod tests {
+    use std::path::Path;
+
+    use rand::SeedableRng;
+    use rand::rngs::StdRng;
+    use rand_distr::{Distribution, Normal};
+
+    use super::*;
+    use crate::diagnose::settings::Settings;
+    use crate::diagnose::taken::Taken;
+    use crate::diagnose::{base, preparation};
+    use crate::experiment::Experiment;
+    use crate::model::{ForwardModel, OfLink, State, Trajectory};
+
+    fn two_arms(length_m: f64, effects: &str) -> Experiment {
+        let text = format!(
+            "[[specimen.links]]\nlength_m = {length_m}\nmass_kg = 0.0938\ncom_m = 0.1086\ninertia_kg_m2 = 4.375e-4\n\
+             [[specimen.links]]\nlength_m = 0.23\nmass_kg = 0.1376\ncom_m = 0.1168\ninertia_kg_m2 = 1.269e-3\n\
+             [model]\nk_eq_n_m_per_rad = 0.0\nc_eq_n_m_s_per_rad = 1e-5\nrelease_rad = [0.8, 0.6]\n\
+             [model.effects]\nhinge_viscous = 5e-5\n{effects}"
+        );
+        Experiment::parse(&text, Path::new("two arms")).unwrap()
+    }
+
+    #[test]
+    fn two_arms_of_which_one_is_longer_than_stated_ask_for_the_losses_hidden_in_them() {
+        let truth = two_arms(0.1737, "hinge_coulomb = 6e-4\nair_quadratic = 0.017\n");
+        let model = ForwardModel::of(&truth).unwrap();
+        let start = State::released(&model, &truth.model.release_rad).unwrap();
+        let swing = Trajectory::swing(&model, &start, 0.0, 40.0).unwrap();
+        let t_s: Vec<f64> = (0..2000).map(|row| 0.02 * f64::from(row)).collect();
+        let (mut random, noise) = (StdRng::seed_from_u64(1), Normal::new(0.0, 1e-4).unwrap());
+        let mut angle = |link: usize, t_s: &f64| Some(swing.at(*t_s).theta_rad[link] + noise.sample(&mut random));
+        let theta_rad = (0..2).map(|link| t_s.iter().map(|t| angle(link, t)).collect()).collect();
+        let relative_sd = vec![vec![1.0; t_s.len()]; 2];
+        let record = Record { path: "made".into(), theta_rad, relative_sd, t_s, in_step: 0.0, continues: false };
+        let (settings, stated) = (Settings::default(), two_arms(0.173, ""));
+        let prepared = preparation::prepare(&[record], &stated, &settings).unwrap();
+        let context = base::context(&prepared, &prepared.experiment, Taken::AtItsWord, &settings).unwrap();
+        let fit = base::fitted(&context, &prepared).unwrap();
+        let asked = asked_for(&context, &fit, &base::candidates(&context), 3);
+        let pair = asked.iter().find(|asked| asked.hypothesis.effects.len() == 2).unwrap();
+        assert_eq!(pair.hypothesis.effects, [Effect::HingeCoulomb, Effect::AirQuadratic], "{asked:?}");
+        let value = |parameter| pair.start.iter().find(|(own, _)| *own == parameter).unwrap().1;
+        let [rubs, drags] = [value(Parameter::HingeCoulomb), value(Parameter::AirQuadratic)];
+        assert!((rubs / 6e-4 - 1.0).abs() < 0.1 && (drags / 0.017 - 1.0).abs() < 0.1, "{rubs} {drags}");
+        let length_m = value(Parameter::Link(0, OfLink::Length));
+        assert!((length_m / 0.1737 - 1.0).abs() < 1e-3, "{length_m}");
+    }
+}
