@@ -131,9 +131,11 @@ impl<'a, 'p> Search<'a, 'p> {
         }
     }
 
-    /// Searches for what the base model lacks, the file taken at its word. Whole recordings that are dear and far from the model are left to their pieces.
+    /// Searches for what the base model lacks, the file taken at its word. Whole recordings of a rig that are dear and far from the model are left to their pieces:
+    /// of bearings and castings no model is right to the noise.
     pub fn run(&mut self) {
-        if self.prepared.part < 1.0 && self.leaves_more_than_noise() && self.pieces().is_some() {
+        let is_rig = !self.context.experiment.specimen.links.is_empty();
+        if is_rig && self.prepared.part < 1.0 && self.leaves_more_than_noise() && self.pieces().is_some() {
             return;
         }
         self.begin();
@@ -218,7 +220,9 @@ impl<'a, 'p> Search<'a, 'p> {
             loosened.begin();
             Some(loosened)
         };
-        let mut search = match self.in_pieces(pieces).or_else(loosened) {
+        // where a model is right to the noise the whole tells more than its pieces
+        let of_pieces = self.in_pieces(pieces).filter(Self::leaves_more_than_noise);
+        let mut search = match of_pieces.or_else(loosened) {
             Some(loosened) => loosened.after(self),
             None => self,
         };
