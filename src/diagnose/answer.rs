@@ -16,7 +16,7 @@ use super::settings::CertificateSettings;
 use super::torque::MissingTorque;
 use super::verdict::Status;
 use super::{energy, locate};
-use crate::fit::{Record, recordings};
+use crate::fit::{Record, recordings, rms_of_pieces};
 use crate::model::Parameter;
 
 /// Candidates written.
@@ -69,8 +69,7 @@ impl Diagnosis {
 impl Pieces {
     fn of(context: &FitContext<'_>) -> Option<Self> {
         let count = context.records.len();
-        let length_s = |record: &Record| record.t_s[record.len() - 1] - record.t_s[0];
-        let whole_s: f64 = context.records.iter().map(length_s).sum();
+        let whole_s: f64 = context.records.iter().map(Record::span_s).sum();
         context.is_in_pieces().then(|| Self { count, length_s: whole_s / count as f64 })
     }
 }
@@ -247,7 +246,8 @@ fn quantities(fit: &Refit<'_>, of: &[Parameter]) -> Vec<(Parameter, Quantity)> {
 /// Noise of the recording that begins with a record.
 fn noise_rad(fit: &Refit<'_>, first: usize) -> Vec<f64> {
     let pieces = recordings(fit.problem.records).into_iter().find(|pieces| pieces.start == first);
-    pieces.and_then(|pieces| fit.residuals_of(pieces)).map(|left| left.noise_rad).unwrap_or_default()
+    let of_piece = |piece: usize| &fit.problem.noise[piece].sd_rad[..];
+    pieces.map(|pieces| rms_of_pieces(&pieces.map(of_piece).collect::<Vec<_>>())).unwrap_or_default()
 }
 
 fn rmse_rad(fit: &Refit<'_>) -> Vec<f64> {

@@ -54,7 +54,6 @@ pub mod taken;
 pub mod torque;
 pub mod unknowns;
 pub mod verdict;
-
 pub mod words;
 
 use std::sync::OnceLock;

@@ -49,7 +49,7 @@ impl Prepared {
         let (length_s, reach_s) = (swings * std::f64::consts::TAU / pace_rad_s, STATE_NEAR / pace_rad_s);
         let (mut records, mut noise, mut starts) = (Vec::new(), Vec::new(), Vec::new());
         for (record, own_noise) in self.records.iter().zip(&self.noise) {
-            let pieces = record.cut(((record.t_s[record.len() - 1] - record.t_s[0]) / length_s) as usize);
+            let pieces = record.pieces(length_s);
             if pieces.len() < FEWEST_PIECES || pieces.iter().any(|piece| piece.len() < FEWEST_ROWS) {
                 return None;
             }

@@ -128,13 +128,19 @@ impl Residuals {
     /// Those of pieces of one recording, together; `None` of none.
     pub fn joined(pieces: Vec<Self>) -> Option<Self> {
         let links = pieces.first()?.values.len();
-        let noise_rad = (0..links).map(|link| rms(pieces.iter().map(|piece| piece.noise_rad[link]))).collect();
+        let noise_rad = rms_of_pieces(&pieces.iter().map(|piece| &piece.noise_rad[..]).collect::<Vec<_>>());
         let mut values = vec![Vec::new(); links];
         for piece in pieces {
             values.iter_mut().zip(piece.values).for_each(|(all, own)| all.extend(own));
         }
         Some(Self::of(values, noise_rad))
     }
+}
+
+/// Of each angle the root mean square over pieces of about as many rows.
+pub(crate) fn rms_of_pieces(pieces: &[&[f64]]) -> Vec<f64> {
+    let links = pieces.first().map_or(0, |piece| piece.len());
+    (0..links).map(|link| rms(pieces.iter().map(|piece| piece[link]))).collect()
 }
 
 fn rms(values: impl ExactSizeIterator<Item = f64>) -> f64 {

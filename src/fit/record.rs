@@ -72,7 +72,17 @@ impl Record {
         }
     }
 
-    /// So many pieces of about as many rows each.
+    /// From its first stamp to its last.
+    pub fn span_s(&self) -> f64 {
+        self.t_s.last().zip(self.t_s.first()).map_or(0.0, |(last, first)| last - first)
+    }
+
+    /// As many pieces of some length as it holds, of about as many rows each; itself where it is shorter.
+    pub fn pieces(&self, length_s: f64) -> Vec<Self> {
+        self.cut((self.span_s() / length_s) as usize)
+    }
+
+    /// So many pieces of about as many rows each, at least one.
     pub fn cut(&self, count: usize) -> Vec<Self> {
         let border = |piece: usize| piece * self.len() / count.max(1);
         let piece = |k: usize| Self { continues: self.continues || k > 0, ..self.rows(border(k)..border(k + 1)) };

@@ -187,12 +187,10 @@ impl<'a, 'p> Search<'a, 'p> {
     /// A search of the recordings in pieces, each with a start of its own. Where every model leaves far more than noise, the sum of squares of a whole recording says
     /// how the model's small errors add up, and has many false minima; that of pieces says what each law does within a few swings.
     fn in_pieces(&self, kept: &'a OnceLock<Prepared>) -> Option<Self> {
-        let pieces = self.pieces().filter(|_| self.leaves_more_than_noise())?;
+        let pieces = self.leaves_more_than_noise().then(|| self.pieces()).flatten()?;
         let (experiment, settings) = (self.context.experiment, self.context.settings);
-        let taken = match lacks_a_damper(experiment, self.context.marks()) {
-            true => Taken::Loosely,
-            false => Taken::AtItsWord,
-        };
+        // there is no time for both
+        let taken = Taken::at_first(experiment, self.context.marks(), true);
         let mut search =
             Self::of_base_model(kept.get_or_init(|| pieces), experiment, taken, settings, self.progress).ok()?;
         // what the stretches ask for is where the search for more and fewer effects begins
@@ -205,8 +203,8 @@ impl<'a, 'p> Search<'a, 'p> {
         Some(search)
     }
 
-    /// Searches on: with the recordings in pieces where far more than noise is left, or, where they are too short for that, with the file taken loosely where it may be doubted, from the beginning of the recordings on where far more than noise is left, and with more
-    /// effects. A strip's fits are too dear for it.
+    /// Searches on, with more effects and fewer: of the recordings in pieces where far more than noise is left; where they are too short for that, with the file taken
+    /// loosely if it may be doubted, and from the beginning of the recordings on. A strip's fits are too dear for it.
     #[must_use]
     pub fn doubted(self, pieces: &'a OnceLock<Prepared>) -> Self {
         let enough = self.up_to(self.context.settings.search.shares.certified);
@@ -223,7 +221,7 @@ impl<'a, 'p> Search<'a, 'p> {
         // where a model is right to the noise the whole tells more than its pieces
         let of_pieces = self.in_pieces(pieces).filter(Self::leaves_more_than_noise);
         let mut search = match of_pieces.or_else(loosened) {
-            Some(loosened) => loosened.after(self),
+            Some(other) => other.after(self),
             None => self,
         };
         search.allow(search.context.settings.search.shares.further);
@@ -267,19 +265,19 @@ impl<'a, 'p> Search<'a, 'p> {
         self.fits.iter_mut().zip(nested_ok).for_each(|(fit, nested_ok)| fit.certificate.nested_ok = nested_ok);
     }
 
-    /// More effects and fewer, by turns, until nothing new leads the way; from the beginning of the recordings first where far more than noise is left.
+    /// More effects and fewer, by turns, until nothing new leads the way; first, where far more than noise is left, from the beginning of whole recordings, or of pieces
+    /// with fewer.
     fn further(&mut self) {
         self.judge_by(&without_errors_in_step(&self.base().problem.noise), 0);
         let mut tried = Tried::default();
-        if self.part == 1.0 && !self.context.is_in_pieces() && self.leaves_more_than_noise() {
+        if self.context.is_in_pieces() {
+            // the stretches have asked for as many laws as are worth it
+            self.round(Round::OneFewer, &mut tried);
+        } else if self.part == 1.0 && self.leaves_more_than_noise() {
             self.round(Round::FromTheBeginning, &mut tried);
         }
         for turn in 0..self.context.settings.search.turns {
             let led = tried.more.len();
-            if turn == 0 && self.context.is_in_pieces() {
-                // the stretches have asked for as many laws as are worth it
-                self.round(Round::OneFewer, &mut tried);
-            }
             self.round(Round::OneMore, &mut tried);
             if turn > 0 && tried.more.len() == led {
                 break;

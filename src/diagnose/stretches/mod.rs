@@ -63,7 +63,7 @@ fn sets(context: &FitContext<'_>, base: &Refit<'_>, effects: &[Effect], each: us
     let all = of_camera.clone().map(|own| own.0).chain(laws.iter().copied()).collect();
     let hypothesis = Hypothesis { effects: all, dropped: None };
     let problem = short.problem(&hypothesis, &short.noise_of(base)).ok()?;
-    let known: Vec<Parameter> = context.base.clone();
+    let known = &context.base;
     let allowed = known.iter().copied().chain(of_camera.map(|own| own.1));
     let columns: Vec<Parameter> = allowed.chain(laws.iter().map(|law| law.parameters()[0])).collect();
     let reach_s = STATE_NEAR / model.pace_rad_s();
@@ -106,8 +106,7 @@ fn is_told(effect: Effect, effects: &[Effect]) -> bool {
 
 /// The recordings in stretches of some length; `None` where the frames are too few for it.
 fn cut(records: &[Record], length_s: f64) -> Option<Vec<Record>> {
-    let count = |record: &Record| (((record.t_s[record.len() - 1] - record.t_s[0]) / length_s) as usize).max(1);
-    let stretches: Vec<Record> = records.iter().flat_map(|record| record.cut(count(record))).collect();
+    let stretches: Vec<Record> = records.iter().flat_map(|record| record.pieces(length_s)).collect();
     stretches.iter().all(|stretch| stretch.len() >= FEWEST_ROWS).then_some(stretches)
 }
 
