@@ -154,9 +154,12 @@ impl<'a> Session<'a> {
         let (mut hues, slots) = hues_of(&options.marks);
         let pictures = survey::pictures(&recording)?;
         let album = survey::album(&pictures, &area, stream.orientation);
-        album.calibrate(&mut hues, options.threshold)?;
-        let (background, camera) = survey::camera(&pictures, options, &stream);
-        let siting = survey::siting(&pictures, &hues)?;
+        let marks = || {
+            album.calibrate(&mut hues, options.threshold)?;
+            survey::siting(&pictures, &hues)
+        };
+        let (siting, (background, camera)) = rayon::join(marks, || survey::camera(&pictures, options, &stream));
+        let siting = siting?;
         let (path, stamps_s) = (path.to_owned(), Vec::new());
         Ok(Self {
             path,

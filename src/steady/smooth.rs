@@ -6,6 +6,8 @@ use super::{HALF, Luma};
 /// the two means that make one, px: farther than the noise of one pixel reaches.
 const SMOOTH_HALF: usize = 2;
 const GRADIENT_HALF: usize = 3;
+/// Of a picture that is smoothed so much every third pixel says what its neighbours say.
+const STEP: usize = 3;
 /// The picture smoothed, in which noise has hardly a gradient.
 pub(super) struct Smooth {
     width: usize,
@@ -48,8 +50,8 @@ impl Smooth {
         };
         let [mut xx, mut xy, mut yy, mut count] = [0.0f32; 4];
         let per_px = 0.5 / GRADIENT_HALF as f32;
-        for j in inside(y, self.height) {
-            for i in inside(x, self.width) {
+        for j in inside(y, self.height).step_by(STEP) {
+            for i in inside(x, self.width).step_by(STEP) {
                 let at = j * self.width + i;
                 let gx = per_px * (self.means[at + GRADIENT_HALF] - self.means[at - GRADIENT_HALF]);
                 let along = GRADIENT_HALF * self.width;
