@@ -60,6 +60,24 @@ fn warned(text: &str) -> String {
 }
 
 #[test]
+fn a_strip_whose_material_is_stated_bends_all_along() {
+    let stiffness = |text: &str| parse(text).unwrap().bending_stiffness_n_m2;
+    // E w t³/12
+    let of_film = 2.5e9 * 0.05 * 25.4e-6_f64.powi(3) / 12.0;
+    assert!((stiffness(STRIP).unwrap() / of_film - 1.0).abs() < 1e-12);
+    let links = "link_lengths_m = [0.10, 0.10]";
+    assert_eq!(stiffness(&strip(&[(links, "link_lengths_m = [0.10, 0.10]\ninertia = \"rods\"")])), None);
+    // a stated spring of a piece between two marks says more than a modulus
+    let sprung = format!("{STRIP}[model]\nk_eq_n_m_per_rad = 2e-4\n");
+    assert!((stiffness(&sprung).unwrap() / 2e-5 - 1.0).abs() < 1e-12);
+    // the file's own word is not overwritten
+    assert_eq!(stiffness(&format!("{STRIP}[model.effects]\ndistributed_flexibility = 1e-6\n")), None);
+    let soft = strip(&[("young_modulus_pa = 2.5e9\n", "inertia = \"strip\"\n")]);
+    assert!(missing(&soft).contains("nothing says how stiff it is; give thickness_m and young_modulus_pa"));
+    assert!(missing(&format!("[specimen]\ninertia = \"strip\"\n{}", ARMS.trim_start())).contains("which are rigid"));
+}
+
+#[test]
 fn a_whole_description_has_nothing_to_say() {
     for text in [STRIP, ARMS] {
         let experiment = parse(text).unwrap();

@@ -11,9 +11,11 @@ use super::settings::Settings;
 use crate::experiment::{Experiment, Model};
 
 /// Counts between two marks that are tried beside the usual one, and the bounds of what they may lead to.
-const TRIED: [usize; 2] = [6, 12];
-const FEWEST: usize = 5;
+const TRIED: [usize; 2] = [4, 12];
+const FEWEST: usize = 3;
 const MOST: usize = 20;
+/// Links that are rigid between the marks: no parabola leads there.
+const RIGID: usize = 1;
 /// How well each fit does, what it needs being paid for, over what the best of them leaves.
 struct Weights<'s> {
     scatter: f64,
@@ -59,7 +61,9 @@ pub fn preferred(context: &FitContext<'_>, fits: &[Refit<'_>]) -> Option<usize> 
         let (pieces, left) = likeliest_count(&points, FEWEST)?;
         // the parabola is only a guide
         let is_new = !points.iter().any(|(tried, _)| *tried == pieces);
-        Some((pieces, if is_new { left_with(fit, pieces)? } else { left }))
+        let bent = (pieces, if is_new { left_with(fit, pieces)? } else { left });
+        let rigid = left_with(fit, RIGID).filter(|left| unexplained && *left < bent.1).map(|left| (RIGID, left));
+        Some(rigid.unwrap_or(bent))
     });
     let (pieces, value) = promised.min_by(|a, b| a.1.total_cmp(&b.1))?;
     (pieces != usual && value < weights.weight(best) - weights.settings.search.worth_a_count).then_some(pieces)

@@ -103,6 +103,31 @@ pub fn complete(specimen: &mut Specimen, file: &Table, name: &str) {
     }
 }
 
+/// The bending stiffness of a strip that bends all along, where [model.effects] does not state it: that of the stated joint spring over a piece between two
+/// marks, or that of its material; and one line where nothing says how stiff it is. A specimen of which thickness, density and modulus are stated is such a
+/// strip, unless the file says otherwise.
+pub fn bending_stiffness_n_m2(experiment: &mut Experiment, file: &Table) -> (Option<f64>, Option<String>) {
+    let states = states_of(file);
+    let Experiment { specimen, model, .. } = experiment;
+    let is_described = ["thickness_m", "density_kg_m3", "young_modulus_pa"].iter().all(|key| states(key));
+    if is_described && !["inertia", "lumps", "links"].iter().any(|key| states(key)) {
+        specimen.inertia = Inertia::Strip;
+    }
+    if specimen.inertia != Inertia::Strip || model.effects.distributed_flexibility.is_some() {
+        return (None, None);
+    }
+    if !specimen.links.is_empty() {
+        let message = "specimen.inertia = \"strip\" stands beside specimen.links, which are rigid; leave one of them out";
+        return (None, Some(message.to_owned()));
+    }
+    let stated = file.get("model").is_some_and(|model| model.get("k_eq_n_m_per_rad").is_some());
+    let mark_length_m = specimen.link_lengths_m.iter().sum::<f64>() / specimen.link_lengths_m.len().max(1) as f64;
+    let of_joint = Some(model.k_eq_n_m_per_rad * mark_length_m).filter(|stiffness| stated && *stiffness > 0.0);
+    let stiffness = of_joint.or_else(|| specimen.bending_stiffness_n_m2());
+    let missing = "specimen.inertia = \"strip\": nothing says how stiff it is; give thickness_m and young_modulus_pa, or distributed_flexibility (N m^2) in [model.effects]";
+    (stiffness, stiffness.is_none().then(|| missing.to_owned()))
+}
+
 /// Density × thickness × width × length.
 fn measured_mass_kg(specimen: &Specimen) -> Option<f64> {
     Some(specimen.density_kg_m3? * specimen.thickness_m? * specimen.width_m * specimen.length_m)
@@ -248,10 +273,11 @@ fn mass_against_measures(specimen: &Specimen) -> Option<Finding> {
 }
 
 fn lumps(specimen: &Specimen) -> Option<Finding> {
-    (specimen.lumps.is_some() && specimen.inertia == Inertia::Rods).then(|| {
-        Finding::Impossible(
-            "specimen.lumps stands beside inertia = \"rods\", which does not use it; write inertia = \"lumps\", or leave lumps out".to_owned(),
-        )
+    (specimen.lumps.is_some() && specimen.inertia != Inertia::Lumps).then(|| {
+        let own = if specimen.inertia == Inertia::Strip { "strip" } else { "rods" };
+        Finding::Impossible(format!(
+            "specimen.lumps stands beside inertia = \"{own}\", which does not use it; write inertia = \"lumps\", or leave lumps out"
+        ))
     })
 }
 

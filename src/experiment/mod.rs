@@ -49,6 +49,9 @@ pub struct Experiment {
     /// The same where the specimen is a strip without marks.
     #[serde(skip)]
     pub missing_of_strip: Option<String>,
+    /// Bending stiffness of a strip that bends all along (N·m²), where the specimen is one; taken over by what simulates it.
+    #[serde(skip)]
+    pub bending_stiffness_n_m2: Option<f64>,
     /// What in the file is odd, and may yet be true.
     #[serde(skip)]
     pub warnings: Vec<String>,
@@ -86,6 +89,8 @@ impl Experiment {
     pub fn read_with_specimen(path: &Path) -> Result<Self> {
         let mut experiment = Self::read(path)?;
         let missing = experiment.missing.take();
+        let effects = &mut experiment.model.effects;
+        effects.distributed_flexibility = effects.distributed_flexibility.or(experiment.bending_stiffness_n_m2);
         experiment.unless(missing, path)
     }
 
@@ -122,9 +127,11 @@ impl Experiment {
         experiment.model.states_damping = keys.get("model").is_some_and(|m| m.get("c_eq_n_m_s_per_rad").is_some());
         let invalid = |message: String| Error::Config { path: path.to_owned(), line: None, message };
         let name = path.file_stem().map_or_else(|| "specimen".into(), std::ffi::OsStr::to_string_lossy);
-        experiment.missing = consistency::missing(&keys);
-        experiment.missing_of_strip = consistency::missing_of_strip(&keys);
         consistency::complete(&mut experiment.specimen, &keys, &name);
+        let (stiffness, stiffness_missing) = consistency::bending_stiffness_n_m2(&mut experiment, &keys);
+        experiment.bending_stiffness_n_m2 = stiffness;
+        experiment.missing = consistency::missing(&keys).or(stiffness_missing);
+        experiment.missing_of_strip = consistency::missing_of_strip(&keys);
         experiment.specimen.validate().map_err(invalid)?;
         experiment.rig.validate().map_err(invalid)?;
         experiment.model.validate().map_err(invalid)?;

@@ -13,6 +13,8 @@ pub enum Inertia {
     Rods,
     /// Point masses at the nodes (paper Eq. 22–25), shares in `lumps`.
     Lumps,
+    /// A uniform strip that bends all along: many rods, with the bending stiffness `model.effects.distributed_flexibility`.
+    Strip,
 }
 
 /// Optical shares of a surface, which sum to one.
@@ -100,7 +102,7 @@ pub struct Specimen {
     pub curl_per_m: f64,
     /// Lengths between the marks, top to bottom.
     pub link_lengths_m: Vec<f64>,
-    /// Rods or lumps.
+    /// Rods, lumps or a strip that bends all along.
     pub inertia: Inertia,
     /// Shares of the mass at the nodes, hinge first, for `inertia = "lumps"`.
     pub lumps: Option<Vec<f64>>,
@@ -138,6 +140,11 @@ impl Specimen {
         } else {
             self.links.iter().map(|l| l.length_m).collect()
         }
+    }
+
+    /// E w t³ / 12, the bending stiffness of a flat strip (N·m²), where modulus and thickness are known.
+    pub fn bending_stiffness_n_m2(&self) -> Option<f64> {
+        Some(self.young_modulus_pa? * self.width_m * self.thickness_m?.powi(3) / 12.0)
     }
 
     pub(super) fn validate(&self) -> Result<(), String> {

@@ -102,7 +102,7 @@ impl Chain {
             None => 0.5 * (share(node - 1) + share(node)),
         };
         let link = |(i, &length_m): (usize, &f64)| match specimen.inertia {
-            Inertia::Rods => {
+            Inertia::Rods | Inertia::Strip => {
                 let mass_kg = specimen.mass_kg * share(i);
                 Link { length_m, mass_kg, com_m: 0.5 * length_m, inertia_kg_m2: mass_kg * length_m * length_m / 12.0 }
             }

@@ -138,7 +138,7 @@ impl RodForms {
         let Specimen { link_lengths_m, links, inertia, mass_kg, .. } = &experiment.specimen;
         let &[upper_m, lower_m] = link_lengths_m.as_slice() else { return None };
         let bends_everywhere = experiment.model.effects.distributed_flexibility.is_some();
-        if !links.is_empty() || *inertia != Inertia::Rods || bends_everywhere {
+        if !links.is_empty() || *inertia == Inertia::Lumps || bends_everywhere {
             return None;
         }
         let per_length_kg_m = mass_kg / (upper_m + lower_m);

@@ -94,8 +94,7 @@ impl Strip {
 
     /// The strip of a specimen, straight and at a hinge; its bending stiffness is EI = E w t³/12. None where modulus or thickness are not given.
     pub fn of(specimen: &Specimen, gravity_m_s2: f64) -> Option<Self> {
-        let (thickness_m, young_modulus_pa) = (specimen.thickness_m?, specimen.young_modulus_pa?);
-        let bending_stiffness_n_m2 = young_modulus_pa * specimen.width_m * thickness_m.powi(3) / 12.0;
+        let bending_stiffness_n_m2 = specimen.bending_stiffness_n_m2()?;
         let mass_per_length_kg_m = specimen.mass_kg / specimen.length_m;
         Some(Self::hung(specimen.length_m, mass_per_length_kg_m, bending_stiffness_n_m2, gravity_m_s2))
     }
