@@ -117,7 +117,8 @@ pub fn bending_stiffness_n_m2(experiment: &mut Experiment, file: &Table) -> (Opt
         return (None, None);
     }
     if !specimen.links.is_empty() {
-        let message = "specimen.inertia = \"strip\" stands beside specimen.links, which are rigid; leave one of them out";
+        let message =
+            "specimen.inertia = \"strip\" stands beside specimen.links, which are rigid; leave one of them out";
         return (None, Some(message.to_owned()));
     }
     let stated = file.get("model").is_some_and(|model| model.get("k_eq_n_m_per_rad").is_some());

@@ -209,7 +209,7 @@ fn in_step(bench: &Bench<'_>, stage: &Stage, fit: &Fit) -> Vec<Test> {
         .into_iter()
         .filter(|(_, further)| !further.is_empty())
         .map(|(looks_for, further)| {
-            let white: Vec<Vec<f64>> = further.iter().map(|course| stage.filter.whiten(course)).collect();
+            let white = stage.filter.whiten_all(&further);
             let all: Vec<&[f64]> = plain.iter().copied().chain(white.iter().map(Vec::as_slice)).collect();
             let solution = solve(&all, &stage.y, &[]);
             let gained = solution.as_ref().map_or(0.0, |solution| fit.chi2 - solution.chi2);
@@ -230,7 +230,7 @@ fn in_step(bench: &Bench<'_>, stage: &Stage, fit: &Fit) -> Vec<Test> {
 pub fn push_of_each(bench: &Bench<'_>, fit: &Fit) -> Vec<[f64; 2]> {
     let stage = &bench.stage(fit.walk_m2_s);
     let members = bench.whitened(stage, &fit.members);
-    let cycles: Vec<Vec<f64>> = bench.with.lamp.each(bench.with.grid).iter().map(|c| stage.filter.whiten(c)).collect();
+    let cycles = stage.filter.whiten_all(&bench.with.lamp.each(bench.with.grid));
     let all: Vec<&[f64]> = cycles.iter().chain(&stage.base[1..]).chain(&members).map(Vec::as_slice).collect();
     let Some(solution) = solve(&all, &stage.y, &[]) else { return Vec::new() };
     (0..cycles.len()).map(|k| [solution.amplitude[k], solution.covariance[(k, k)].max(0.0).sqrt()]).collect()

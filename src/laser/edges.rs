@@ -143,7 +143,7 @@ struct Shifting<'a> {
 fn shifts(with: &Shifting<'_>, lamp: &Lamp, stated_s: &[f64], known_s: f64) -> Option<Vec<f64>> {
     let Shifting { grid, filter, noise, beside } = *with;
     let raw = sharp(lamp, grid, &noise.swings);
-    let white: Vec<Vec<f64>> = raw.iter().chain(beside).map(|c| filter.whiten(c)).collect();
+    let white = filter.whiten_all(&raw.iter().chain(beside).collect::<Vec<_>>());
     let y = filter.whiten(&grid.y_m);
     let columns: Vec<&[f64]> = white.iter().map(Vec::as_slice).collect();
     let base = solve(&columns, &y, &[])?;
@@ -154,10 +154,10 @@ fn shifts(with: &Shifting<'_>, lamp: &Lamp, stated_s: &[f64], known_s: f64) -> O
         .map(|k| {
             let mut moved = lamp.clone();
             moved.edges_s[k] += step_s;
-            let slope: Vec<f64> = of(&moved).iter().zip(&here).map(|(m, h)| (m - h) / step_s).collect();
-            filter.whiten(&slope)
+            of(&moved).iter().zip(&here).map(|(m, h)| (m - h) / step_s).collect()
         })
         .collect();
+    let slopes = filter.whiten_all(&slopes);
     // what is known beforehand as further rows: (edge + shift − stated)/known
     let rows = slopes.len();
     let padded = |column: &[f64], row: Option<usize>| {

@@ -128,7 +128,7 @@ impl<'a> Bench<'a> {
 
     /// The columns of some members, whitened.
     pub fn whitened(&self, stage: &Stage, members: &[Member]) -> Vec<Vec<f64>> {
-        columns_of(members, &self.with).iter().map(|column| stage.filter.whiten(column)).collect()
+        stage.filter.whiten_all(&columns_of(members, &self.with))
     }
 
     /// A candidate from a start of its shapes; a walk among its members is led to its likeliest size.
@@ -182,7 +182,7 @@ pub fn columns_of(members: &[Member], with: &Setting<'_>) -> Vec<Vec<f64>> {
 
 fn stage(base: &[Vec<f64>], with: Setting<'_>, noise: &Noise, walk_m2_s: f64) -> Stage {
     let filter = Filter::of(&noise.with_walk(walk_m2_s), with.grid);
-    let base = base.iter().map(|c| filter.whiten(c)).collect();
+    let base = filter.whiten_all(base);
     Stage { walk_m2_s, base, y: filter.whiten(&with.grid.y_m), filter }
 }
 
@@ -201,7 +201,7 @@ struct State {
 impl State {
     fn of(bench: &Bench<'_>, stage: &Stage, members: Vec<Member>) -> Option<Self> {
         let raw: Vec<Vec<Vec<f64>>> = members.iter().map(|m| m.form.columns(&m.shape, &bench.with)).collect();
-        let white: Vec<Vec<f64>> = raw.iter().flatten().map(|c| stage.filter.whiten(c)).collect();
+        let white = stage.filter.whiten_all(&raw.iter().flatten().collect::<Vec<_>>());
         let reach_m = vec![bench.reach_m; members.len()];
         let mut state = Self { members, raw, white, amplitude: Vec::new(), chi2: 0.0, reach_m };
         let solution = solve(&columns(stage, &state.white, &[]), &stage.y, &state.known(bench))?;
@@ -254,12 +254,12 @@ impl State {
                     let amplitude = self.amplitude[first + j] / step;
                     slope.iter_mut().zip(there.iter().zip(here)).for_each(|(s, (t, h))| *s += amplitude * (t - h));
                 }
-                slopes.push(stage.filter.whiten(&slope));
+                slopes.push(slope);
                 known.push(12.0 / shape.width().powi(2));
             }
             first += raw.len();
         }
-        (slopes, known)
+        (stage.filter.whiten_all(&slopes), known)
     }
 
     fn stepped(self, bench: &Bench<'_>, stage: &Stage) -> Option<Self> {

@@ -249,8 +249,20 @@ fn weighted_rings(edges: &[(f64, f64)], grid: &Grid, swing: &Swing) -> [Vec<f64>
     let size = (-decay * part_s).exp();
     let (c, s) = (size * (turn * part_s).cos(), size * (turn * part_s).sin());
     let (mut cos, mut sin) = (Vec::with_capacity(grid.len()), Vec::with_capacity(grid.len()));
+    // what the parts of a cell without an edge come to, Σ zᵏ, and the whole of it, zⁿ
+    let ((mut all_c, mut all_s), (mut whole_c, mut whole_s)) = ((0.0, 0.0), (1.0, 0.0));
+    for _ in 0..PARTS {
+        (whole_c, whole_s) = (c * whole_c - s * whole_s, s * whole_c + c * whole_s);
+        (all_c, all_s) = (all_c + whole_c, all_s + whole_s);
+    }
     let (mut x, mut y, mut next) = (0.0, 0.0, 0);
     for cell in 0..grid.len() {
+        if edges.get(next).is_none_or(|edge| edge.0 > grid.time_s(cell) + 0.5 * grid.step_s) {
+            cos.push((all_c * x - all_s * y) / PARTS as f64);
+            sin.push((all_s * x + all_c * y) / PARTS as f64);
+            (x, y) = (whole_c * x - whole_s * y, whole_s * x + whole_c * y);
+            continue;
+        }
         let (mut sum_x, mut sum_y) = (0.0, 0.0);
         for part in 0..PARTS {
             let t_s = grid.time_s(cell) + (part as f64 + 0.5) * part_s - 0.5 * grid.step_s;

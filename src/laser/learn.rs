@@ -87,8 +87,8 @@ impl Acting<'_> {
     /// The columns' amplitudes under a noise.
     pub fn solution(&self, noise: &Noise) -> Option<(Filter, Solution)> {
         let filter = Filter::of(noise, self.grid);
-        let columns: Vec<Vec<f64>> =
-            self.slow.iter().chain(&self.quick(&noise.swings)).map(|c| filter.whiten(c)).collect();
+        let quick = self.quick(&noise.swings);
+        let columns = filter.whiten_all(&self.slow.iter().chain(&quick).collect::<Vec<_>>());
         let columns: Vec<&[f64]> = columns.iter().map(Vec::as_slice).collect();
         let solution = solve(&columns, &filter.whiten(&self.grid.y_m), &[])?;
         Some((filter, solution))

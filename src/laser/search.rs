@@ -2,6 +2,7 @@
 
 use rayon::prelude::*;
 
+use super::filter::LANES;
 use super::fit::{Bench, Fit, Member, Stage};
 use super::forms::{Effect, FROM_ENDS_S, Form};
 use super::solve::{Span, solve};
@@ -93,11 +94,16 @@ impl Starts {
             .into_iter()
             .flat_map(|form| form.starts(with).into_iter().map(move |shape| (form, shape)))
             .collect();
-        let whitened = |(form, shape): (Form, Vec<f64>)| {
-            let white = form.columns(&shape, with).first().map(|column| stage.filter.whiten(column));
-            white.map(|white| (form, shape, white))
+        let first = |(form, shape): &(Form, Vec<f64>)| {
+            Some((*form, shape.clone(), form.columns(shape, with).into_iter().next()?))
         };
-        Self(shapes.into_par_iter().filter_map(whitened).collect())
+        let whitened = |some: &[(Form, Vec<f64>)]| {
+            let (shapes, columns): (Vec<_>, Vec<_>) =
+                some.iter().filter_map(first).map(|(form, shape, column)| ((form, shape), column)).unzip();
+            let white = stage.filter.whiten_all(&columns);
+            shapes.into_iter().zip(white).map(|((form, shape), white)| (form, shape, white)).collect::<Vec<_>>()
+        };
+        Self(shapes.par_chunks(LANES).flat_map_iter(whitened).collect())
     }
 }
 

@@ -1,6 +1,6 @@
 //! Least squares of whitened columns.
 
-use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
+use nalgebra::{Cholesky, DMatrix, DVector, DVectorView, Dyn};
 
 /// Added to the diagonal of columns scaled to 1, so that two that are the same cost no solution.
 const RIDGE: f64 = 1e-9;
@@ -34,12 +34,15 @@ pub fn solve(columns: &[&[f64]], y: &[f64], known: &[f64]) -> Option<Solution> {
             left: y.to_vec(),
         });
     }
-    let mut x = DMatrix::zeros(rows, count);
-    for (k, column) in columns.iter().enumerate() {
-        x.column_mut(k).copy_from_slice(column);
+    let x: Vec<DVectorView<'_, f64>> = columns.iter().map(|column| DVectorView::from_slice(column, rows)).collect();
+    let mut fisher = DMatrix::zeros(count, count);
+    for i in 0..count {
+        for j in 0..=i {
+            fisher[(i, j)] = x[i].dot(&x[j]);
+            fisher[(j, i)] = fisher[(i, j)];
+        }
     }
-    let mut fisher = x.tr_mul(&x);
-    let right = x.tr_mul(&y_vector);
+    let right: Vec<f64> = x.iter().map(|column| column.dot(&y_vector)).collect();
     for (k, own) in known.iter().enumerate() {
         fisher[(k, k)] += own;
     }
@@ -49,7 +52,8 @@ pub fn solve(columns: &[&[f64]], y: &[f64], known: &[f64]) -> Option<Solution> {
     let amplitude: Vec<f64> = (0..count).map(|k| solved[k] / scale[k]).collect();
     let inverse = factor.inverse();
     let covariance = DMatrix::from_fn(count, count, |i, j| inverse[(i, j)] / (scale[i] * scale[j]));
-    let left = y_vector - &x * DVector::from_column_slice(&amplitude);
+    let mut left = y_vector;
+    x.iter().zip(&amplitude).for_each(|(column, amplitude)| left.axpy(-amplitude, column, 1.0));
     let ln_fisher = factor.l_dirty().diagonal().iter().map(|d| 2.0 * d.ln()).sum::<f64>()
         + scale.iter().map(|s| 2.0 * s.ln()).sum::<f64>();
     Some(Solution { amplitude, covariance, chi2: left.norm_squared(), ln_fisher, left: left.as_slice().to_vec() })
@@ -91,12 +95,12 @@ impl Span {
 
     /// What of the sum of squares of `left`, which is perpendicular to the span, a further column explains.
     pub fn gain(&self, column: &[f64], left: &[f64]) -> f64 {
-        let column = DVector::from_column_slice(column);
-        let beyond = &column - &self.basis * self.basis.tr_mul(&column);
-        let size = beyond.norm_squared();
-        if size <= 1e-12 * column.norm_squared() || size == 0.0 {
+        let column = DVectorView::from_slice(column, column.len());
+        let whole = column.norm_squared();
+        let beyond = whole - self.basis.tr_mul(&column).norm_squared();
+        if beyond <= 1e-12 * whole || beyond <= 0.0 {
             return 0.0;
         }
-        beyond.dot(&DVector::from_column_slice(left)).powi(2) / size
+        column.dot(&DVectorView::from_slice(left, left.len())).powi(2) / beyond
     }
 }
