@@ -124,7 +124,8 @@ fn effects(report: &Report) -> String {
 fn surroundings(report: &Report, analysis: &Analysis) -> String {
     let mut text = String::new();
     let edges: Vec<String> = report.lamp.edges_s.iter().map(|t| format!("{t:.2}")).collect();
-    let found = if report.lamp.found { "found in the record" } else { "as given" };
+    let found =
+        if report.lamp.found { "found in the record" } else { "led from those given to where the record has them" };
     text.push_str(&paragraph("Lamp on, off, …: ", &format!("{} s, {found}.", edges.join(", "))));
     let each: Vec<String> =
         report.lamp.push_of_each_m.iter().map(|q| format!("{} ± {}", um(q.value, 3), um(q.sd, 2))).collect();
@@ -145,10 +146,15 @@ fn surroundings(report: &Report, analysis: &Analysis) -> String {
         text.push_str(&paragraph(
             "Cycles not fitted: ",
             &format!(
-                "from {:.1} s on the push alone leaves {} µm, with the effects named {} µm.",
+                "from {:.1} s on the push alone leaves {} µm, with the effects named {} µm.{}",
                 proof.from_s,
                 um(proof.baseline_rmse_m, 3),
-                um(proof.augmented_rmse_m, 3)
+                um(proof.augmented_rmse_m, 3),
+                if proof.is_against() {
+                    " What is there predicts better: doubt the names, and check laser.column and its unit."
+                } else {
+                    ""
+                }
             ),
         ));
     }

@@ -102,8 +102,8 @@ pub fn diagnose(
     let prepared = preparation::prepare(records, experiment, settings)?;
     // 2. the base model
     progress.begin("base model", None);
-    let mut search =
-        Search::of_base_model(&prepared, &prepared.experiment, prepared.taken_at_first(), settings, progress)?;
+    let search = Search::of_base_model(&prepared, &prepared.experiment, prepared.taken_at_first(), settings, progress)?;
+    let mut search = search.counted(&counted)?;
     // 3. what it lacks
     search.run();
     // 4. a strip's rods
@@ -140,8 +140,7 @@ pub fn diagnose(
     Ok(Diagnosis::of(&findings, &experiment.specimen.name))
 }
 
-/// The hypotheses weighed. Where something unknown is likelier than not, or far more than noise is left, the search goes on first. (A strip's fits are too dear to be
-/// followed from the beginning.)
+/// The hypotheses weighed. Where something unknown is likelier than not, or far more than noise is left, the search goes on first.
 fn weighed<'a, 'p>(
     search: Search<'a, 'p>,
     pieces: &'a OnceLock<Prepared>,
@@ -152,10 +151,9 @@ fn weighed<'a, 'p>(
         progress.begin("weighing", None);
         posterior::weigh(search.fits.clone(), search.effects.len(), settings)
     };
-    let is_strip = search.context.is_strip();
-    let at_once = (is_strip || !search.leaves_more_than_noise()).then(|| weigh(&search));
+    let at_once = (!search.leaves_more_than_noise()).then(|| weigh(&search));
     match at_once {
-        Some(posterior) if is_strip || posterior.unknown <= settings.verdict.even => (search, posterior),
+        Some(posterior) if posterior.unknown <= settings.verdict.even => (search, posterior),
         _ => {
             let search = search.doubted(pieces);
             let posterior = weigh(&search);

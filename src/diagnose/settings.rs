@@ -182,7 +182,7 @@ pub struct SearchSettings {
     pub most_of: f64,
     /// Turns of more and fewer effects (cost).
     pub turns: usize,
-    /// Another count of rods must lower χ² by so many variances of the best fit (statistics: 5 σ).
+    /// Another count of rods must lower χ² by so many variances of the best fit (statistics: 3 σ of one number, as for any other).
     pub worth_a_count: f64,
     /// Where the best fit leaves this many variances of the noise, a wrong count may have led to it (training bank).
     pub count_unexplained: f64,
@@ -368,7 +368,7 @@ impl Default for SearchSettings {
             leads: 2.0,
             most_of: 0.5,
             turns: 4,
-            worth_a_count: 25.0,
+            worth_a_count: 9.0,
             count_unexplained: 1.2,
         }
     }

@@ -20,6 +20,8 @@ const LONGEST_M: f64 = 100.0;
 /// A link heavier than a cube of lead of its length is a surprise, a thousand times heavier is in grams.
 const LEAD_KG_M3: f64 = 11_340.0;
 const GRAMS: f64 = 10.0;
+/// A strip wider than it is long is a surprise, one so many times as wide is in millimetres.
+const TOO_WIDE: f64 = 10.0;
 /// A centre of mass this many lengths away, and a radius of gyration of as many, is a surprise and is another unit.
 const FAR: f64 = 2.0;
 const TOO_FAR: f64 = 20.0;
@@ -159,6 +161,9 @@ pub fn contradictions(experiment: &Experiment, file: &Table) -> Result<Vec<Strin
             judge(links_against_length(specimen))?;
         }
         judge(material(specimen))?;
+        if states("width_m") {
+            judge(width(specimen))?;
+        }
         if states("mass_kg") && states("width_m") && (states("length_m") || states("link_lengths_m")) {
             judge(mass_against_measures(specimen))?;
         }
@@ -240,7 +245,7 @@ fn material(specimen: &Specimen) -> Option<Finding> {
     let thickness = specimen.thickness_m.and_then(|thickness_m| {
         Finding::of(thickness_m, [0.0, 0.1 * specimen.length_m], [0.0, specimen.length_m], || {
             format!(
-                "specimen.thickness_m = {thickness_m}: thick beside a length of {} m; if it is millimetres, write {:e}, if µm, {:e}",
+                "specimen.thickness_m = {thickness_m}: thick beside a length of {} m; if it is millimetres, write {:.3e}, if µm, {:.3e}",
                 specimen.length_m,
                 thickness_m * 1e-3,
                 thickness_m * 1e-6
@@ -248,6 +253,16 @@ fn material(specimen: &Specimen) -> Option<Finding> {
         })
     });
     density.or(modulus).or(thickness)
+}
+
+fn width(specimen: &Specimen) -> Option<Finding> {
+    let Specimen { width_m, length_m, .. } = *specimen;
+    Finding::of(width_m, [0.0, length_m], [0.0, TOO_WIDE * length_m], || {
+        format!(
+            "specimen.width_m = {width_m}: wider than the strip is long ({length_m} m); if it is millimetres, write {}",
+            rounded(width_m * 1e-3)
+        )
+    })
 }
 
 fn mass_against_measures(specimen: &Specimen) -> Option<Finding> {

@@ -7,7 +7,8 @@
 //! sd(step) = 2σ/√(rT)        sd(amplitude) = σ√(2/(rT))
 //! ```
 //!
-//! Swings that die away, drift and heat come on top: this is the least that is needed.
+//! After each switch the swing has to die away, and a chopped one to build up, before anything is learnt: a step takes two such times, one on and one off, beside T, and
+//! chopping one, and a period at least. Drift and heat come on top: this is the least that is needed.
 
 use serde::Serialize;
 
@@ -37,13 +38,13 @@ pub struct Way {
     pub push_m: f64,
     /// What heat moves it by over what the push does.
     pub heat_over_push: f64,
-    /// Half the 95 % interval at this power and time, over the push.
+    /// Half the 95 % interval at this power, after averaging over the time, over the push.
     pub relative_interval: f64,
     /// Least power for the wanted interval in the time (W).
     pub smallest_power_w: f64,
-    /// Least time for the wanted interval at the power (s).
+    /// Least time for the wanted interval at the power, with what nothing is learnt in (s).
     pub shortest_time_s: f64,
-    /// The record's time that nothing is learnt in: until the swing has built up or died away to a tenth (s).
+    /// The time after a switch that nothing is learnt in: until the swing has built up or died away to a tenth (s).
     pub settling_s: f64,
 }
 
@@ -101,7 +102,7 @@ impl Plan {
         }
         let response = Response::of(setup, power_w, distance_m, wanted.damping_ratio)?;
         let settling_s = 10f64.ln() / (wanted.damping_ratio * std::f64::consts::TAU * response.first_mode_hz());
-        let way = |[push_m, heat_m]: [f64; 2], noise_factor: f64| {
+        let way = |[push_m, heat_m]: [f64; 2], noise_factor: f64, settlings: f64, least_s: f64| {
             let per_root_s_m = NORMAL_QUANTILE * noise_factor * wanted.noise_m / wanted.rate_hz.sqrt();
             let push_m = push_m.abs();
             let relative_interval = per_root_s_m / wanted.time_s.sqrt() / push_m;
@@ -110,12 +111,14 @@ impl Plan {
                 heat_over_push: heat_m / push_m,
                 relative_interval,
                 smallest_power_w: power_w * relative_interval / wanted.relative,
-                shortest_time_s: (per_root_s_m / (push_m * wanted.relative)).powi(2),
+                shortest_time_s: settlings * settling_s
+                    + (per_root_s_m / (push_m * wanted.relative)).powi(2).max(least_s),
                 settling_s,
             }
         };
-        let steps = way(response.still_m(), 2.0);
-        let chopped = way(response.chopped_m(response.first_mode_hz()), 2f64.sqrt());
+        let steps = way(response.still_m(), 2.0, 2.0, 0.0);
+        let chopped =
+            way(response.chopped_m(response.first_mode_hz()), 2f64.sqrt(), 1.0, 1.0 / response.first_mode_hz());
         Ok(Self {
             schema: "freeswing.force_plan/1",
             power_w,

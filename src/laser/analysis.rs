@@ -227,6 +227,11 @@ fn within(stated_s: &[f64], grid: &Grid) -> std::result::Result<Lamp, String> {
         // lit from the start: an on edge just before the first cell
         edges_s.insert(0, first - grid.step_s);
     }
+    if let [only] = edges_s[..] {
+        return Err(format!(
+            "the lamp is switched once within the record, at {only} s, and a push shows when it is switched on and off; give both times in light.on_s"
+        ));
+    }
     Ok(Lamp { edges_s })
 }
 

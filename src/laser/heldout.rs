@@ -18,6 +18,16 @@ pub struct Heldout {
     pub augmented_rmse_m: f64,
 }
 
+/// What is named predicts worse by this factor: no chance of a few cycles.
+const WORSE: f64 = 1.5;
+
+impl Heldout {
+    /// Whether what is named predicts clearly worse than the push alone.
+    pub fn is_against(&self) -> bool {
+        self.augmented_rmse_m > WORSE * self.baseline_rmse_m
+    }
+}
+
 /// The proof, where there are at least two cycles.
 pub fn heldout(bench: &Bench<'_>, fit: &Fit) -> Option<Heldout> {
     let Setting { grid, lamp, swings, lasts_s } = bench.with;

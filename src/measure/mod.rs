@@ -226,7 +226,8 @@ impl<'a> Session<'a> {
             self.stamps_s.clear();
             self.camera = self.first_camera;
         }
-        let detector = Detector::new(hues);
+        let siting = survey::siting(&survey::pictures(&self.recording)?, &hues)?;
+        let detector = Detector::new(hues).with_siting(siting);
         let mut frames = Vec::new();
         self.each_frame(&detector, progress, &mut |frame| frames.push(frame))?;
         self.camera.finish(self.stamps_s.len());

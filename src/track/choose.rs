@@ -1,7 +1,7 @@
 //! Which of the things of the right colour are the marks.
 //!
 //! Marks are seen most of the time, look alike, swing, and keep their distances: a link is rigid, a strip hardly
-//! shortens. Only the uppermost may stand still, at the hinge: then it is where the next mark's distance from it does
+//! shortens. Only the uppermost, or one below all others, may stand still, at the hinge: then it is where the next mark's distance from it does
 //! not change while that mark swings. A knob on the stand keeps its distance from nothing that swings.
 
 use std::cmp::Ordering;
@@ -85,6 +85,9 @@ pub(super) fn choose(
     candidates.iter_mut().for_each(|c| {
         c.moves &= c.travel_px > STILL_SHARE * farthest_px && swinging.contains(&c.hue);
     });
+    if let Some(place_px) = hinge_below(&candidates).filter(|_| pivot_px.is_none()) {
+        candidates.iter_mut().for_each(|c| c.order = order(&c.path, Some(place_px)));
+    }
     candidates.sort_by(|a, b| (b.moves, b.presence).partial_cmp(&(a.moves, a.presence)).unwrap_or(Ordering::Equal));
     let spares_of = |taken: &[usize]| spares(&candidates_but(&candidates, taken));
     // of what stands still only a possible hinge is considered, if anything swings at all
@@ -119,6 +122,31 @@ pub(super) fn choose(
     Choice { chosen, spares, moves }
 }
 
+/// Where a hinge stands below all that swings about it: the chain then begins there, and not at the top.
+fn hinge_below(candidates: &[Candidate]) -> Option<[f64; 2]> {
+    let mut swinging = candidates.iter().filter(|c| c.moves).peekable();
+    swinging.peek()?;
+    let is_below = |c: &&Candidate| swinging.clone().all(|m| m.order < c.order && stretch(c, m) < MOST_STRETCH);
+    candidates.iter().find(|c| !c.moves && is_below(c)).and_then(|c| middle_px(&c.path))
+}
+
+/// Where a thing usually is.
+fn middle_px(path: &[Option<[f64; 2]>]) -> Option<[f64; 2]> {
+    let middle = |axis: usize| median(&mut path.iter().flatten().map(|p| p[axis]).collect::<Vec<_>>());
+    Some([middle(0)?, middle(1)?])
+}
+
+/// How far from the hinge a thing comes, or, where that is not known, how far down the picture.
+fn order(path: &[Option<[f64; 2]>], hinge_px: Option<[f64; 2]>) -> f64 {
+    let of = |p: &[f64; 2]| match hinge_px {
+        Some(hinge) => (p[0] - hinge[0]).hypot(p[1] - hinge[1]),
+        None => p[1],
+    };
+    let mut orders: Vec<f64> = path.iter().flatten().map(of).collect();
+    orders.sort_unstable_by(f64::total_cmp);
+    orders.get(orders.len() * 19 / 20).copied().unwrap_or(0.0)
+}
+
 /// What was not taken, but was seen beside what was.
 fn candidates_but<'a>(candidates: &'a [Candidate], taken: &[usize]) -> Vec<&'a Candidate> {
     let chosen: Vec<&Candidate> = candidates.iter().filter(|c| taken.contains(&c.tracklet)).collect();
@@ -136,8 +164,7 @@ fn spares(candidates: &[&Candidate]) -> Vec<Spare> {
     candidates
         .iter()
         .map(|c| {
-            let middle = |axis: usize| median(&mut c.path.iter().flatten().map(|p| p[axis]).collect::<Vec<_>>());
-            let position_px = [0, 1].map(|axis| middle(axis).unwrap_or(0.0));
+            let position_px = middle_px(&c.path).unwrap_or_default();
             Spare { hue: c.hue, position_px, travel_px: c.travel_px, moves: c.moves }
         })
         .collect()
@@ -173,12 +200,6 @@ fn candidates(tracklets: &[Tracklet], window: &[FrameBlobs], pivot_px: Option<[f
             for at in &t.sightings {
                 path[at.0] = Some(sighting(at).measured.position_px);
             }
-            let order = |p: &[f64; 2]| match pivot_px {
-                Some(pivot) => (p[0] - pivot[0]).hypot(p[1] - pivot[1]),
-                None => p[1],
-            };
-            let mut orders: Vec<f64> = path.iter().flatten().map(order).collect();
-            orders.sort_unstable_by(f64::total_cmp);
             let mut areas = vec![None; window.len()];
             for at in &t.sightings {
                 areas[at.0] = Some(f64::from(sighting(at).measured.area_px2));
@@ -195,7 +216,7 @@ fn candidates(tracklets: &[Tracklet], window: &[FrameBlobs], pivot_px: Option<[f
                 presence: t.sightings.len() as f64 / window.len() as f64,
                 lateness: t.sightings.first().map_or(1.0, |s| s.0 as f64 / window.len() as f64),
                 ln_area: median(&mut ln_areas).unwrap_or(0.0),
-                order: orders.get(orders.len() * 19 / 20).copied().unwrap_or(0.0),
+                order: order(&path, pivot_px),
                 path,
             }
         })

@@ -228,7 +228,7 @@ pub fn plan_text(plan: &Plan) -> String {
     text.push_str(&paragraph(
         "  – ",
         &format!(
-            "Chopping at the strip's own frequency raises signal over noise {} times in the same time; the swing needs {} s more to build up to nine tenths.",
+            "Chopping at the strip's own frequency raises signal over noise {} times in the same time. Nothing is learnt in the {} s after a switch, until the swing has built up or died away to a tenth; the least time holds it once for chopping, twice for one on and off.",
             number(plan.gain, 3),
             number(plan.chopped.settling_s, 3)
         ),

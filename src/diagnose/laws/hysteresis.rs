@@ -75,9 +75,11 @@ fn softened<'a>(context: &FitContext<'a>, null: &Refit<'a>, bound: f64) -> Optio
     let hypothesis = null.hypothesis.and(Effect::JointHysteretic, None);
     let starts = starts(context, null, &YIELD_SHARES, &SPRING_SHARES, &[1.0])?;
     let costed = starts.into_iter().map(|start| (context.cost_at(&hypothesis, null, &start), start));
-    let (_, best) = costed.min_by(|a, b| a.0.total_cmp(&b.0))?;
+    let (cost, best) = costed.min_by(|a, b| a.0.total_cmp(&b.0))?;
     if context.is_strip() {
-        return context.begin(&hypothesis, null, &best);
+        // in every joint of it: a step is as dear as ten of another effect's
+        let is_hopeful = cost < context.settings.descent.beyond_hope * null.chi2;
+        return is_hopeful.then(|| context.begin(&hypothesis, null, &best)).flatten();
     }
     context.refit_below(bound, &hypothesis, null, &best)
 }

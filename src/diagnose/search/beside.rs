@@ -32,7 +32,7 @@ impl<'f, 'a> Beside<'f, 'a> {
     /// Every effect that a fit does not have.
     pub fn every(context: &FitContext<'a>, base: &'f Refit<'a>, effects: &[Effect]) -> Vec<Self> {
         let Some(screen) = Screen::at(context, base) else { return Vec::new() };
-        let scores = laws::scores(&screen, effects);
+        let scores = laws::scores(&screen, &laws::cheap_to_score(context, effects));
         let misfit = Misfit::of(context, base, &scores);
         let others = effects.iter().copied().filter(|effect| !base.hypothesis.has(*effect));
         others.map(|effect| Self::of(base, misfit, effect, &scores)).collect()

@@ -1,10 +1,13 @@
 //! A search of the first part of recordings, where a fit of the whole is too dear for one.
 //!
 //! A search fits some hundred hypotheses. Where the budget does not allow that of the whole recordings, it is made on as much of their beginning as the budget
-//! allows; the best fits of each number of coefficients then follow the recordings to their end, part after part.
+//! allows; the best fits of each number of coefficients then follow the recordings to their end, part after part, and beside the best of them one more is sought.
 
 use super::super::context::first_part;
-use super::super::refit::Refit;
+use super::super::effect::{Cost, Effect};
+use super::super::misfit::needs;
+use super::super::refit::{Refit, least};
+use super::super::settings::MisfitSettings;
 use super::rounds::{Round, Tried};
 use super::{Search, horizon};
 
@@ -34,10 +37,30 @@ impl<'a> Search<'a, '_> {
         self.part = part;
         self.rounds.extend(rounds);
         self.undecided.extend(undecided);
+        self.tied = tied(&fits, &self.context.settings.misfit);
         self.progress.begin("to the end", None);
         let noise = &self.base().problem.noise;
         let found: Vec<Refit<'a>> = horizon::carried(&self.context, fits, part, noise);
         self.keep(found);
         self.learn_noise();
+        self.allow(self.context.settings.search.shares.certified);
+        self.round(Round::Tied, &mut Tried::default());
+        self.round(Round::OneMore, &mut Tried::default());
     }
+}
+
+/// Single effects that a part of the recordings does not tell from the best of its fits, nearest first.
+fn tied(fits: &[Refit<'_>], settings: &MisfitSettings) -> Vec<Effect> {
+    let Some(best) = least(fits) else { return Vec::new() };
+    let least = fits.iter().map(|fit| needs(fit, best, settings)).fold(f64::INFINITY, f64::min);
+    let mut singles: Vec<(f64, Effect)> = fits
+        .iter()
+        .filter_map(|fit| match fit.hypothesis.effects[..] {
+            [only] if only.entry().cost == Cost::Ordinary => Some((needs(fit, best, settings) - least, only)),
+            _ => None,
+        })
+        .filter(|(behind, _)| *behind < 2.0 * settings.counts)
+        .collect();
+    singles.sort_by(|a, b| a.0.total_cmp(&b.0));
+    singles.into_iter().map(|(_, effect)| effect).collect()
 }

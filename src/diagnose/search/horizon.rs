@@ -8,7 +8,8 @@ use rayon::prelude::*;
 use super::super::context::{FitContext, first_part};
 use super::super::effect::Effect;
 use super::super::hypothesis::Hypothesis;
-use super::super::refit::{self, Refit, best_of_each_count, merged};
+use super::super::misfit::needs;
+use super::super::refit::{self, Refit, best_of_each_count, least, merged};
 use super::super::settings::SearchSettings;
 use super::beside::with_one_more;
 use crate::fit::search::PARTS;
@@ -50,9 +51,12 @@ pub fn continued<'a>(context: &FitContext<'a>, fits: &[Refit<'a>], effects: &[Ef
 /// The best of some fits of the first part of the recordings, followed to their end.
 pub fn carried<'a>(context: &FitContext<'a>, fits: Vec<Refit<'_>>, part: f64, noise: &[RecordNoise]) -> Vec<Refit<'a>> {
     let (settings, steps) = (&context.settings.search, &context.settings.descent);
-    // of a longer part each step costs more
+    // of a longer part each step costs more; what an effect has not earned does not come before the fit without it
     let few = |mut fits: Vec<Refit<'_>>| {
-        fits.sort_by(|a, b| a.chi2.total_cmp(&b.chi2));
+        if let Some(best) = least(&fits).cloned() {
+            let needs = |fit: &Refit<'_>| needs(fit, &best, &context.settings.misfit);
+            fits.sort_by(|a, b| needs(a).total_cmp(&needs(b)));
+        }
         fits.truncate(settings.carried);
         to_follow(fits)
     };

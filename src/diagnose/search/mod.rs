@@ -74,9 +74,11 @@ pub struct Search<'a, 'p> {
     pub undecided: Vec<&'static str>,
     /// What the effects promise at the base model.
     scores: Vec<Score>,
+    /// Single effects that a search of the first part did not tell from its best.
+    tied: Vec<Effect>,
     /// Whether the file is taken loosely.
     is_loose: bool,
-    /// The work that had been done when it began.
+    /// The work that had been done when it began, the base model's fit with it.
     begun_at: u64,
     /// The work up to which the present phase may go.
     until: u64,
@@ -98,8 +100,8 @@ impl<'a, 'p> Search<'a, 'p> {
         progress: &'p dyn Progress,
     ) -> Result<Self> {
         let context = base::context(prepared, experiment, taken, settings)?;
-        let begun_at = context.work.done();
         let fit = base::fitted(&context, prepared)?;
+        let begun_at = context.work.done();
         let is_loose = taken == Taken::Loosely;
         Ok(Self { is_loose, ..Self::begun(prepared, context, fit, begun_at, progress) })
     }
@@ -123,6 +125,7 @@ impl<'a, 'p> Search<'a, 'p> {
             rounds: Vec::new(),
             undecided: Vec::new(),
             scores,
+            tied: Vec::new(),
             is_loose: false,
             begun_at,
             until: begun_at,
@@ -155,15 +158,35 @@ impl<'a, 'p> Search<'a, 'p> {
         self.begun_at + (share * left as f64) as u64
     }
 
-    /// Searches again with the number of rods that the recordings of a strip ask for, where that does better.
+    /// The base model's fit with the number of rods that the recordings of a strip ask for, where nothing else is missing.
+    ///
+    /// # Errors
+    /// As [`Self::of_base_model`].
+    pub fn counted(self, counted: &'a OnceLock<Experiment>) -> Result<Self> {
+        if self.misfit().is_some_and(|misfit| misfit.unexplained) {
+            return Ok(self);
+        }
+        let Some(again) = self.with_the_preferred_count(counted)? else { return Ok(self) };
+        let is_kept = rods::is_kept(&self.context, &self.fits, &again.fits);
+        Ok(if is_kept { again } else { self })
+    }
+
+    /// The base model's fit with another number of rods, if the recordings ask for it.
+    fn with_the_preferred_count(&self, counted: &'a OnceLock<Experiment>) -> Result<Option<Self>> {
+        let Some(count) = rods::preferred(&self.context, &self.fits) else { return Ok(None) };
+        let counted = counted.get_or_init(|| rods::with(self.context.experiment, count));
+        let settings = self.context.settings;
+        Self::of_base_model(self.prepared, counted, Taken::AtItsWord, settings, self.progress).map(Some)
+    }
+
+    /// Searches again with the number of rods that the recordings of a strip ask for, where that does better; [`Self::counted`] has asked where nothing is missing.
     ///
     /// # Errors
     /// As [`Self::of_base_model`].
     pub fn recounted(self, counted: &'a OnceLock<Experiment>) -> Result<Self> {
-        let Some(count) = rods::preferred(&self.context, &self.fits) else { return Ok(self) };
-        let counted = counted.get_or_init(|| rods::with(self.context.experiment, count));
-        let settings = self.context.settings;
-        let mut again = Self::of_base_model(self.prepared, counted, Taken::AtItsWord, settings, self.progress)?;
+        let is_counted = !Misfit::of(&self.context, self.base(), &[]).unexplained;
+        let again = if is_counted { None } else { self.with_the_preferred_count(counted)? };
+        let Some(mut again) = again else { return Ok(self) };
         again.run();
         let is_kept = rods::is_kept(&self.context, &self.fits, &again.fits);
         Ok(if is_kept { again.after(self) } else { self.after(again) })
@@ -204,7 +227,7 @@ impl<'a, 'p> Search<'a, 'p> {
     }
 
     /// Searches on, with more effects and fewer: of the recordings in pieces where far more than noise is left; where they are too short for that, with the file taken
-    /// loosely if it may be doubted, and from the beginning of the recordings on. A strip's fits are too dear for it.
+    /// loosely if it may be doubted, and from the beginning of the recordings on.
     #[must_use]
     pub fn doubted(self, pieces: &'a OnceLock<Prepared>) -> Self {
         let enough = self.up_to(self.context.settings.search.shares.certified);

@@ -22,6 +22,10 @@ pub enum Round {
     Singles,
     /// Those that are dear to fit: sought the longer the less the others explain.
     DearSingles,
+    /// What has corners in every joint of a strip: a step of it is as dear as ten of another effect's.
+    StripCorners,
+    /// After a search of the first part of recordings, the single effects that it does not tell from its best: the whole of them may.
+    Tied,
     /// The others from where one effect stands that explains most of what the base model leaves, with another spring or damper.
     FromTheLeader,
     /// Pairs that promise most, each from the better of its two singles.
@@ -61,7 +65,7 @@ pub enum Learns {
 
 impl Round {
     /// The rounds that every recording has.
-    pub const USUAL: [Self; 7] = [
+    pub const USUAL: [Self; 8] = [
         Self::Asked,
         Self::Singles,
         Self::DearSingles,
@@ -69,6 +73,7 @@ impl Round {
         Self::AlongTheLeader,
         Self::Pairs,
         Self::Stragglers,
+        Self::StripCorners,
     ];
     /// Those where the best of the usual ones leaves more than noise: it may stand in a false minimum, or its partner have been sought from the wrong place.
     pub const RESTARTS: [Self; 3] = [Self::RestartedLeaders, Self::BesideLeaders, Self::RestartedBest];
@@ -79,6 +84,8 @@ impl Round {
             Self::Asked => "short stretches",
             Self::Singles => "effects",
             Self::DearSingles => "dear effects",
+            Self::StripCorners => "a strip's corners",
+            Self::Tied => "tied in the first part",
             Self::FromTheLeader => "from the best",
             Self::Pairs => "pairs",
             Self::Stragglers => "from better minima",
@@ -107,8 +114,10 @@ impl Round {
     pub fn proposals<'f, 'a>(self, search: &'f Search<'a, '_>, tried: &mut Tried) -> Vec<Proposal<'f, 'a>> {
         match self {
             Self::Asked => search.asked(),
-            Self::Singles => search.singles(false),
-            Self::DearSingles => search.singles(true),
+            Self::Singles => search.singles(),
+            Self::DearSingles => search.dear_singles(|effect, is_strip| !(is_strip && effect.has_corners())),
+            Self::StripCorners => search.dear_singles(|effect, is_strip| is_strip && effect.has_corners()),
+            Self::Tied => search.tied(),
             Self::FromTheLeader => search.begun_at_the_leader(),
             Self::Pairs => search.pairs(),
             Self::Stragglers => search.stragglers(),
@@ -146,14 +155,44 @@ impl<'a> Search<'a, '_> {
         asked.into_iter().map(|asked| Proposal::Asked(asked, self.base())).collect()
     }
 
-    /// Every effect beside the base model: those of ordinary cost, or the others.
-    fn singles(&self, dear: bool) -> Vec<Proposal<'_, 'a>> {
-        let base = self.base();
-        let misfit = Misfit::of(&self.context, base, &self.scores);
-        let misfit = if dear { misfit.beside(&self.fits[1..]) } else { misfit };
-        let of_kind = |effect: &&Effect| (effect.entry().cost != Cost::Ordinary) == dear;
-        let beside = |effect: &Effect| Proposal::Beside(Beside::of(base, misfit, *effect, &self.scores));
-        self.effects.iter().filter(of_kind).map(beside).collect()
+    /// Every effect of ordinary cost beside the base model.
+    fn singles(&self) -> Vec<Proposal<'_, 'a>> {
+        self.beside_base(Misfit::of(&self.context, self.base(), &self.scores), |effect| {
+            effect.entry().cost == Cost::Ordinary
+        })
+    }
+
+    /// The others of a kind, of a strip or not.
+    fn dear_singles(&self, is_of_kind: fn(Effect, bool) -> bool) -> Vec<Proposal<'_, 'a>> {
+        let misfit = Misfit::of(&self.context, self.base(), &self.scores).beside(&self.fits[1..]);
+        let is_strip = self.context.is_strip();
+        self.beside_base(misfit, |effect| effect.entry().cost != Cost::Ordinary && is_of_kind(effect, is_strip))
+    }
+
+    /// Along the motion of the best fit of the whole; where that has no effect, beside it, those first that the whole promises.
+    fn tied(&self) -> Vec<Proposal<'_, 'a>> {
+        let settings = self.context.settings;
+        let Some(best) = least(&self.fits) else { return Vec::new() };
+        let needs_of = |fit: &Refit<'a>| needs(fit, best, &settings.misfit);
+        let leader = self.fits.iter().min_by(|a, b| needs_of(a).total_cmp(&needs_of(b))).unwrap_or(best);
+        let is_new = |effect: &Effect| !self.fits.iter().any(|fit| fit.hypothesis.effects == [*effect]);
+        let mut tied: Vec<Effect> = self.tied.iter().copied().filter(is_new).collect();
+        if !leader.hypothesis.effects.is_empty() {
+            tied.truncate(settings.search.tried);
+            let along = |effect| Proposal::Along(Hypothesis { effects: vec![effect], dropped: None }, leader);
+            return tied.into_iter().map(along).collect();
+        }
+        let promised = |effect: Effect| self.scores.iter().find(|s| s.effect == effect).map_or(0.0, |s| s.gain);
+        tied.retain(|effect| promised(*effect) > settings.misfit.counts);
+        tied.sort_by(|a, b| promised(*b).total_cmp(&promised(*a)));
+        tied.truncate(settings.search.tried);
+        let misfit = Misfit::of(&self.context, self.base(), &self.scores);
+        self.beside_base(misfit, |effect| tied.contains(&effect))
+    }
+
+    fn beside_base(&self, misfit: Misfit, is_of_kind: impl Fn(Effect) -> bool) -> Vec<Proposal<'_, 'a>> {
+        let of_kind = self.effects.iter().copied().filter(|effect| is_of_kind(*effect));
+        of_kind.map(|effect| Proposal::Beside(Beside::of(self.base(), misfit, effect, &self.scores))).collect()
     }
 
     fn begun_at_the_leader(&self) -> Vec<Proposal<'_, 'a>> {
@@ -172,10 +211,10 @@ impl<'a> Search<'a, '_> {
         others.map(|fit| Proposal::FromLeader { fit, hypothesis: fit.hypothesis.clone(), leader }).collect()
     }
 
-    /// Where the base model leaves more than noise: a rival in a false minimum would count as evidence for the best. A strip's fits are too dear for it.
+    /// Where the base model leaves more than noise: a rival in a false minimum would count as evidence for the best.
     fn along_the_leader(&self) -> Vec<Proposal<'_, 'a>> {
         let misfit = Misfit::of(&self.context, self.base(), &self.scores);
-        let Some(leader) = least(&self.fits).filter(|_| misfit.unexplained && !self.context.is_strip()) else {
+        let Some(leader) = least(&self.fits).filter(|_| misfit.unexplained) else {
             return Vec::new();
         };
         let behind = leader.chi2 + self.context.settings.misfit.counts;
