@@ -64,6 +64,10 @@ pub enum Error {
     #[error("{}{}: {message}", path.display(), line.map(|l| format!(":{l}")).unwrap_or_default())]
     Config { path: PathBuf, line: Option<usize>, message: String },
 
+    /// Words of a command that cannot be understood.
+    #[error("{detail}; --help tells all options")]
+    Words { detail: String },
+
     /// An option that cannot be used.
     #[error("{option}: {message}")]
     Option { option: String, message: String },

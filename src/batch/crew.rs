@@ -17,7 +17,7 @@ use super::find::Found;
 use super::layers::{self, Layered};
 use super::state::{self, Fingerprint, Finished, Status};
 use crate::error::{Error, Result};
-use crate::output::OutputFile;
+use crate::output::{self, OutputFile};
 use crate::progress::Heard;
 
 /// A recording to be run.
@@ -91,7 +91,7 @@ impl Crew<'_> {
         }
         self.watch.begun(lane, &job.found.name);
         let began = Instant::now();
-        fs::create_dir_all(&job.folder).map_err(|e| Error::unwritable(&job.folder, e))?;
+        output::make_folder(&job.folder)?;
         state::forget(&job.folder)?;
         let before = seen(&job.found.paths);
         let fingerprint = Fingerprint::of(job.found, &self.options.words);

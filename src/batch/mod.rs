@@ -200,7 +200,7 @@ impl From<&[Planned]> for Intentions {
 /// # Errors
 /// [`Error::Busy`] where another batch works in the output folder, [`Error::Unwritable`] where it cannot be written, [`Error::Stopped`].
 pub fn run(options: &Options, watch: &dyn Watch) -> Result<Tally> {
-    std::fs::create_dir_all(&options.output).map_err(|e| Error::unwritable(&options.output, e))?;
+    output::make_folder(&options.output)?;
     let _lock = Lock::take(&options.output, options.shard)?;
     if options.shard.is_none() {
         // of a batch that was ended while it wrote its summary

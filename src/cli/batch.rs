@@ -10,10 +10,10 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use globset::GlobBuilder;
 use indicatif::{MultiProgress, ProgressBar, ProgressStyle};
 
-use super::Console;
 use super::bar::{self, Bar};
 use super::run::{Extent, Stage};
 use super::table::Table;
+use super::{Console, Target};
 use crate::batch::crew::Watch;
 use crate::batch::state::{Finished, Status};
 use crate::batch::{self, Intentions, Options, Plan, Planned, Shard, Tally};
@@ -55,7 +55,7 @@ pub struct BatchArgs {
     dry_run: bool,
     /// With --dry-run: the same as JSON, for a program that shares the recordings out; `-` for standard output, instead of the table.
     #[arg(long, value_name = "FILE", requires = "dry_run")]
-    json: Option<PathBuf>,
+    json: Option<Target>,
     /// Part K of N, for several machines that share the folders.
     #[arg(long, value_name = "K/N", value_parser = shard)]
     shard: Option<Shard>,

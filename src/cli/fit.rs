@@ -5,8 +5,8 @@ use std::path::PathBuf;
 
 use serde_json::{Value, json};
 
-use super::Console;
 use super::table::{Table, number, paragraph};
+use super::{Console, Target};
 use crate::error::{Error, Result};
 use crate::experiment::Experiment;
 use crate::fit::{self, Fit, Pace, Record, Seen, Verdict};
@@ -34,10 +34,10 @@ pub struct FitArgs {
     config: PathBuf,
     /// Write all of it as JSON; `-` for standard output.
     #[arg(long, value_name = "FILE")]
-    json: Option<PathBuf>,
+    json: Option<Target>,
     /// Write measured and simulated angles, and what is left, row by row, as CSV; `-` for standard output.
     #[arg(long, value_name = "FILE")]
-    curves: Option<PathBuf>,
+    curves: Option<Target>,
     /// Let a parameter or effect free that the file does not name; may be repeated.
     #[arg(long, value_name = "ID")]
     free: Vec<String>,
@@ -45,10 +45,10 @@ pub struct FitArgs {
     #[arg(long, value_name = "ID")]
     fix: Vec<String>,
     /// Use rows from this stamp on.
-    #[arg(long, value_name = "S", default_value_t = f64::NEG_INFINITY, hide_default_value = true, allow_negative_numbers = true)]
+    #[arg(long, value_name = "S", default_value_t = f64::NEG_INFINITY, hide_default_value = true)]
     from: f64,
     /// Use rows before this stamp.
-    #[arg(long, value_name = "S", default_value_t = f64::INFINITY, hide_default_value = true, allow_negative_numbers = true)]
+    #[arg(long, value_name = "S", default_value_t = f64::INFINITY, hide_default_value = true)]
     until: f64,
     /// Nothing on standard output.
     #[arg(long)]

@@ -2,11 +2,11 @@
 
 use std::path::PathBuf;
 
-use super::Console;
+use super::{Console, Target};
 use crate::error::{Error, Result};
 use crate::experiment::Experiment;
 use crate::identify::identify;
-use crate::output::{OutputFile, is_same_file};
+use crate::output::OutputFile;
 use crate::series::AngleSeries;
 
 /// Find frequencies, damping and mode shapes in a table of angles, every estimator side by side.
@@ -30,12 +30,12 @@ pub struct IdentifyArgs {
     config: Option<PathBuf>,
     /// Everything as JSON; `-` for standard output, instead of the table.
     #[arg(long, value_name = "FILE")]
-    json: Option<PathBuf>,
+    json: Option<Target>,
     /// Leave out what comes before this time.
-    #[arg(long, value_name = "S", allow_negative_numbers = true)]
+    #[arg(long, value_name = "S")]
     from: Option<f64>,
     /// Leave out what comes from this time on.
-    #[arg(long, value_name = "S", allow_negative_numbers = true)]
+    #[arg(long, value_name = "S")]
     until: Option<f64>,
     /// Print nothing.
     #[arg(long)]
@@ -50,7 +50,6 @@ impl IdentifyArgs {
     pub fn run(&self, console: &Console) -> Result<()> {
         let experiment = self.config.as_deref().map(Experiment::read).transpose()?;
         let experiment = experiment.filter(|experiment| describes_specimen(experiment, console));
-        self.keep_inputs()?;
         let json = self.json.as_deref().map(OutputFile::create).transpose()?;
         let series = self.stretch(super::read_angles(&self.angles, console)?)?;
         let found = identify(&series, experiment.as_ref())?;
@@ -76,16 +75,6 @@ impl IdentifyArgs {
             },
             other => other,
         })
-    }
-
-    /// The output may not take the place of an input.
-    fn keep_inputs(&self) -> Result<()> {
-        let Some(json) = &self.json else { return Ok(()) };
-        if [Some(&self.angles), self.config.as_ref()].into_iter().flatten().any(|input| is_same_file(input, json)) {
-            let message = format!("{} is an input and would be overwritten; use another name", json.display());
-            return Err(Error::Option { option: "--json".to_owned(), message });
-        }
-        Ok(())
     }
 }
 

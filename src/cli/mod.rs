@@ -20,6 +20,7 @@ mod shell;
 mod simulate;
 mod table;
 mod track;
+mod words;
 
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
@@ -28,6 +29,7 @@ use clap::{Parser, Subcommand};
 
 pub use bar::Bar;
 use console::Console;
+use words::Target;
 
 use crate::experiment::Experiment;
 use crate::fit::Record;
@@ -76,7 +78,7 @@ impl Cli {
     /// Runs the command.
     pub fn run() -> ExitCode {
         bar::hear_interrupts();
-        exit(Self::parse().command.run(&Console::default()))
+        exit(words::read::<Self>(std::env::args_os()).and_then(|cli| cli.command.run(&Console::default())))
     }
 }
 
@@ -111,7 +113,8 @@ impl TrackCli {
     /// Runs `track`.
     pub fn run() -> ExitCode {
         bar::hear_interrupts();
-        exit(Self::parse().args.run(&Console::default()).map(|()| ExitCode::SUCCESS))
+        let ran = words::read::<Self>(std::env::args_os()).and_then(|cli| cli.args.run(&Console::default()));
+        exit(ran.map(|()| ExitCode::SUCCESS))
     }
 }
 

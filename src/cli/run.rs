@@ -3,10 +3,10 @@
 use std::fs::{self, File, TryLockError};
 use std::path::{Path, PathBuf};
 
-use clap::{Parser, ValueEnum};
+use clap::ValueEnum;
 
 use super::bar::Shown;
-use super::{Cli, Console};
+use super::{Cli, Console, words};
 use crate::error::{Error, Result};
 use crate::experiment::Experiment;
 use crate::output;
@@ -144,12 +144,7 @@ impl RunArgs {
     fn stage(&self, stage: Stage, console: &Console) -> Result<()> {
         let Some(words) = self.words(stage)? else { return Ok(()) };
         console.log(&format!("\n$ {}", as_typed(&words)));
-        // the words are the program's own: they are sound unless a path looks like an option
-        let cli = Cli::try_parse_from(&words).map_err(|error| Error::Option {
-            option: as_typed(&words),
-            message: error.to_string().lines().next().unwrap_or_default().to_owned(),
-        })?;
-        cli.command.run(console).map(drop)
+        words::read::<Cli>(&words)?.command.run(console).map(drop)
     }
 
     /// The command of a stage; nothing where a table of angles needs no tracking.
@@ -216,22 +211,18 @@ impl RunArgs {
             }
         }
         self.config.as_deref().map(Experiment::read_rig).transpose()?;
-        let inputs: Vec<&PathBuf> = self.recordings.iter().chain(&self.config).collect();
+        let inputs: Vec<&Path> = self.recordings.iter().chain(&self.config).map(PathBuf::as_path).collect();
         let kept = self.own_config();
-        for output in OUTPUTS.map(|name| self.out.join(name)).into_iter().filter(|output| kept.as_ref() != Some(output))
-        {
-            if inputs.iter().any(|input| output::is_same_file(input, &output)) {
-                let message = format!("{} is an input and would be overwritten; give another folder", output.display());
-                return Err(Error::Option { option: "--out".to_owned(), message });
-            }
-        }
-        Ok(())
+        let outputs = OUTPUTS.map(|name| self.out.join(name));
+        let outputs = outputs.iter().filter(|output| kept.as_ref() != Some(*output));
+        let outputs: Vec<(String, &Path)> = outputs.map(|output| ("--out".to_owned(), output.as_path())).collect();
+        words::keep_apart(&inputs, &outputs, "give another folder")
     }
 
     /// The log of a folder without what an earlier run left, and with the configuration, which may stand there already.
     fn begin(&self) -> Result<File> {
         let figures = self.out.join("figures");
-        fs::create_dir_all(&self.out).map_err(|e| Error::unwritable(&self.out, e))?;
+        output::make_folder(&self.out)?;
         let log = self.log()?;
         let kept = self.own_config();
         for path in OUTPUTS.map(|name| self.out.join(name)) {
@@ -246,7 +237,7 @@ impl RunArgs {
                 _ => {}
             }
         }
-        fs::create_dir_all(&figures).map_err(|e| Error::unwritable(&figures, e))?;
+        output::make_folder(&figures)?;
         match &self.config {
             Some(config) if kept.is_none() => output::copy(config, &self.out.join("experiment.toml"))?,
             _ => {}

@@ -28,7 +28,7 @@ use rayon::prelude::*;
 pub use curves::{diagnosis_curves, fit_curves, where_curves};
 
 use crate::error::{Error, Result};
-use crate::output::OutputFile;
+use crate::output::{self, OutputFile};
 use chapters::Part;
 use left::Left;
 use page::Drawn;
@@ -60,7 +60,7 @@ pub fn write(folder: &Path) -> Result<()> {
         .collect::<Result<_>>()?;
     let figures = folder.join("figures");
     if !drawn.is_empty() {
-        std::fs::create_dir_all(&figures).map_err(|e| Error::unwritable(&figures, e))?;
+        output::make_folder(&figures)?;
     }
     let page = page::page(&left, &chapters, drawn.iter().map(|d| &d.0))?;
     let mut files = Vec::new();
