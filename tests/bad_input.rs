@@ -424,7 +424,9 @@ fn options_that_make_no_sense() {
     std::fs::write(bench.path("typo.toml"), "[rig]\nmirored = true\n").unwrap();
     std::fs::write(bench.path("broken.toml"), "[rig\n").unwrap();
     std::fs::write(bench.path("colour.toml"), "[rig]\nmarks = [\"crimson\"]\n").unwrap();
-    let cases: [(&[&str], &str); 10] = [
+    let cases: [(&[&str], &str); 12] = [
+        (&["--from", "5", "--until", "2"], "error: --until = 2: must be later than --from = 5"),
+        (&["--roi", "0,0,1,1"], "error: --roi: give left, top, width and height"),
         (&["--threshold", "300"], "--threshold: must lie between 0 and 255"),
         (&["--threshold", "nan"], "--threshold: must lie between 0 and 255"),
         (&["--markers", "0"], "--markers: 1 to 12 marks can be followed"),

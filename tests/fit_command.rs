@@ -198,6 +198,19 @@ fn bad_input_is_one_line_and_exit_code_2() {
         ),
         (vec![angles.clone()], config.clone(), vec!["--from", "9.9"], "rows between --from and --until; widen them"),
         (vec![angles.clone()], config.clone(), vec!["--json", "/nowhere/fit.json"], "cannot be written"),
+        (
+            vec![angles.clone(), folder.write("copy.csv", &fs::read_to_string(&angles).unwrap())],
+            config.clone(),
+            vec![],
+            "give each recording once",
+        ),
+        (
+            vec![angles.clone()],
+            config.clone(),
+            vec!["--free", "hinge_coulomb", "--fix", "hinge_coulomb"],
+            "--free: hinge_coulomb is to be kept as well (--fix)",
+        ),
+        (vec![angles.clone()], config.clone(), vec!["--from", "5", "--until", "2"], "--until: 2 s does not lie after"),
     ];
     for (tables, config, options, message) in cases {
         freeswing("fit")

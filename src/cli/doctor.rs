@@ -156,7 +156,7 @@ impl Findings {
             number(test.rendered_in_s, 2),
             number(test.tracked_in_s, 2),
             number(1e3 * test.median_error_rad, 2),
-            if test.passed { "well" } else { "FAILED" }
+            if test.passed { "passed" } else { "FAILED" }
         )
     }
 }

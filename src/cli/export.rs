@@ -18,7 +18,7 @@ Examples:
 
 Every column keeps its name, with the unit at its end. A missing number is NaN, in Parquet and SEP005 null.")]
 pub struct ExportArgs {
-    /// The table.
+    /// The table; `-` for standard input.
     angles: PathBuf,
     /// The file; its extension says the format.
     #[arg(long, value_name = "FILE")]

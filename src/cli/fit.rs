@@ -118,6 +118,10 @@ fn free_parameters(experiment: &Experiment, marks: usize, more: &[String], fix: 
             message: format!("no such parameter; the nearest known one is `{}`", nearest()),
         })
     };
+    if let Some(both) = more.iter().find(|id| fix.contains(id)) {
+        let message = format!("{both} is to be kept as well (--fix); leave one of the two out");
+        return Err(Error::Option { option: "--free".to_owned(), message });
+    }
     let fix = fix.iter().map(parse).collect::<Result<Vec<_>>>()?;
     let mut free = fit::base_parameters(experiment, marks);
     for id in more {
@@ -253,8 +257,9 @@ impl Report<'_> {
         }
         let outliers = self.fitted.fit.outliers[index].len();
         if outliers > 0 {
-            let plural = if outliers == 1 { "value stands" } else { "values stand" };
-            text.push_str(&paragraph("  ", &format!("{outliers} {plural} apart from the neighbours and was left out")));
+            let [stand, was] = if outliers == 1 { ["value stands", "was"] } else { ["values stand", "were"] };
+            let line = format!("{outliers} {stand} apart from the neighbours and {was} left out");
+            text.push_str(&paragraph("  ", &line));
         }
         self.peaks(index, text);
     }

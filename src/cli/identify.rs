@@ -2,6 +2,7 @@
 
 use std::path::PathBuf;
 
+use super::table::number;
 use super::{Console, Target};
 use crate::error::{Error, Result};
 use crate::experiment::Experiment;
@@ -66,15 +67,26 @@ impl IdentifyArgs {
         if self.from.is_none() && self.until.is_none() {
             return Ok(series);
         }
-        let rows = series.rows(self.from.unwrap_or(f64::NEG_INFINITY), self.until.unwrap_or(f64::INFINITY));
+        let (from_s, until_s) = (self.from.unwrap_or(f64::NEG_INFINITY), self.until.unwrap_or(f64::INFINITY));
+        super::check_span(from_s, until_s)?;
+        let stretch = series.slice(series.rows(from_s, until_s));
         let [first, last] = [series.t_s[0], series.t_s[series.len() - 1]];
-        series.slice(rows).checked().map_err(|error| match error {
-            Error::Table { message, .. } => Error::Option {
-                option: "--from, --until".to_owned(),
-                message: format!("the stretch {message} (the table runs from {first} s to {last} s)"),
-            },
+        let refused = |what: String| Error::Option {
+            option: "--from, --until".to_owned(),
+            message: format!("the stretch {what} (the table runs from {first} s to {last} s)"),
+        };
+        if stretch.is_empty() {
+            return Err(refused("holds no row; widen it".to_owned()));
+        }
+        let stretch = stretch.checked().map_err(|error| match error {
+            Error::Table { message, .. } => refused(message),
             other => other,
-        })
+        })?;
+        if let Some(swing_s) = series.period_s().filter(|swing_s| stretch.duration_s() < *swing_s) {
+            let (long, swing) = (number(stretch.duration_s(), 3), number(swing_s, 3));
+            return Err(refused(format!("of {long} s is shorter than one swing, which takes {swing} s; widen it")));
+        }
+        Ok(stretch)
     }
 }
 

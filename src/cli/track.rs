@@ -209,7 +209,7 @@ impl TrackArgs {
         if !self.reference.is_empty() {
             rig.reference_marks.clone_from(&self.reference);
         }
-        rig.validate().map_err(|message| option("options", &message))?;
+        rig.validate().map_err(|message| self.by_option(&message))?;
         let threshold = self.threshold;
         if threshold.is_some_and(|t| !(t > 0.0 && t < 255.0)) {
             return Err(option("--threshold", "must lie between 0 and 255"));
@@ -239,6 +239,22 @@ impl TrackArgs {
             },
             workers: self.threads.unwrap_or(defaults.workers),
         })
+    }
+
+    /// What is wrong with a key, by the name of the option that gave it: the file by itself was sound.
+    fn by_option(&self, message: &str) -> Error {
+        let given = [
+            (self.pivot.is_some(), "rig.pivot_px", "--pivot"),
+            (self.roi.is_some(), "rig.roi_px", "--roi"),
+            (self.from.is_some(), "rig.from_s", "--from"),
+            (self.until.is_some(), "rig.until_s", "--until"),
+            (self.true_rate.is_some(), "rig.true_rate_hz", "--true-rate"),
+            (!self.reference.is_empty(), "rig.reference_marks", "--reference"),
+        ];
+        let given = given.into_iter().filter(|(is_given, ..)| *is_given);
+        let named = given.fold(message.to_owned(), |text, (_, key, option)| text.replace(key, option));
+        let (what, why) = named.split_once(": ").unwrap_or(("options", &named));
+        option(what, why)
     }
 
     /// One colour a mark: the command line before the file before the paper's three red ones.

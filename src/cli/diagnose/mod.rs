@@ -12,9 +12,11 @@ use super::{Console, Target};
 use crate::diagnose::{self, report::Limits};
 use crate::error::{Error, Result};
 use crate::experiment::Experiment;
+use crate::fit::Record;
 use crate::model::ForwardModel;
 use crate::output::OutputFile;
 use crate::report::{diagnosis_curves, where_curves};
+use crate::series::FEWEST_ROWS;
 use figure::Figure;
 
 /// Longest planned recording.
@@ -90,6 +92,7 @@ impl DiagnoseArgs {
         }
         let marks = ForwardModel::of(&experiment)?.chain().groups().len();
         let records = super::recordings(&self.angles, marks, (self.from, self.until), console)?;
+        self.check_border(&records)?;
         let json = self.json.as_deref().map(OutputFile::create).transpose()?;
         let [figure, curves, map] =
             [&self.figure, &self.curves, &self.map].map(|path| path.as_deref().map(OutputFile::create).transpose());
@@ -108,6 +111,25 @@ impl DiagnoseArgs {
             }
         }
         super::deliver(&text, &json!(diagnosis), json, console)
+    }
+
+    /// Both sides of the border hold enough to be fitted and to be predicted.
+    fn check_border(&self, records: &[Record]) -> Result<()> {
+        let Some(border_s) = self.predict_from else { return Ok(()) };
+        let refused = |message: String| Err(Error::Option { option: "--predict-from".to_owned(), message });
+        let [record] = records else {
+            return refused("of several recordings the last is predicted from the others; leave it out".to_owned());
+        };
+        let before = record.t_s.iter().filter(|t_s| **t_s < border_s).count();
+        if before.min(record.len() - before) < FEWEST_ROWS {
+            return refused(format!(
+                "{border_s} s leaves {before} rows to fit and {} to predict, and each needs {FEWEST_ROWS}; give a stamp well between {} s and {} s",
+                record.len() - before,
+                record.t_s[0],
+                record.t_s[record.len() - 1]
+            ));
+        }
+        Ok(())
     }
 
     fn options(&self) -> diagnose::Options {
