@@ -100,6 +100,10 @@ pub enum Error {
     #[error("the experiment file: {detail}")]
     Missing { detail: String },
 
+    /// A file in the place of a folder of recordings.
+    #[error("{}: is a file, not a folder; use `freeswing run` for one recording", path.display())]
+    NotAFolder { path: PathBuf },
+
     /// A folder below which there is no recording.
     #[error("{}: holds no recording and no table of angles; give the folder above them", path.display())]
     NothingToDo { path: PathBuf },
