@@ -84,6 +84,23 @@ fn what_simulate_writes_fit_reads() {
 }
 
 #[test]
+fn values_that_stand_apart_are_counted() {
+    let folder = Folder::new();
+    let angles = folder.angles(SWING);
+    let text = fs::read_to_string(&angles).unwrap();
+    let mut rows: Vec<String> = text.lines().map(str::to_owned).collect();
+    for row in [60, 180] {
+        let mut fields: Vec<&str> = rows[row].split(',').collect();
+        fields[2] = "0.9";
+        rows[row] = fields.join(",");
+    }
+    let spoilt = folder.write("spoilt.csv", &(rows.join("\n") + "\n"));
+    let config = folder.write("start.toml", SWING);
+    let said = contains("2 values stand apart from the neighbours and were left out");
+    freeswing("fit").arg(spoilt).arg("--config").arg(config).assert().success().stdout(said);
+}
+
+#[test]
 fn one_link_is_read_and_fitted() {
     let folder = Folder::new();
     let one = "
