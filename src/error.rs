@@ -64,6 +64,10 @@ pub enum Error {
     #[error("{}{}: {message}", path.display(), line.map(|l| format!(":{l}")).unwrap_or_default())]
     Config { path: PathBuf, line: Option<usize>, message: String },
 
+    /// Words of a command that cannot be understood.
+    #[error("{detail}; --help tells all options")]
+    Words { detail: String },
+
     /// An option that cannot be used.
     #[error("{option}: {message}")]
     Option { option: String, message: String },
@@ -95,6 +99,10 @@ pub enum Error {
     /// An experiment file that does not say what a command needs.
     #[error("the experiment file: {detail}")]
     Missing { detail: String },
+
+    /// A file in the place of a folder of recordings.
+    #[error("{}: is a file, not a folder; use `freeswing run` for one recording", path.display())]
+    NotAFolder { path: PathBuf },
 
     /// A folder below which there is no recording.
     #[error("{}: holds no recording and no table of angles; give the folder above them", path.display())]

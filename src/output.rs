@@ -141,6 +141,35 @@ pub fn is_same_file(a: &Path, b: &Path) -> bool {
     a.canonicalize().is_ok_and(|a| b.canonicalize().is_ok_and(|b| a == b))
 }
 
+/// Whether what is written to `b` takes the place of `a`, be they there or not. A device or pipe takes all that comes.
+pub fn is_same_target(a: &Path, b: &Path) -> bool {
+    if b.exists() {
+        return b.is_file() && is_same_file(a, b);
+    }
+    a == b || (a.file_name() == b.file_name() && is_same_file(folder_of(a), folder_of(b)))
+}
+
+/// The folder in which a file stands.
+fn folder_of(path: &Path) -> &Path {
+    match path.parent() {
+        Some(parent) if !parent.as_os_str().is_empty() => parent,
+        _ => Path::new("."),
+    }
+}
+
+/// Makes a folder for outputs, and those above it.
+///
+/// # Errors
+/// [`Error::Unwritable`].
+pub fn make_folder(path: &Path) -> Result<()> {
+    let not_a_folder = path.ancestors().find(|above| above.exists()).filter(|above| !above.is_dir());
+    match not_a_folder {
+        Some(file) if file == path => Err(Error::unwritable(path, std::io::Error::other("it is a file, not a folder"))),
+        Some(file) => Err(Error::unwritable(path, std::io::Error::other(format!("{} is a file", file.display())))),
+        None => std::fs::create_dir_all(path).map_err(|e| Error::unwritable(path, e)),
+    }
+}
+
 /// A copy of a file, whole or not at all.
 ///
 /// # Errors
@@ -179,10 +208,11 @@ pub fn remove_left_temporaries(folder: &Path) {
 /// # Errors
 /// [`Error::Unwritable`].
 pub fn temporary_beside(path: &Path) -> Result<Temporary> {
-    let folder = match path.parent() {
-        Some(parent) if !parent.as_os_str().is_empty() => parent,
-        _ => Path::new("."),
-    };
+    let folder = folder_of(path);
+    if !folder.exists() {
+        let missing = std::io::Error::other(format!("there is no folder {}", folder.display()));
+        return Err(Error::unwritable(path, missing));
+    }
     let suffix = path.extension().map(|e| format!(".{}", e.to_string_lossy())).unwrap_or_default();
     let mut builder = tempfile::Builder::new();
     builder.prefix(TEMPORARY).suffix(&suffix);

@@ -129,13 +129,17 @@ impl AngleSeries {
         }
     }
 
+    /// How long a swing of the first link takes, where there are a few.
+    pub fn period_s(&self) -> Option<f64> {
+        let angles = self.t_s.iter().zip(self.theta_rad.first()?).filter_map(|(t, a)| Some((*t, (*a)?)));
+        period_s(&angles.collect::<Vec<_>>())
+    }
+
     /// What to say of stamps in which a swing takes longer than that of any hung thing.
     fn slow_clock(&self) -> Option<String> {
-        let angles: Vec<(f64, f64)> =
-            self.t_s.iter().zip(&self.theta_rad[0]).filter_map(|(t, a)| Some((*t, (*a)?))).collect();
         let counts = self.t_s.windows(2).all(|pair| pair[1] - pair[0] == 1.0);
         let longest_s = if counts { LONGEST_BY_FRAME_S } else { LONGEST_PERIOD_S };
-        let period_s = period_s(&angles).filter(|period_s| *period_s > longest_s)?;
+        let period_s = self.period_s().filter(|period_s| *period_s > longest_s)?;
         let unit = if counts { "frame numbers: divide by the frame rate" } else { "milliseconds: divide by 1000" };
         Some(format!(
             "{}: a swing takes {period_s:.0} s, as of a pendulum {:.0} m long; t_s looks like {unit}",

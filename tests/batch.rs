@@ -168,7 +168,7 @@ fn every_recording_has_a_row_and_a_bad_one_says_why_as_its_command_alone_does() 
         let told = said(&output);
         assert_eq!(
             Some(rows[name]["reason"].as_str()),
-            told.lines().rev().find(|line| line.starts_with("error: ")),
+            told.lines().rev().find_map(|line| line.strip_prefix("error: ")),
             "{name}"
         );
     }
@@ -214,10 +214,9 @@ fn what_may_not_be_read_has_a_row_that_says_so_and_is_done_once_it_may_be() {
     assert_eq!(rows["films/good.mp4"]["status"], "done");
     for (file, row, more) in closed {
         let alone = start(&[&["track", &format!("in/{row}"), "--out", "alone.csv"], more].concat());
-        let line = format!(
-            "error: in/{file}: cannot be read: Permission denied (os error 13); check the path and its permissions"
-        );
-        assert_eq!((alone.status.code(), said(&alone)), (Some(2), line.clone() + "\n"), "{row}");
+        let line =
+            format!("in/{file}: cannot be read: Permission denied (os error 13); check the path and its permissions");
+        assert_eq!((alone.status.code(), said(&alone)), (Some(2), format!("error: {line}\n")), "{row}");
         assert_eq!(rows[row]["reason"], line);
     }
     set_modes(0o755);
@@ -406,6 +405,10 @@ fn nothing_that_can_be_run_is_one_clear_line() {
     fs::remove_dir(lab.path("in")).unwrap();
     let (code, told) = lab.batch("out", &[]);
     assert!(code == Some(2) && told.starts_with("error: in: cannot be read"), "{told}");
+    lab.write("in", "a file");
+    let (code, told) = lab.batch("out", &[]);
+    assert!(code == Some(2) && told.starts_with("error: in: is a file, not a folder; use `freeswing run`"), "{told}");
+    assert!(!lab.path("out").exists(), "nothing is written where nothing is done");
 }
 
 #[test]
@@ -483,4 +486,145 @@ fn recordings_of_one_specimen_are_fitted_together() {
     assert!((k - 2e-4).abs() < 2e-6, "{k}");
     let page = fs::read_to_string(lab.path("out/index.html")).unwrap();
     assert!(page.contains("fitted and diagnosed together") && page.contains("together/strip"), "no table of specimens");
+}
+
+/// `freeswing run` in the laboratory.
+fn run(lab: &Laboratory, words: &str) -> Output {
+    let mut run = Command::cargo_bin("freeswing").unwrap();
+    run.current_dir(lab.folder.path()).arg("run").args(words.split(' ')).stdin(Stdio::null()).output().unwrap()
+}
+
+#[test]
+fn a_run_removes_what_a_run_left_and_nothing_else() {
+    let lab = Laboratory::new();
+    lab.write("a.csv", table(1.2));
+    let own = ["figures/mine.svg", "identify.json", "overlay.mp4"];
+    own.iter().for_each(|file| lab.write(&format!("mine/{file}"), "of my own"));
+    let output = run(&lab, "a.csv --until identify --out mine");
+    let told = said(&output);
+    assert_eq!((output.status.code(), told.lines().count()), (Some(2), 1), "{told}");
+    assert!(told.contains("--out: mine holds overlay.mp4, identify.json, figures, and no log of a run"), "{told}");
+    let all: Vec<PathBuf> = walk(&lab.path("mine"));
+    assert!(all.iter().all(|file| !file.is_file() || fs::read(file).unwrap() == b"of my own"), "{all:?}");
+    assert!(!lab.path("mine/log.txt").exists());
+    // in a run's own folder figures of others stay, those of the run go
+    assert!(run(&lab, "a.csv --out kept").status.success());
+    lab.write("kept/figures/mine.svg", "of my own");
+    let made = fs::read_dir(lab.path("kept/figures")).unwrap().count();
+    assert!(made > 1, "the page has figures");
+    assert!(run(&lab, "a.csv --until track --out kept").status.success());
+    let left: Vec<_> = fs::read_dir(lab.path("kept/figures")).unwrap().map(|own| own.unwrap().file_name()).collect();
+    assert_eq!(left, ["mine.svg"]);
+    assert!(!lab.path("kept/report.html").exists() && !lab.path("kept/identify.json").exists());
+}
+
+#[test]
+fn a_run_that_cannot_begin_leaves_an_earlier_one_as_it_is() {
+    let lab = Laboratory::new();
+    lab.write("a.csv", table(1.2));
+    lab.write("notes.mp4", "Dear all,");
+    lab.write("short.csv", "t_s,theta1_rad\n0,0.1\n");
+    let output = run(&lab, "a.csv --until identify --out good");
+    let told = String::from_utf8_lossy(&output.stdout).into_owned();
+    assert!(
+        output.status.success() && told.contains("f₁ = 1.2") && told.contains("a.csv: done; see good/log.txt"),
+        "{told}"
+    );
+    let before: Vec<(PathBuf, Vec<u8>)> =
+        walk(&lab.path("good")).into_iter().map(|file| (file.clone(), fs::read(&file).unwrap_or_default())).collect();
+    for (words, says) in [
+        ("notes.mp4 --out good", "notes.mp4: not a video that can be opened"),
+        ("short.csv --out good", "short.csv: holds one row"),
+        ("in --out good", "in: holds no PNG, JPEG"),
+        ("a.csv ./a.csv --out good", "./a.csv: holds the same angles as a.csv; give each recording once"),
+        ("in --out never", "in: holds no PNG, JPEG"),
+        ("a.csv --out short.csv", "short.csv: cannot be written: it is a file, not a folder"),
+    ] {
+        let output = run(&lab, words);
+        let told = said(&output);
+        assert_eq!((output.status.code(), told.lines().count()), (Some(2), 1), "{words}: {told}");
+        assert!(told.contains(says), "{words}: {told}");
+    }
+    let after: Vec<(PathBuf, Vec<u8>)> =
+        walk(&lab.path("good")).into_iter().map(|file| (file.clone(), fs::read(&file).unwrap_or_default())).collect();
+    assert!(before == after && !lab.path("never").exists());
+}
+
+#[test]
+fn what_another_run_left_in_the_results_is_not_taken_for_the_batch_s() {
+    let lab = Laboratory::new().with_tables(2);
+    assert_eq!(lab.batch("out", &[]).0, Some(0));
+    lab.write("other.csv", table(1.9));
+    let mut alone = Command::cargo_bin("freeswing").unwrap();
+    alone.current_dir(lab.folder.path()).args([
+        "run",
+        "other.csv",
+        "--until",
+        "identify",
+        "--out",
+        "out/day 0/swing00.csv",
+    ]);
+    assert!(alone.output().unwrap().status.success());
+    let (code, told) = lab.batch("out", &[]);
+    assert!(code == Some(0) && told.contains("2 recordings: 1 to run, 1 finished before, 0 left out"), "{told}");
+    assert!((lab.rows("out")["day 0/swing00.csv"]["f1_hz"].parse::<f64>().unwrap() - 1.0).abs() < 1e-3);
+}
+
+#[test]
+fn what_is_passed_over_left_out_or_bound_to_fail_is_said_beforehand() {
+    let lab = Laboratory::new();
+    lab.write("in/plain.csv", table(1.2));
+    lab.write("in/broken.csv", table(1.3));
+    lab.write("in/broken.toml", "[rig\n");
+    lab.write("in/typo.csv", table(1.4));
+    lab.write("in/typo.toml", "[rig]\nmirored = true\n");
+    lab.write("in/other.csv", "t_s,theta_1\n0,0.1\n");
+    lab.write("in/nothing.csv", "");
+    (0..9).for_each(|k| lab.write(&format!("in/stills/{k}.png"), "a picture"));
+    let batch = |more: &[&str]| {
+        let mut batch = Command::cargo_bin("freeswing").unwrap();
+        let output =
+            batch.current_dir(lab.folder.path()).args(["batch", "in", "--out", "out"]).args(more).output().unwrap();
+        (String::from_utf8(output.stdout.clone()).unwrap(), said(&output))
+    };
+    let (plan, _) = batch(&["--until", "fit", "--dry-run"]);
+    let passed_over = [
+        "passed over: in/nothing.csv: the file is empty",
+        "passed over: in/other.csv:1: no column `theta1_rad` among t_s, theta_1",
+        "passed over: in/stills: holds 9 stills and says when none of them was taken; put times.csv beside them",
+    ];
+    for says in [
+        "run; no experiment file: not fitted, not diagnosed",
+        "run; fails: in/broken.toml:1: ",
+        "run; fails: in/typo.toml:2: unknown key `mirored`",
+    ]
+    .iter()
+    .chain(&passed_over)
+    {
+        assert!(plan.contains(says), "{says} is missing in\n{plan}");
+    }
+    let (_, told) = batch(&["--until", "fit"]);
+    assert!(passed_over.iter().all(|says| told.contains(says)), "{told}");
+    assert!(told.contains("plain.csv: done in ") && told.contains(" s; no experiment file: not fitted"), "{told}");
+    let rows = lab.rows("out");
+    assert_eq!(rows["plain.csv"]["status"], "done");
+    assert_eq!(rows["plain.csv"]["reason"], "no experiment file: not fitted, not diagnosed");
+    assert!(rows["typo.csv"]["reason"].starts_with("in/typo.toml:2: unknown key"), "{rows:?}");
+    let page = fs::read_to_string(lab.path("out/index.html")).unwrap();
+    assert!(page.contains("done<br><small>no experiment file: not fitted, not diagnosed</small>"));
+    // and why what was finished is done again
+    let (plan, _) = batch(&["--until", "track", "--dry-run"]);
+    assert!(plan.contains("run; again: other options were given"), "{plan}");
+    lab.write("in/plain.csv", table(1.5));
+    lab.write("in/plain.toml", SPECIMEN);
+    let (plan, _) = batch(&["--until", "fit", "--dry-run"]);
+    assert!(plan.contains("run; again: the recording has changed, its experiment file has changed"), "{plan}");
+    assert!(plan.contains("left, it failed (--retry-failed)"), "{plan}");
+    let (plan, _) = batch(&["--until", "fit", "--dry-run", "--retry-failed"]);
+    assert!(plan.contains("run; again: it failed (--retry-failed); fails: in/typo.toml:2"), "{plan}");
+    let before = fs::read(lab.path("in/plain.toml")).unwrap();
+    let (_, told) = batch(&["--dry-run", "--json", "in/plain.toml"]);
+    assert!(
+        told.contains("--json: in/plain.toml is an input") && fs::read(lab.path("in/plain.toml")).unwrap() == before
+    );
 }

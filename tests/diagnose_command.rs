@@ -426,6 +426,14 @@ fn bad_input_is_one_line_and_exit_code_2_and_touches_no_output() {
         (angles.clone(), &two_links, vec![], "has 1 angle, and the specimen 2 links"),
         (angles.clone(), &config, vec!["--from", "14.9"], "rows between --from and --until; widen them"),
         (angles.clone(), &config, vec!["--until", "0.1"], "rows between --from and --until; widen them"),
+        (
+            angles.clone(),
+            &config,
+            vec!["--predict-from", "100"],
+            "--predict-from: 100 s leaves 450 rows to fit and 0 to",
+        ),
+        (angles.clone(), &config, vec!["--predict-from", "0"], "give a stamp well between 0 s and 14."),
+        (angles.clone(), &config, vec!["--predict-from", "-5"], "--predict-from: -5 s leaves 0 rows to fit"),
         (angles.clone(), &config, vec!["--figure", "/nowhere/figure.svg"], "cannot be written"),
     ];
     for (table, config, options, message) in cases {

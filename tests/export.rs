@@ -37,7 +37,14 @@ fn a_columnar_table_has_every_column_and_missing_values() {
 fn what_cannot_be_exported_is_said_in_one_line_and_nothing_is_written() {
     let folder = folder_with_table();
     fs::write(folder.path().join("ragged.csv"), "t_s,theta1_rad\n0,1\n2\n").unwrap();
+    fs::write(folder.path().join("readme.txt"), "Dear all,\n").unwrap();
+    fs::write(folder.path().join("other.csv"), "time,volts\n0,1\n").unwrap();
     for (words, said) in [
+        (
+            ["export", "readme.txt", "--out", "a.json"],
+            "error: readme.txt: not a table of angles: it has no rows; give what `track` wrote",
+        ),
+        (["export", "other.csv", "--out", "a.json"], "error: other.csv: not a table of angles: it has no column `t_s`"),
         (
             ["export", "angles.csv", "--out", "a.xlsx"],
             "error: --out: a.xlsx: name it .parquet, .mat, .json (SEP005) or .h5",
@@ -49,7 +56,17 @@ fn what_cannot_be_exported_is_said_in_one_line_and_nothing_is_written() {
         let told = String::from_utf8(output.stderr).unwrap();
         assert!(output.status.code() == Some(2) && told.starts_with(said) && told.lines().count() == 1, "{told}");
     }
-    assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 2);
+    assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 4);
+}
+
+#[test]
+fn a_table_may_come_from_standard_input() {
+    let folder = folder_with_table();
+    let table = fs::File::open(folder.path().join("angles.csv")).unwrap();
+    let mut export = Command::cargo_bin("freeswing").unwrap();
+    export.current_dir(folder.path()).args(["export", "-", "--out", "a.json"]).stdin(table);
+    assert!(export.status().unwrap().success());
+    assert!(fs::read_to_string(folder.path().join("a.json")).unwrap().contains("theta1_rad"));
 }
 
 /// `cargo test --features hdf5 --test export`

@@ -84,6 +84,23 @@ fn what_simulate_writes_fit_reads() {
 }
 
 #[test]
+fn values_that_stand_apart_are_counted() {
+    let folder = Folder::new();
+    let angles = folder.angles(SWING);
+    let text = fs::read_to_string(&angles).unwrap();
+    let mut rows: Vec<String> = text.lines().map(str::to_owned).collect();
+    for row in [60, 180] {
+        let mut fields: Vec<&str> = rows[row].split(',').collect();
+        fields[2] = "0.9";
+        rows[row] = fields.join(",");
+    }
+    let spoilt = folder.write("spoilt.csv", &(rows.join("\n") + "\n"));
+    let config = folder.write("start.toml", SWING);
+    let said = contains("2 values stand apart from the neighbours and were left out");
+    freeswing("fit").arg(spoilt).arg("--config").arg(config).assert().success().stdout(said);
+}
+
+#[test]
 fn one_link_is_read_and_fitted() {
     let folder = Folder::new();
     let one = "
@@ -198,6 +215,19 @@ fn bad_input_is_one_line_and_exit_code_2() {
         ),
         (vec![angles.clone()], config.clone(), vec!["--from", "9.9"], "rows between --from and --until; widen them"),
         (vec![angles.clone()], config.clone(), vec!["--json", "/nowhere/fit.json"], "cannot be written"),
+        (
+            vec![angles.clone(), folder.write("copy.csv", &fs::read_to_string(&angles).unwrap())],
+            config.clone(),
+            vec![],
+            "give each recording once",
+        ),
+        (
+            vec![angles.clone()],
+            config.clone(),
+            vec!["--free", "hinge_coulomb", "--fix", "hinge_coulomb"],
+            "--free: hinge_coulomb is to be kept as well (--fix)",
+        ),
+        (vec![angles.clone()], config.clone(), vec!["--from", "5", "--until", "2"], "--until: 2 s does not lie after"),
     ];
     for (tables, config, options, message) in cases {
         freeswing("fit")

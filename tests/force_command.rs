@@ -207,6 +207,15 @@ fn a_chopped_trace_settles_at_the_amplitude_that_the_plan_says() {
 }
 
 #[test]
+fn a_figure_is_svg_and_a_point_above_the_hinge_is_off_the_strip() {
+    let desk = Desk::new(FILM);
+    assert!(desk.refused(&["--figure", "x.png"]).contains("--figure: x.png: figures are SVG; name it x.svg"));
+    let line = desk.refused(&["--at-m", "-0.1"]);
+    assert!(line.contains("-0.1") && !line.contains("unexpected"), "{line}");
+    assert_eq!(desk.refused(&["--at-m", "-0.1,0.1"]), line);
+}
+
+#[test]
 fn nothing_is_written_where_something_is_wrong() {
     let desk = Desk::new(&FILM.replace("absorbed = 0.14", "absorbed = 0.5"));
     desk.refused(&["--json", "force.json", "--trace", "t.csv"]);

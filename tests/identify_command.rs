@@ -163,6 +163,9 @@ fn files_and_options_that_cannot_be_used_are_refused() {
     bench.refuses(&["a.csv", "--json", "a.csv"], "--json: a.csv is an input and would be overwritten");
     bench.refuses(&["a.csv", "--from", "24.9"], "--from, --until: the stretch holds 3 rows; a swing needs at least 8");
     bench.refuses(&["a.csv", "--from", "90"], "the table runs from 0 s to 24.966667 s");
+    bench.refuses(&["a.csv", "--from", "90"], "the stretch holds no row; widen it");
+    bench.refuses(&["a.csv", "--from", "10", "--until", "5"], "--until: 5 s does not lie after --from 10 s");
+    bench.refuses(&["a.csv", "--until", "0.5"], "is shorter than one swing, which takes 0.7");
     write("massless.toml", "[specimen]\nmass_kg = 0\n");
     bench.refuses(&["a.csv", "--config", "massless.toml"], "specimen.mass_kg = 0: must be a positive number");
     write("unknown.toml", "[specimen]\nmass = 1\n");

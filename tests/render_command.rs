@@ -46,7 +46,11 @@ fn bad_input_is_one_line_and_exit_2() {
         ("small.toml", &["--out", "missing/a.mp4"], "missing/a.mp4: cannot be written"),
         ("small.toml", &["--out", "a.mp4", "--truth", "missing/a.csv"], "missing/a.csv: cannot be written"),
         ("small.toml", &["--out", "a.mp4", "--frames", "0"], "render.duration_s = 0: not one frame"),
-        ("small.toml", &["--out", "a.mp4", "--truth", "a.mp4"], "--out: names the same file as --truth"),
+        (
+            "small.toml",
+            &["--out", "a.mp4", "--truth", "a.mp4"],
+            "--truth: a.mp4 is what --out writes and would be overwritten",
+        ),
     ];
     for (config, more, text) in cases {
         render(folder.path(), config, more).code(2).stdout("").stderr(one_line(text));

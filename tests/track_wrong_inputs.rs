@@ -302,15 +302,15 @@ fn times() -> Vec<Case> {
             Refuses(&["no frame lies between --from and --until"]),
         ),
         swing("an end before --from", &["--from", "2", "--until", "1"], Refuses(&["until", "later than"])),
-        swing("a beginning that is no number", &["--from", "NaN"], Refuses(&["from_s", "number of seconds"])),
+        swing("a beginning that is no number", &["--from", "NaN"], Refuses(&["--from", "number of seconds"])),
         swing(
             "a file with an end before its beginning",
             &["--config", "reversed.toml"],
             Refuses(&["until_s = 1", "later than"]),
         ),
-        swing("a negative true rate", &["--true-rate=-240"], Refuses(&["true_rate_hz", "positive"])),
+        swing("a negative true rate", &["--true-rate=-240"], Refuses(&["--true-rate", "positive"])),
         swing("a true rate of nothing", &["--config", "slow.toml"], Refuses(&["true_rate_hz", "positive"])),
-        swing("a true rate that is no number", &["--true-rate", "inf"], Refuses(&["true_rate_hz", "positive"])),
+        swing("a true rate that is no number", &["--true-rate", "inf"], Refuses(&["--true-rate", "positive"])),
         swing("a true rate in words", &["--true-rate", "fast"], Refuses(&["--true-rate", "fast"])),
         swing(
             "a true rate slower than the file's",

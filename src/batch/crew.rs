@@ -17,7 +17,7 @@ use super::find::Found;
 use super::layers::{self, Layered};
 use super::state::{self, Fingerprint, Finished, Status};
 use crate::error::{Error, Result};
-use crate::output::OutputFile;
+use crate::output::{self, OutputFile};
 use crate::progress::Heard;
 
 /// A recording to be run.
@@ -29,12 +29,16 @@ pub struct Job<'p> {
     pub folder: PathBuf,
     /// Its size, which tells about how long it takes.
     pub bytes: u64,
+    /// What is left out of it though it was asked for.
+    pub note: &'static str,
 }
 
 /// Hears how a batch goes. A lane is one of the processes that run at a time.
 pub trait Watch: Sync {
-    /// So many recordings, or specimens, there are, and so many are to be run.
-    fn begin(&self, what: &'static str, all: usize, to_run: usize);
+    /// Something that might have been meant as a recording, and why it is none.
+    fn passed_over(&self, line: &str);
+    /// So many recordings, or specimens, there are, so many are to be run, and so many are left out.
+    fn begin(&self, what: &'static str, all: usize, to_run: usize, left_out: usize);
     /// A run begins.
     fn begun(&self, lane: usize, name: &str);
     /// How far it is.
@@ -91,7 +95,7 @@ impl Crew<'_> {
         }
         self.watch.begun(lane, &job.found.name);
         let began = Instant::now();
-        fs::create_dir_all(&job.folder).map_err(|e| Error::unwritable(&job.folder, e))?;
+        output::make_folder(&job.folder)?;
         state::forget(&job.folder)?;
         let before = seen(&job.found.paths);
         let fingerprint = Fingerprint::of(job.found, &self.options.words);
@@ -99,7 +103,7 @@ impl Crew<'_> {
         let unchanged = seen(&job.found.paths) == before;
         if matches!(ended, Ended::Well) && !unchanged {
             let path = job.found.path().display();
-            ended = Ended::Failed(format!("error: {path}: changed while it was processed; run the batch again"));
+            ended = Ended::Failed(format!("{path}: changed while it was processed; run the batch again"));
         }
         // what has no fingerprint is done again the next time
         let is_final = unchanged && !matches!(ended, Ended::Killed(_));
@@ -107,7 +111,7 @@ impl Crew<'_> {
             schema: "freeswing.run/1".to_owned(),
             fingerprint: fingerprint.ok().filter(|_| is_final).unwrap_or_default(),
             status: if matches!(ended, Ended::Well) { Status::Done } else { Status::Failed },
-            reason: ended.reason(),
+            reason: ended.reason().unwrap_or_else(|| job.note.to_owned()),
         };
         state::write(&job.folder, &finished)?;
         self.watch.ended(lane, &job.found.name, &finished, began.elapsed().as_secs_f64());
@@ -124,7 +128,7 @@ impl Crew<'_> {
                 OutputFile::create(&path)?.commit(text.as_bytes())?;
                 Some(path)
             }
-            Err(error) => return Ok(Ended::Failed(format!("error: {error}"))),
+            Err(error) => return Ok(Ended::Failed(error.to_string())),
         };
         let mut command = Command::new(&self.options.program);
         command.arg("run").args(job.found.paths.iter().map(|path| as_argument(path)));
@@ -151,7 +155,7 @@ impl Crew<'_> {
         if status.success() {
             return Ok(Ended::Well);
         }
-        let Some(line) = said.lines().rev().find(|line| line.starts_with("error: ")) else {
+        let Some(line) = said.lines().rev().find_map(|line| line.strip_prefix("error: ")) else {
             let line = ended_without_a_word(job.found.path(), &status);
             let is_killed = matches!(status.signal(), Some(libc::SIGKILL | libc::SIGTERM | libc::SIGHUP));
             return Ok(if is_killed { Ended::Killed(line) } else { Ended::Failed(line) });
@@ -161,8 +165,7 @@ impl Crew<'_> {
     }
 
     /// What is no fault of the recording: the user has stopped it all, or nothing can be written any more.
-    fn unless_of_all(&self, line: &str, folder: &Path) -> Result<()> {
-        let told = line.trim_start_matches("error: ");
+    fn unless_of_all(&self, told: &str, folder: &Path) -> Result<()> {
         if self.watch.is_cancelled() || told == Error::Interrupted.to_string() {
             return Err(Error::Stopped);
         }
@@ -185,10 +188,11 @@ enum Ended {
 }
 
 impl Ended {
-    fn reason(self) -> String {
+    /// Why it failed.
+    fn reason(self) -> Option<String> {
         match self {
-            Self::Well => String::new(),
-            Self::Failed(line) | Self::Killed(line) => line,
+            Self::Well => None,
+            Self::Failed(line) | Self::Killed(line) => Some(line),
         }
     }
 }
@@ -216,7 +220,7 @@ fn whole_text(mut errors: ChildStderr) -> String {
 
 fn ended_without_a_word(path: &Path, status: &std::process::ExitStatus) -> String {
     format!(
-        "error: {}: the run was ended from outside ({status}), perhaps for want of memory; run it alone to see",
+        "{}: the run was ended from outside ({status}), perhaps for want of memory; run it alone to see",
         path.display()
     )
 }

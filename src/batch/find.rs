@@ -7,6 +7,7 @@ use std::path::{Path, PathBuf};
 use serde::Deserialize;
 
 use crate::error::{Error, Result};
+use crate::series::{AngleSeries, FEWEST_ROWS};
 
 /// How recordings end. What is in them the decoder says.
 const VIDEOS: [&str; 16] = [
@@ -41,21 +42,34 @@ pub struct Found {
     pub configs: Vec<PathBuf>,
 }
 
-/// Every recording and every table of angles below a folder, sorted by path; nothing of this or another batch's results, should they lie below it.
+/// What is below a folder.
+#[derive(Debug, Default)]
+pub struct Contents {
+    /// Every recording and every table of angles, sorted by path.
+    pub found: Vec<Found>,
+    /// What might have been meant as one: the line that says why it is none.
+    pub passed_over: Vec<String>,
+}
+
+/// What is below a folder; nothing of this or another batch's results, should they lie below it.
 ///
 /// # Errors
-/// [`Error::Unreadable`] for the folder itself. A folder below it that cannot be read is found as one that failed.
-pub fn recordings(input: &Path, output: &Path) -> Result<Vec<Found>> {
+/// [`Error::Unreadable`] for the folder itself, [`Error::NotAFolder`]. A folder below it that cannot be read is found as one that failed.
+pub fn recordings(input: &Path, output: &Path) -> Result<Contents> {
+    if input.is_file() {
+        return Err(Error::NotAFolder { path: input.to_owned() });
+    }
     // a link that leads back up is followed no further
-    let mut search = Search { output: output.canonicalize().ok(), found: Vec::new(), above: Vec::new() };
+    let mut search = Search { output: output.canonicalize().ok(), contents: Contents::default(), above: Vec::new() };
     search.folder(input, "", &[]).map_err(|e| Error::unreadable(input, e))?;
-    search.found.sort_by(|a, b| a.name.cmp(&b.name));
-    Ok(search.found)
+    search.contents.found.sort_by(|a, b| a.name.cmp(&b.name));
+    search.contents.passed_over.sort();
+    Ok(search.contents)
 }
 
 struct Search {
     output: Option<PathBuf>,
-    found: Vec<Found>,
+    contents: Contents,
     /// The folders above the one that is looked into, without links.
     above: Vec<PathBuf>,
 }
@@ -80,12 +94,13 @@ impl Search {
             }
             let path = entry.path();
             let name = if name.is_empty() { file_name } else { format!("{name}/{file_name}") };
-            let kind = if path.is_dir() { self.kind_of_folder(&path, &name, &configs) } else { kind_of_file(&path) };
+            let kind =
+                if path.is_dir() { self.kind_of_folder(&path, &name, &configs) } else { self.kind_of_file(&path) };
             let Some(kind) = kind else { continue };
             let beside = path.with_extension("toml");
             let beside = (kind != Kind::Unreadable && fs::symlink_metadata(&beside).is_ok()).then_some(beside);
             let configs = configs.iter().cloned().chain(beside).collect();
-            self.found.push(Found { name, paths: vec![path], kind, configs });
+            self.contents.found.push(Found { name, paths: vec![path], kind, configs });
         }
         self.above.pop();
         Ok(())
@@ -93,19 +108,32 @@ impl Search {
 
     /// A folder of stills with their times is one recording; any other is looked into.
     fn kind_of_folder(&mut self, path: &Path, name: &str, configs: &[PathBuf]) -> Option<Kind> {
-        if STILL_TIMES.iter().any(|times| path.join(times).is_file()) && crate::video::stills_in(path).is_ok() {
+        let stills = crate::video::stills_in(path).map_or(0, |stills| stills.len());
+        if stills > 0 && STILL_TIMES.iter().any(|times| path.join(times).is_file()) {
             return Some(Kind::Recording);
+        }
+        // a few pictures are a preview, not a swing
+        if stills >= FEWEST_ROWS {
+            let why = "says when none of them was taken; put times.csv beside them";
+            self.contents.passed_over.push(format!("{}: holds {stills} stills and {why}", path.display()));
         }
         self.folder(path, name, configs).is_err().then_some(Kind::Unreadable)
     }
-}
 
-fn kind_of_file(path: &Path) -> Option<Kind> {
-    let extension = path.extension()?.to_str()?.to_ascii_lowercase();
-    if VIDEOS.contains(&extension.as_str()) {
-        return Some(Kind::Recording);
+    fn kind_of_file(&mut self, path: &Path) -> Option<Kind> {
+        let extension = path.extension()?.to_str()?.to_ascii_lowercase();
+        if VIDEOS.contains(&extension.as_str()) {
+            return Some(Kind::Recording);
+        }
+        if extension != "csv" || STILL_TIMES.iter().any(|times| path.ends_with(times)) {
+            return None;
+        }
+        if has_columns_of_angles(path) {
+            return Some(Kind::Table);
+        }
+        self.contents.passed_over.extend(AngleSeries::read(path).err().map(|error| error.to_string()));
+        None
     }
-    (extension == "csv" && has_columns_of_angles(path)).then_some(Kind::Table)
 }
 
 /// Whether a table has the columns of angles. One that cannot be read is taken for one: its row says why.
@@ -185,7 +213,7 @@ mod tests {
         }
         file(top, "a/d.csv", "frame,t_s,theta1_rad\n");
         file(top, "a/other.csv", "time,volts\n");
-        let found = recordings(top, &top.join("out")).unwrap();
+        let found = recordings(top, &top.join("out")).unwrap().found;
         let names: Vec<&str> = found.iter().map(|found| found.name.as_str()).collect();
         assert_eq!(names, ["a/c.mov", "a/d.csv", "b.MP4"]);
         let configs = |index: usize| -> Vec<PathBuf> {
@@ -203,7 +231,7 @@ mod tests {
         file(top, "swing.mp4", "");
         file(top, "angles.csv", "t_s,theta1_rad\n");
         file(top, "angles.json", r#"{"schema": "freeswing.angles/1", "source": {"file": "somewhere/swing.mp4"}}"#);
-        let found = recordings(top, &top.join("out")).unwrap();
+        let found = recordings(top, &top.join("out")).unwrap().found;
         let all: Vec<PathBuf> = found.iter().map(|found| found.path().to_owned()).collect();
         assert_eq!(found[0].made_from(&all), Some(top.join("swing.mp4")));
         fs::remove_file(top.join("swing.mp4")).unwrap();

@@ -166,7 +166,13 @@ fn row(text: &mut String, folder: &Path, row: &Row, columns: &[Column], with_pic
         Some(file) => format!("<a href=\"{}/{file}\">{name}</a>", address(&row.recording)),
         None => name,
     };
-    let _ = write!(text, "<tr class=\"{0}\"><th scope=\"row\">{first}</th><td>{0}</td>", row.status.id());
+    // what was left out of one that is done
+    let note = if row.status == Status::Done && !row.reason.is_empty() {
+        format!("<br><small>{}</small>", escaped(&row.reason))
+    } else {
+        String::new()
+    };
+    let _ = write!(text, "<tr class=\"{0}\"><th scope=\"row\">{first}</th><td>{0}{note}</td>", row.status.id());
     if with_picture {
         let _ = write!(text, "<td>{}</td>", swing(&own.join("angles.csv"), &row.recording));
     }
@@ -176,7 +182,7 @@ fn row(text: &mut String, folder: &Path, row: &Row, columns: &[Column], with_pic
             let _ = write!(text, "<td{by}>{}</td>", escaped(&(column.shown)(row)));
         }
     } else {
-        let reason = escaped(row.reason.trim_start_matches("error: "));
+        let reason = escaped(&row.reason);
         let _ = write!(text, "<td class=\"reason\" colspan=\"{}\">{reason}</td>", columns.len());
     }
     text.push_str("</tr>\n");

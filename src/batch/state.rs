@@ -59,7 +59,7 @@ pub struct Finished {
     pub fingerprint: Fingerprint,
     /// How it ended.
     pub status: Status,
-    /// The line with which it failed.
+    /// The line with which it failed; of one that is done what was left out of it.
     pub reason: String,
 }
 
@@ -84,6 +84,23 @@ impl Fingerprint {
     }
 }
 
+impl Fingerprint {
+    /// What differs, in words.
+    pub fn changed_to(&self, now: &Self) -> String {
+        if *self == Self::default() {
+            return "it was ended from outside, or changed meanwhile".to_owned();
+        }
+        let version = format!("version {} did it", self.version);
+        let differences = [
+            (self.recording_sha256 != now.recording_sha256, "the recording has changed"),
+            (self.config_sha256 != now.config_sha256, "its experiment file has changed"),
+            (self.words != now.words, "other options were given"),
+            (self.version != now.version, &version),
+        ];
+        differences.into_iter().filter_map(|(is, what)| is.then_some(what)).collect::<Vec<_>>().join(", ")
+    }
+}
+
 /// What was finished in a folder; nothing where that cannot be read.
 pub fn read(folder: &Path) -> Option<Finished> {
     let text = std::fs::read_to_string(folder.join(FILE)).ok()?;
@@ -100,14 +117,14 @@ pub fn write(folder: &Path, finished: &Finished) -> Result<()> {
     OutputFile::create(&folder.join(FILE))?.commit(text.as_bytes())
 }
 
-/// From here on nothing in a folder is finished.
+/// From here on nothing in a folder is finished. A file of that name that says nothing of a run is another's.
 ///
 /// # Errors
 /// [`Error::Unwritable`].
 pub fn forget(folder: &Path) -> Result<()> {
-    let path = folder.join(FILE);
-    match std::fs::remove_file(&path) {
-        Err(error) if error.kind() != std::io::ErrorKind::NotFound => Err(Error::unwritable(&path, error)),
-        _ => Ok(()),
+    if read(folder).is_none() {
+        return Ok(());
     }
+    let path = folder.join(FILE);
+    std::fs::remove_file(&path).map_err(|e| Error::unwritable(&path, e))
 }

@@ -2,7 +2,7 @@
 
 use std::collections::HashMap;
 use std::io::IsTerminal;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicUsize, Ordering};
@@ -10,13 +10,13 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use globset::GlobBuilder;
 use indicatif::{MultiProgress, ProgressBar, ProgressStyle};
 
-use super::Console;
 use super::bar::{self, Bar};
 use super::run::{Extent, Stage};
 use super::table::Table;
+use super::{Console, Target, words};
 use crate::batch::crew::Watch;
 use crate::batch::state::{Finished, Status};
-use crate::batch::{self, Intentions, Options, Plan, Planned, Shard, Tally};
+use crate::batch::{self, Intentions, Options, Plan, Plans, Shard, Tally};
 use crate::error::{Error, Result};
 use crate::output::{OutputFile, is_same_file};
 use crate::progress::{Heard, Progress};
@@ -55,7 +55,7 @@ pub struct BatchArgs {
     dry_run: bool,
     /// With --dry-run: the same as JSON, for a program that shares the recordings out; `-` for standard output, instead of the table.
     #[arg(long, value_name = "FILE", requires = "dry_run")]
-    json: Option<PathBuf>,
+    json: Option<Target>,
     /// Part K of N, for several machines that share the folders.
     #[arg(long, value_name = "K/N", value_parser = shard)]
     shard: Option<Shard>,
@@ -87,10 +87,11 @@ impl BatchArgs {
             let _ = rayon::ThreadPoolBuilder::new().num_threads(jobs.into()).build_global();
         }
         if self.dry_run {
+            let plans = batch::plan(&options)?;
+            self.keep_files_of(&plans)?;
             let json = self.json.as_deref().map(OutputFile::create).transpose()?;
-            let planned = batch::plan(&options)?;
-            let text = if self.quiet { String::new() } else { intentions(&planned, &options) };
-            super::deliver(&text, &Intentions::from(&planned[..]), json, console)?;
+            let text = if self.quiet { String::new() } else { intentions(&plans, &options) };
+            super::deliver(&text, &Intentions::from(&plans), json, console)?;
             return Ok(ExitCode::SUCCESS);
         }
         let display = Display::new(self.quiet);
@@ -100,6 +101,14 @@ impl BatchArgs {
             console.remark(self.result(tally));
         }
         Ok(if tally.failed > 0 { ExitCode::FAILURE } else { ExitCode::SUCCESS })
+    }
+
+    /// Nor may the plan take the place of a file below the folder.
+    fn keep_files_of(&self, plans: &Plans) -> Result<()> {
+        let Some(json) = &self.json else { return Ok(()) };
+        let files = plans.recordings.iter().flat_map(|own| own.found.paths.iter().chain(&own.found.configs));
+        let files: Vec<&Path> = files.map(PathBuf::as_path).collect();
+        words::keep_apart(&files, &[("--json".to_owned(), json)], "use another name")
     }
 
     fn options(&self) -> Result<Options> {
@@ -138,11 +147,12 @@ impl BatchArgs {
 }
 
 /// What would be done.
-fn intentions(planned: &[Planned], options: &Options) -> String {
+fn intentions(plans: &Plans, options: &Options) -> String {
     let mut table = Table::new(["recording", "would be", "experiment files"]);
-    for planned in planned {
+    for planned in &plans.recordings {
         let what = match &planned.plan {
-            Plan::Run => "run".to_owned(),
+            Plan::Run(notes) if notes.is_empty() => "run".to_owned(),
+            Plan::Run(notes) => format!("run; {}", notes.join("; ")),
             Plan::Finished(finished) if finished.status == Status::Failed => {
                 "left, it failed (--retry-failed)".to_owned()
             }
@@ -157,7 +167,8 @@ fn intentions(planned: &[Planned], options: &Options) -> String {
             if configs.is_empty() { "none".to_owned() } else { configs.join(", ") },
         ]);
     }
-    table.text()
+    let passed_over = plans.passed_over.iter().map(|line| format!("passed over: {line}\n"));
+    table.text() + &passed_over.collect::<String>()
 }
 
 /// Bars on a terminal, one a run and one of all; elsewhere a line a recording.
@@ -199,10 +210,16 @@ fn style(template: &str) -> ProgressStyle {
 }
 
 impl Watch for Display {
-    fn begin(&self, what: &'static str, all: usize, to_run: usize) {
+    fn passed_over(&self, line: &str) {
+        if !self.quiet {
+            eprintln!("passed over: {line}");
+        }
+    }
+
+    fn begin(&self, what: &'static str, all: usize, to_run: usize, left_out: usize) {
         self.to_run.store(to_run, Ordering::SeqCst);
         self.ended.store(0, Ordering::SeqCst);
-        let finished = all - to_run;
+        let finished = all - to_run - left_out;
         if let (Some(bars), Ok(mut own)) = (&self.bars, self.all.lock()) {
             let bar = bars.add(ProgressBar::new(to_run as u64));
             bar.set_style(style("{prefix:>11} {wide_bar} {pos}/{len}, {elapsed}"));
@@ -213,7 +230,7 @@ impl Watch for Display {
             }
         } else if !self.quiet && all > 0 {
             let what = if all == 1 { what.trim_end_matches('s') } else { what };
-            eprintln!("{all} {what}, {to_run} to run, {finished} finished before or left out");
+            eprintln!("{all} {what}: {to_run} to run, {finished} finished before, {left_out} left out");
         }
     }
 
@@ -250,8 +267,9 @@ impl Watch for Display {
             return;
         }
         let how = match finished.status {
+            Status::Done if !finished.reason.is_empty() => format!("done in {seconds:.1} s; {}", finished.reason),
             Status::Done => format!("done in {seconds:.1} s"),
-            _ => format!("failed: {}", finished.reason.trim_start_matches("error: ")),
+            _ => format!("failed: {}", finished.reason),
         };
         match &self.bars {
             // what went well is seen in the bar of all

@@ -5,8 +5,8 @@ use std::time::Instant;
 
 use serde::Serialize;
 
-use super::Console;
 use super::table::number;
+use super::{Console, Target};
 use crate::error::{Error, Result};
 use crate::experiment::Experiment;
 use crate::measure::{Options, measure};
@@ -50,7 +50,7 @@ Renders two seconds of a swing, tracks them and compares the angles with the tru
 pub struct DoctorArgs {
     /// The same as JSON; `-` for standard output.
     #[arg(long, value_name = "FILE")]
-    json: Option<std::path::PathBuf>,
+    json: Option<Target>,
 }
 
 /// What was found.
@@ -156,7 +156,7 @@ impl Findings {
             number(test.rendered_in_s, 2),
             number(test.tracked_in_s, 2),
             number(1e3 * test.median_error_rad, 2),
-            if test.passed { "well" } else { "FAILED" }
+            if test.passed { "passed" } else { "FAILED" }
         )
     }
 }

@@ -1,11 +1,11 @@
 //! `freeswing export`: a table of angles for another program.
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
-use super::Console;
+use super::{Console, Target};
 use crate::error::{Error, Result};
 use crate::export::{self, Format};
-use crate::output::is_same_file;
+use crate::output::is_same_target;
 
 /// Write a table of angles as Parquet, MATLAB, SEP005 or HDF5.
 #[derive(Debug, clap::Args)]
@@ -18,11 +18,11 @@ Examples:
 
 Every column keeps its name, with the unit at its end. A missing number is NaN, in Parquet and SEP005 null.")]
 pub struct ExportArgs {
-    /// The table.
+    /// The table; `-` for standard input.
     angles: PathBuf,
     /// The file; its extension says the format.
     #[arg(long, value_name = "FILE")]
-    out: PathBuf,
+    out: Target,
 }
 
 impl ExportArgs {
@@ -32,11 +32,7 @@ impl ExportArgs {
     /// One line: what, where, what to do.
     pub fn run(&self, _console: &Console) -> Result<()> {
         let format = Format::of(&self.out)?;
-        if is_same_file(&self.angles, &self.out) {
-            let message = format!("{} is the input and would be overwritten; use another name", self.out.display());
-            return Err(Error::Option { option: "--out".to_owned(), message });
-        }
-        if is_account_of(&self.angles, &self.out) {
+        if is_same_target(&self.angles.with_extension("json"), &self.out) {
             let message = format!(
                 "{} is the name of the account that `track` writes beside {}; use another name, such as series.json",
                 self.out.display(),
@@ -46,15 +42,4 @@ impl ExportArgs {
         }
         export::write(&export::read(&self.angles)?, &self.out, format)
     }
-}
-
-/// Whether a path is that of the account of a table, be it there or not.
-fn is_account_of(table: &Path, path: &Path) -> bool {
-    let account = table.with_extension("json");
-    let folder = |path: &Path| match path.parent() {
-        Some(parent) if !parent.as_os_str().is_empty() => parent.to_owned(),
-        _ => PathBuf::from("."),
-    };
-    is_same_file(&account, path)
-        || (account.file_name() == path.file_name() && is_same_file(&folder(&account), &folder(path)))
 }

@@ -5,8 +5,8 @@ use std::path::PathBuf;
 
 use serde_json::{Value, json};
 
-use super::Console;
 use super::table::{Table, number, paragraph};
+use super::{Console, Target};
 use crate::error::{Error, Result};
 use crate::experiment::Experiment;
 use crate::fit::{self, Fit, Pace, Record, Seen, Verdict};
@@ -34,10 +34,10 @@ pub struct FitArgs {
     config: PathBuf,
     /// Write all of it as JSON; `-` for standard output.
     #[arg(long, value_name = "FILE")]
-    json: Option<PathBuf>,
+    json: Option<Target>,
     /// Write measured and simulated angles, and what is left, row by row, as CSV; `-` for standard output.
     #[arg(long, value_name = "FILE")]
-    curves: Option<PathBuf>,
+    curves: Option<Target>,
     /// Let a parameter or effect free that the file does not name; may be repeated.
     #[arg(long, value_name = "ID")]
     free: Vec<String>,
@@ -45,10 +45,10 @@ pub struct FitArgs {
     #[arg(long, value_name = "ID")]
     fix: Vec<String>,
     /// Use rows from this stamp on.
-    #[arg(long, value_name = "S", default_value_t = f64::NEG_INFINITY, hide_default_value = true, allow_negative_numbers = true)]
+    #[arg(long, value_name = "S", default_value_t = f64::NEG_INFINITY, hide_default_value = true)]
     from: f64,
     /// Use rows before this stamp.
-    #[arg(long, value_name = "S", default_value_t = f64::INFINITY, hide_default_value = true, allow_negative_numbers = true)]
+    #[arg(long, value_name = "S", default_value_t = f64::INFINITY, hide_default_value = true)]
     until: f64,
     /// Nothing on standard output.
     #[arg(long)]
@@ -118,6 +118,10 @@ fn free_parameters(experiment: &Experiment, marks: usize, more: &[String], fix: 
             message: format!("no such parameter; the nearest known one is `{}`", nearest()),
         })
     };
+    if let Some(both) = more.iter().find(|id| fix.contains(id)) {
+        let message = format!("{both} is to be kept as well (--fix); leave one of the two out");
+        return Err(Error::Option { option: "--free".to_owned(), message });
+    }
     let fix = fix.iter().map(parse).collect::<Result<Vec<_>>>()?;
     let mut free = fit::base_parameters(experiment, marks);
     for id in more {
@@ -253,8 +257,9 @@ impl Report<'_> {
         }
         let outliers = self.fitted.fit.outliers[index].len();
         if outliers > 0 {
-            let plural = if outliers == 1 { "value stands" } else { "values stand" };
-            text.push_str(&paragraph("  ", &format!("{outliers} {plural} apart from the neighbours and was left out")));
+            let [stand, was] = if outliers == 1 { ["value stands", "was"] } else { ["values stand", "were"] };
+            let line = format!("{outliers} {stand} apart from the neighbours and {was} left out");
+            text.push_str(&paragraph("  ", &line));
         }
         self.peaks(index, text);
     }

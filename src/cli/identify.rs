@@ -2,11 +2,12 @@
 
 use std::path::PathBuf;
 
-use super::Console;
+use super::table::number;
+use super::{Console, Target};
 use crate::error::{Error, Result};
 use crate::experiment::Experiment;
 use crate::identify::identify;
-use crate::output::{OutputFile, is_same_file};
+use crate::output::OutputFile;
 use crate::series::AngleSeries;
 
 /// Find frequencies, damping and mode shapes in a table of angles, every estimator side by side.
@@ -30,12 +31,12 @@ pub struct IdentifyArgs {
     config: Option<PathBuf>,
     /// Everything as JSON; `-` for standard output, instead of the table.
     #[arg(long, value_name = "FILE")]
-    json: Option<PathBuf>,
+    json: Option<Target>,
     /// Leave out what comes before this time.
-    #[arg(long, value_name = "S", allow_negative_numbers = true)]
+    #[arg(long, value_name = "S")]
     from: Option<f64>,
     /// Leave out what comes from this time on.
-    #[arg(long, value_name = "S", allow_negative_numbers = true)]
+    #[arg(long, value_name = "S")]
     until: Option<f64>,
     /// Print nothing.
     #[arg(long)]
@@ -50,7 +51,6 @@ impl IdentifyArgs {
     pub fn run(&self, console: &Console) -> Result<()> {
         let experiment = self.config.as_deref().map(Experiment::read).transpose()?;
         let experiment = experiment.filter(|experiment| describes_specimen(experiment, console));
-        self.keep_inputs()?;
         let json = self.json.as_deref().map(OutputFile::create).transpose()?;
         let series = self.stretch(super::read_angles(&self.angles, console)?)?;
         let found = identify(&series, experiment.as_ref())?;
@@ -67,25 +67,26 @@ impl IdentifyArgs {
         if self.from.is_none() && self.until.is_none() {
             return Ok(series);
         }
-        let rows = series.rows(self.from.unwrap_or(f64::NEG_INFINITY), self.until.unwrap_or(f64::INFINITY));
+        let (from_s, until_s) = (self.from.unwrap_or(f64::NEG_INFINITY), self.until.unwrap_or(f64::INFINITY));
+        super::check_span(from_s, until_s)?;
+        let stretch = series.slice(series.rows(from_s, until_s));
         let [first, last] = [series.t_s[0], series.t_s[series.len() - 1]];
-        series.slice(rows).checked().map_err(|error| match error {
-            Error::Table { message, .. } => Error::Option {
-                option: "--from, --until".to_owned(),
-                message: format!("the stretch {message} (the table runs from {first} s to {last} s)"),
-            },
-            other => other,
-        })
-    }
-
-    /// The output may not take the place of an input.
-    fn keep_inputs(&self) -> Result<()> {
-        let Some(json) = &self.json else { return Ok(()) };
-        if [Some(&self.angles), self.config.as_ref()].into_iter().flatten().any(|input| is_same_file(input, json)) {
-            let message = format!("{} is an input and would be overwritten; use another name", json.display());
-            return Err(Error::Option { option: "--json".to_owned(), message });
+        let refused = |what: String| Error::Option {
+            option: "--from, --until".to_owned(),
+            message: format!("the stretch {what} (the table runs from {first} s to {last} s)"),
+        };
+        if stretch.is_empty() {
+            return Err(refused("holds no row; widen it".to_owned()));
         }
-        Ok(())
+        let stretch = stretch.checked().map_err(|error| match error {
+            Error::Table { message, .. } => refused(message),
+            other => other,
+        })?;
+        if let Some(swing_s) = series.period_s().filter(|swing_s| stretch.duration_s() < *swing_s) {
+            let (long, swing) = (number(stretch.duration_s(), 3), number(swing_s, 3));
+            return Err(refused(format!("of {long} s is shorter than one swing, which takes {swing} s; widen it")));
+        }
+        Ok(stretch)
     }
 }
 

@@ -2,11 +2,11 @@
 
 use std::path::{Path, PathBuf};
 
-use super::Console;
+use super::{Console, Target};
 use crate::error::{Error, Result};
 use crate::look::{Finding, look, preview, to_toml};
 use crate::measure::Options;
-use crate::output::{OutputFile, is_same_file};
+use crate::output::OutputFile;
 
 /// Look at a recording and write a starting experiment file.
 #[derive(Debug, clap::Args)]
@@ -25,10 +25,10 @@ pub struct InitArgs {
     video: PathBuf,
     /// The experiment file to write; an existing one is not replaced. `-` for standard output.
     #[arg(long, value_name = "TOML", default_value = "experiment.toml")]
-    out: PathBuf,
+    out: Target,
     /// A picture of what was found.
     #[arg(long, value_name = "PNG")]
-    preview: Option<PathBuf>,
+    preview: Option<Target>,
     /// Replace an existing experiment file.
     #[arg(long)]
     force: bool,
@@ -43,7 +43,7 @@ impl InitArgs {
     /// # Errors
     /// One line: what, where, what to do.
     pub fn run(&self, console: &Console) -> Result<()> {
-        self.keep_inputs()?;
+        self.check_preview()?;
         if self.out.exists() && !self.force && self.out.as_os_str() != "-" {
             let message = format!("{} exists already; name another file, or say --force", self.out.display());
             return Err(Error::Option { option: "--out".to_owned(), message });
@@ -64,21 +64,12 @@ impl InitArgs {
         Ok(())
     }
 
-    /// The recording is never written over, nor is one output by the other; the preview is a PNG.
-    fn keep_inputs(&self) -> Result<()> {
-        let same = |a: &Path, b: &Path| a == b || is_same_file(a, b);
-        let refused = |option: &str, message: String| Err(Error::Option { option: option.to_owned(), message });
-        for (option, target) in [("--out", Some(&self.out)), ("--preview", self.preview.as_ref())] {
-            if let Some(target) = target.filter(|target| same(target, &self.video)) {
-                return refused(option, format!("{} is the recording and would be overwritten", target.display()));
-            }
-        }
+    /// The preview is a PNG.
+    fn check_preview(&self) -> Result<()> {
         let Some(preview) = &self.preview else { return Ok(()) };
-        if same(preview, &self.out) {
-            return refused("--preview", format!("{} is the experiment file; name another", preview.display()));
-        }
         if !preview.extension().is_some_and(|e| e.eq_ignore_ascii_case("png")) {
-            return refused("--preview", format!("{}: the preview is a PNG; name it .png", preview.display()));
+            let message = format!("{}: the preview is a PNG; name it .png", preview.display());
+            return Err(Error::Option { option: "--preview".to_owned(), message });
         }
         Ok(())
     }

@@ -3,8 +3,8 @@
 use std::fmt::Write;
 use std::path::PathBuf;
 
-use super::Console;
 use super::table::{Table, number, paragraph};
+use super::{Console, Target};
 use crate::error::Result;
 use crate::laser::{Analysis, LaserRecord, Report, analyse, plot};
 use crate::output::OutputFile;
@@ -28,10 +28,10 @@ pub struct LaserArgs {
     config: PathBuf,
     /// Write all of it as JSON; `-` for standard output.
     #[arg(long, value_name = "FILE")]
-    json: Option<PathBuf>,
+    json: Option<Target>,
     /// Draw record and answer as SVG; `-` for standard output.
     #[arg(long, value_name = "FILE")]
-    figure: Option<PathBuf>,
+    figure: Option<Target>,
     /// Nothing on standard output.
     #[arg(long)]
     quiet: bool,
@@ -43,7 +43,6 @@ impl LaserArgs {
     /// # Errors
     /// One line: what, where, what to do.
     pub fn run(&self, console: &Console) -> Result<()> {
-        self.figure.as_deref().map(super::diagnose::check_figure).transpose()?;
         let experiment = super::read_strip(&self.config, console)?;
         let record = LaserRecord::read(&self.record, &experiment.laser.clone().unwrap_or_default())?;
         for warning in &record.warnings {

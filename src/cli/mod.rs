@@ -20,6 +20,7 @@ mod shell;
 mod simulate;
 mod table;
 mod track;
+mod words;
 
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
@@ -28,6 +29,7 @@ use clap::{Parser, Subcommand};
 
 pub use bar::Bar;
 use console::Console;
+use words::Target;
 
 use crate::experiment::Experiment;
 use crate::fit::Record;
@@ -76,7 +78,7 @@ impl Cli {
     /// Runs the command.
     pub fn run() -> ExitCode {
         bar::hear_interrupts();
-        exit(Self::parse().command.run(&Console::default()))
+        exit(words::read::<Self>(std::env::args_os()).and_then(|cli| cli.command.run(&Console::default())))
     }
 }
 
@@ -111,7 +113,8 @@ impl TrackCli {
     /// Runs `track`.
     pub fn run() -> ExitCode {
         bar::hear_interrupts();
-        exit(Self::parse().args.run(&Console::default()).map(|()| ExitCode::SUCCESS))
+        let ran = words::read::<Self>(std::env::args_os()).and_then(|cli| cli.args.run(&Console::default()));
+        exit(ran.map(|()| ExitCode::SUCCESS))
     }
 }
 
@@ -159,16 +162,39 @@ fn recordings(
     (from_s, until_s): (f64, f64),
     console: &Console,
 ) -> crate::Result<Vec<Record>> {
-    let read = |path: &PathBuf| {
-        let series = read_angles(path, console)?;
+    check_span(from_s, until_s)?;
+    let all = paths.iter().map(|path| read_angles(path, console)).collect::<crate::Result<Vec<_>>>()?;
+    refuse_twice(&all)?;
+    let record = |series: &AngleSeries| {
         let kept = series.slice(series.rows(from_s, until_s));
         if kept.len() < crate::series::FEWEST_ROWS {
             let message = format!("{} rows between --from and --until; widen them", kept.len());
-            return Err(crate::Error::Table { path: path.clone(), line: None, message });
+            return Err(crate::Error::Table { path: series.path.clone(), line: None, message });
         }
         Record::of(&kept, marks)
     };
-    paths.iter().map(read).collect()
+    all.iter().map(record).collect()
+}
+
+/// `--from` comes before `--until`.
+fn check_span(from_s: f64, until_s: f64) -> crate::Result<()> {
+    if from_s < until_s {
+        return Ok(());
+    }
+    let message = format!("{until_s} s does not lie after --from {from_s} s; give a later one");
+    Err(crate::Error::Option { option: "--until".to_owned(), message })
+}
+
+/// The same angles twice would count as two measurements.
+fn refuse_twice(all: &[AngleSeries]) -> crate::Result<()> {
+    for (index, series) in all.iter().enumerate() {
+        let is_same = |other: &&AngleSeries| other.t_s == series.t_s && other.theta_rad == series.theta_rad;
+        if let Some(other) = all[..index].iter().find(is_same) {
+            let message = format!("holds the same angles as {}; give each recording once", other.path.display());
+            return Err(crate::Error::Table { path: series.path.clone(), line: None, message });
+        }
+    }
+    Ok(())
 }
 
 /// Prints a report; with a file for JSON writes it there, and prints nothing where that file is standard output.

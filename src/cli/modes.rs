@@ -4,8 +4,8 @@ use std::f64::consts::PI;
 use std::fmt::Write;
 use std::path::PathBuf;
 
-use super::Console;
 use super::table::{Table, number, paragraph, setting};
+use super::{Console, Target};
 use crate::error::Result;
 use crate::model::modes::{Component, RodMode, Survey};
 use crate::output::OutputFile;
@@ -29,7 +29,7 @@ pub struct ModesArgs {
     config: PathBuf,
     /// The same as JSON, in full precision; `-` for standard output instead of the tables.
     #[arg(long, value_name = "FILE")]
-    json: Option<PathBuf>,
+    json: Option<Target>,
 }
 
 impl ModesArgs {

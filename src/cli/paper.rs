@@ -1,10 +1,9 @@
 //! `freeswing paper`: the published numbers, recomputed.
 
 use std::fmt::Write;
-use std::path::PathBuf;
 
-use super::Console;
 use super::table::{Table, number, paragraph};
+use super::{Console, Target};
 use crate::error::Result;
 use crate::output::OutputFile;
 use crate::paper::{Quantity, Reproduction, Row, Section, Verdict};
@@ -19,11 +18,11 @@ Example:
   freeswing paper --distance-m 0.8 --json paper.json")]
 pub struct PaperArgs {
     /// From the spotlight to the strip, which the paper does not give.
-    #[arg(long, value_name = "M", default_value_t = 1.0, allow_negative_numbers = true)]
+    #[arg(long, value_name = "M", default_value_t = 1.0)]
     distance_m: f64,
     /// The same as JSON, in full precision; `-` for standard output instead of the tables.
     #[arg(long, value_name = "FILE")]
-    json: Option<PathBuf>,
+    json: Option<Target>,
 }
 
 impl PaperArgs {

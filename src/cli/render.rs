@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use super::Console;
+use super::{Console, Target};
 use crate::error::{Error, Result};
 use crate::progress::Progress;
 use crate::synth::Recording;
@@ -18,10 +18,10 @@ pub struct RenderArgs {
     config: PathBuf,
     /// The video to make: .mp4, .mov, .mkv or .avi.
     #[arg(long, value_name = "FILE")]
-    out: PathBuf,
+    out: Target,
     /// A table of the true marks and angles.
     #[arg(long, value_name = "FILE")]
-    truth: Option<PathBuf>,
+    truth: Option<Target>,
     /// Seed of noise and jitter, instead of render.seed.
     #[arg(long)]
     seed: Option<u64>,
@@ -48,10 +48,6 @@ impl RenderArgs {
         render.duration_s = self.duration.unwrap_or(render.duration_s);
         if let Some(frames) = self.frames {
             render.duration_s = frames as f64 / render.fps;
-        }
-        if self.truth.as_ref() == Some(&self.out) {
-            let message = "names the same file as --truth; give them different names".to_owned();
-            return Err(Error::Option { option: "--out".to_owned(), message });
         }
         let recording = Recording::of(&experiment)?;
         let bar = console.bar_of_frames(self.quiet);

@@ -1,15 +1,20 @@
 //! `freeswing run`: every stage for one recording, each as its own command would do it.
 
 use std::fs::{self, File, TryLockError};
+use std::io::{Read, Write};
 use std::path::{Path, PathBuf};
 
-use clap::{Parser, ValueEnum};
+use clap::ValueEnum;
 
 use super::bar::Shown;
-use super::{Cli, Console};
+use super::{Cli, Console, words};
+use crate::batch::state;
 use crate::error::{Error, Result};
 use crate::experiment::Experiment;
 use crate::output;
+use crate::report;
+use crate::series::AngleSeries;
+use crate::video::{Recording, StillTimes};
 
 /// Track, identify, fit, diagnose and report one recording into a folder.
 #[derive(Debug, clap::Args)]
@@ -22,7 +27,8 @@ Examples:
 
 Leaves in the folder: angles.csv, angles.json, overlay.mp4, identify.json, fit.json, diagnosis.json, figures/, report.html, and
 log.txt with every command, as it could be typed alone, and what it printed. Where a stage fails, what was done before it is kept,
-the page shows it, and the exit code is 2. Without --config it ends with identify. What an earlier run left there is removed.")]
+the page shows it, and the exit code is 2. Without --config it ends with identify. What an earlier run left there is removed, and nothing
+else: a folder that holds files of these names and no log of a run is refused.")]
 pub struct RunArgs {
     /// The recording, or a table of angles; several tables of one specimen are fitted and diagnosed together.
     #[arg(required = true, value_name = "RECORDING")]
@@ -86,7 +92,7 @@ impl Stage {
 }
 
 /// What a run leaves in its folder.
-pub const OUTPUTS: [&str; 10] = [
+const OUTPUTS: [&str; 10] = [
     "angles.csv",
     "angles.json",
     "overlay.mp4",
@@ -94,12 +100,18 @@ pub const OUTPUTS: [&str; 10] = [
     "fit.json",
     "diagnosis.json",
     "experiment.toml",
-    "figures",
+    FIGURES,
     "report.html",
     LOG,
 ];
 /// Every command, and what it printed.
 const LOG: &str = "log.txt";
+/// Its first line, before the version.
+const LOG_BEGINS: &str = "freeswing ";
+/// The folder of pictures and their curves.
+const FIGURES: &str = "figures";
+/// What a run leaves there besides the figures of the page.
+const DRAWN: [&str; 4] = ["fit.csv", "diagnosis.svg", "diagnosis.csv", "where.csv"];
 
 impl RunArgs {
     /// Runs the stages.
@@ -113,7 +125,6 @@ impl RunArgs {
         self.check()?;
         let log = self.begin()?;
         let console = Console::of_run(log, self.shown());
-        console.log(&format!("freeswing {}", env!("CARGO_PKG_VERSION")));
         let outcome = self.stages(&console);
         if let Err(error) = &outcome {
             console.log(&format!("error: {error}"));
@@ -122,7 +133,7 @@ impl RunArgs {
         let page = if self.extent.until == Stage::Report { self.stage(Stage::Report, &console) } else { Ok(()) };
         outcome.and(page)?;
         if self.shown() == Shown::OnTerminal {
-            Console::default().print(&format!("{}\n", self.done()))?;
+            Console::default().print(&self.done()?)?;
         }
         Ok(())
     }
@@ -144,12 +155,7 @@ impl RunArgs {
     fn stage(&self, stage: Stage, console: &Console) -> Result<()> {
         let Some(words) = self.words(stage)? else { return Ok(()) };
         console.log(&format!("\n$ {}", as_typed(&words)));
-        // the words are the program's own: they are sound unless a path looks like an option
-        let cli = Cli::try_parse_from(&words).map_err(|error| Error::Option {
-            option: as_typed(&words),
-            message: error.to_string().lines().next().unwrap_or_default().to_owned(),
-        })?;
-        cli.command.run(console).map(drop)
+        words::read::<Cli>(&words)?.command.run(console).map(drop)
     }
 
     /// The command of a stage; nothing where a table of angles needs no tracking.
@@ -216,37 +222,70 @@ impl RunArgs {
             }
         }
         self.config.as_deref().map(Experiment::read_rig).transpose()?;
-        let inputs: Vec<&PathBuf> = self.recordings.iter().chain(&self.config).collect();
+        let inputs: Vec<&Path> = self.recordings.iter().chain(&self.config).map(PathBuf::as_path).collect();
         let kept = self.own_config();
-        for output in OUTPUTS.map(|name| self.out.join(name)).into_iter().filter(|output| kept.as_ref() != Some(output))
-        {
-            if inputs.iter().any(|input| output::is_same_file(input, &output)) {
-                let message = format!("{} is an input and would be overwritten; give another folder", output.display());
-                return Err(Error::Option { option: "--out".to_owned(), message });
+        let outputs = OUTPUTS.map(|name| self.out.join(name));
+        let outputs = outputs.iter().filter(|output| kept.as_ref() != Some(*output));
+        let outputs: Vec<(String, &Path)> = outputs.map(|output| ("--out".to_owned(), output.as_path())).collect();
+        words::keep_apart(&inputs, &outputs, "give another folder")?;
+        self.leave_others_alone(&outputs)?;
+        // a batch's folder is its own: there what an earlier run left goes first, for it belongs to a recording that has changed
+        if self.watched {
+            return Ok(());
+        }
+        match self.recordings.as_slice() {
+            [one] if !is_table(one) => Recording::open(one, &StillTimes::Beside).map(drop),
+            tables => {
+                let read = |table: &PathBuf| AngleSeries::read(table);
+                super::refuse_twice(&tables.iter().map(read).collect::<Result<Vec<_>>>()?)
             }
         }
-        Ok(())
+    }
+
+    /// Files that no run has left are not removed.
+    fn leave_others_alone(&self, outputs: &[(String, &Path)]) -> Result<()> {
+        if self.is_of_a_run() {
+            return Ok(());
+        }
+        let there = outputs.iter().map(|(_, output)| *output).filter(|output| fs::symlink_metadata(output).is_ok());
+        let names: Vec<String> = there.filter_map(Path::file_name).map(|n| n.to_string_lossy().into_owned()).collect();
+        if names.is_empty() {
+            return Ok(());
+        }
+        let message = format!(
+            "{} holds {}, and no log of a run that made it; give another folder",
+            self.out.display(),
+            names.join(", ")
+        );
+        Err(Error::Option { option: "--out".to_owned(), message })
+    }
+
+    /// Whether the folder holds a run's log, however far the run came.
+    fn is_of_a_run(&self) -> bool {
+        let Ok(log) = File::open(self.out.join(LOG)) else { return false };
+        let mut first = String::new();
+        let is_text = log.take(LOG_BEGINS.len() as u64).read_to_string(&mut first).is_ok();
+        is_text && (first.is_empty() || first == LOG_BEGINS)
     }
 
     /// The log of a folder without what an earlier run left, and with the configuration, which may stand there already.
     fn begin(&self) -> Result<File> {
-        let figures = self.out.join("figures");
-        fs::create_dir_all(&self.out).map_err(|e| Error::unwritable(&self.out, e))?;
+        let figures = self.out.join(FIGURES);
+        output::make_folder(&self.out)?;
         let log = self.log()?;
+        state::forget(&self.out)?;
         let kept = self.own_config();
-        for path in OUTPUTS.map(|name| self.out.join(name)) {
-            if kept.as_ref() == Some(&path) || path.ends_with(LOG) {
-                continue;
-            }
-            let gone = if path.is_dir() { fs::remove_dir_all(&path) } else { fs::remove_file(&path) };
-            match gone {
+        let drawn = DRAWN.map(|name| figures.join(name)).into_iter().chain(report::figures_on_page(&self.out));
+        let files = OUTPUTS.into_iter().filter(|name| ![LOG, FIGURES].contains(name)).map(|name| self.out.join(name));
+        for path in drawn.chain(files).filter(|path| kept.as_ref() != Some(path)) {
+            match fs::remove_file(&path) {
                 Err(error) if error.kind() != std::io::ErrorKind::NotFound => {
                     return Err(Error::unwritable(&path, error));
                 }
                 _ => {}
             }
         }
-        fs::create_dir_all(&figures).map_err(|e| Error::unwritable(&figures, e))?;
+        output::make_folder(&figures)?;
         match &self.config {
             Some(config) if kept.is_none() => output::copy(config, &self.out.join("experiment.toml"))?,
             _ => {}
@@ -254,11 +293,11 @@ impl RunArgs {
         Ok(log)
     }
 
-    /// The log, emptied. Its lock keeps a second run out of the folder; the system frees it when this one ends, however that comes about.
+    /// The log, with its first line alone. Its lock keeps a second run out of the folder; the system frees it when this one ends, however that comes about.
     fn log(&self) -> Result<File> {
         let path = self.out.join(LOG);
         let unwritable = |e| Error::unwritable(&path, e);
-        let log = File::options().write(true).create(true).truncate(false).open(&path).map_err(unwritable)?;
+        let mut log = File::options().write(true).create(true).truncate(false).open(&path).map_err(unwritable)?;
         // one that another program has begun waits for one that is just being ended
         let locked = if self.watched { log.lock().map_err(TryLockError::Error) } else { log.try_lock() };
         match locked {
@@ -268,7 +307,9 @@ impl RunArgs {
             Err(TryLockError::Error(error)) => return Err(unwritable(error)),
             Ok(()) => {}
         }
-        log.set_len(0).map_err(unwritable)?;
+        // its beginning says that the folder is a run's: at no instant it is without
+        let first = format!("{LOG_BEGINS}{}\n", env!("CARGO_PKG_VERSION"));
+        log.write_all(first.as_bytes()).and_then(|()| log.set_len(first.len() as u64)).map_err(unwritable)?;
         output::remove_left_temporaries(&self.out);
         Ok(log)
     }
@@ -288,12 +329,14 @@ impl RunArgs {
         }
     }
 
-    fn done(&self) -> String {
+    /// What was found, and where more of it stands.
+    fn done(&self) -> Result<String> {
+        let results = report::results(&self.out).ok().flatten().map_or(String::new(), |results| results + "\n");
         let last = match self.extent.until {
             Stage::Report => "report.html",
             _ => LOG,
         };
-        format!("{}: done; see {}", self.recordings[0].display(), self.out.join(last).display())
+        Ok(format!("{results}{}: done; see {}\n", self.recordings[0].display(), self.out.join(last).display()))
     }
 }
 

@@ -7,7 +7,7 @@ use clap_complete::Shell;
 
 use super::{Cli, Console, TrackCli};
 use crate::error::{Error, Result};
-use crate::output::OutputFile;
+use crate::output::{self, OutputFile};
 
 /// Print a shell's completions of all commands.
 #[derive(Debug, clap::Args)]
@@ -55,7 +55,7 @@ impl ManArgs {
     /// # Errors
     /// [`Error::Unwritable`].
     pub fn run(&self, _console: &Console) -> Result<()> {
-        std::fs::create_dir_all(&self.out).map_err(|e| Error::unwritable(&self.out, e))?;
+        output::make_folder(&self.out)?;
         let mut whole = Cli::command();
         whole.build();
         self.page(whole.clone(), "freeswing".to_owned())?;

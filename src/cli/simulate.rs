@@ -6,7 +6,7 @@ use std::path::PathBuf;
 use rand::SeedableRng;
 use rand_distr::{Distribution, Normal};
 
-use super::Console;
+use super::{Console, Target};
 use crate::error::{Error, Result};
 use crate::output::OutputFile;
 use crate::synth::Swing;
@@ -28,7 +28,7 @@ pub struct SimulateArgs {
     config: PathBuf,
     /// The table to write; `-` for standard output.
     #[arg(long, value_name = "FILE")]
-    out: PathBuf,
+    out: Target,
     /// Length in seconds, instead of render.duration_s.
     #[arg(long, value_name = "S")]
     duration: Option<f64>,

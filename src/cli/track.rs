@@ -4,14 +4,14 @@ use std::path::{Path, PathBuf};
 
 use clap::{Args, ValueEnum};
 
-use super::Console;
+use super::{Console, Target, words};
 use crate::angles::{self, AngleSource};
 use crate::caution::slow_motion;
 use crate::detect::debug::DebugFolder;
 use crate::error::{Error, Result};
 use crate::experiment::{Experiment, MarkColour};
 use crate::measure::{Measurement, Options, Session, Steadying};
-use crate::output::{OutputFile, is_same_file};
+use crate::output::OutputFile;
 use crate::overlay::{self, Overlay};
 use crate::sidecar::Sidecar;
 use crate::video::{Recording, StillTimes};
@@ -32,13 +32,13 @@ pub struct TrackArgs {
     video: PathBuf,
     /// The table of angles; `-` for standard output.
     #[arg(long, value_name = "CSV")]
-    out: PathBuf,
+    out: Target,
     /// The experiment: marks, pivot, mirror, plumb line, lens.
     #[arg(long, value_name = "TOML")]
     config: Option<PathBuf>,
     /// The recording with what was measured drawn into it: .mp4, .mov or .mkv.
     #[arg(long, value_name = "VIDEO")]
-    overlay: Option<PathBuf>,
+    overlay: Option<Target>,
     /// Keep the overlay below about so many megabytes, with smaller pictures where that must be.
     #[arg(long, value_name = "MB", requires = "overlay")]
     overlay_mb: Option<f64>,
@@ -67,13 +67,13 @@ pub struct TrackArgs {
     #[arg(long, value_name = "PNG")]
     mask: Option<PathBuf>,
     /// Leave out what comes before, seconds of the file.
-    #[arg(long, value_name = "S", allow_negative_numbers = true)]
+    #[arg(long, value_name = "S")]
     from: Option<f64>,
     /// Leave out what comes after, seconds of the file.
-    #[arg(long, value_name = "S", allow_negative_numbers = true)]
+    #[arg(long, value_name = "S")]
     until: Option<f64>,
     /// Frames a second at which the camera ran, where the file plays slower (slow motion).
-    #[arg(long, value_name = "HZ", allow_negative_numbers = true)]
+    #[arg(long, value_name = "HZ")]
     true_rate: Option<f64>,
     /// A fixed point with clear edges, displayed pixels, against which the camera's own motion is taken out; may be
     /// given several times. The standing background is used otherwise.
@@ -156,7 +156,7 @@ impl TrackArgs {
         let experiment = self.config.as_deref().map(Experiment::read_rig).transpose()?;
         let folder = self.config.as_deref().and_then(Path::parent).unwrap_or(Path::new("")).to_owned();
         let options = self.options(experiment.clone().unwrap_or_default())?;
-        self.keep_inputs()?;
+        self.keep_account_apart()?;
         // before the first temporary file, so that Ctrl-C leaves none behind
         let bar = console.bar_of_frames(self.quiet);
         let mut table = OutputFile::create(&self.out)?;
@@ -209,7 +209,7 @@ impl TrackArgs {
         if !self.reference.is_empty() {
             rig.reference_marks.clone_from(&self.reference);
         }
-        rig.validate().map_err(|message| option("options", &message))?;
+        rig.validate().map_err(|message| self.by_option(&message))?;
         let threshold = self.threshold;
         if threshold.is_some_and(|t| !(t > 0.0 && t < 255.0)) {
             return Err(option("--threshold", "must lie between 0 and 255"));
@@ -241,6 +241,22 @@ impl TrackArgs {
         })
     }
 
+    /// What is wrong with a key, by the name of the option that gave it: the file by itself was sound.
+    fn by_option(&self, message: &str) -> Error {
+        let given = [
+            (self.pivot.is_some(), "rig.pivot_px", "--pivot"),
+            (self.roi.is_some(), "rig.roi_px", "--roi"),
+            (self.from.is_some(), "rig.from_s", "--from"),
+            (self.until.is_some(), "rig.until_s", "--until"),
+            (self.true_rate.is_some(), "rig.true_rate_hz", "--true-rate"),
+            (!self.reference.is_empty(), "rig.reference_marks", "--reference"),
+        ];
+        let given = given.into_iter().filter(|(is_given, ..)| *is_given);
+        let named = given.fold(message.to_owned(), |text, (_, key, option)| text.replace(key, option));
+        let (what, why) = named.split_once(": ").unwrap_or(("options", &named));
+        option(what, why)
+    }
+
     /// One colour a mark: the command line before the file before the paper's three red ones.
     fn marks(&self, configured: &[MarkColour], pivot: bool) -> Result<Vec<MarkColour>> {
         let given = if self.color.is_empty() { configured } else { &self.color };
@@ -269,23 +285,16 @@ impl TrackArgs {
         self.mask.as_ref().map(absolute).transpose()
     }
 
-    /// No output may take the place of an input, nor one output that of the other.
-    fn keep_inputs(&self) -> Result<()> {
-        let beside = self.sidecar_path();
-        if beside.as_ref() == Some(&self.out) {
+    /// Nor may the account beside the table, which no option names, take the place of anything.
+    fn keep_account_apart(&self) -> Result<()> {
+        let Some(beside) = self.sidecar_path() else { return Ok(()) };
+        if beside == *self.out {
             let message = format!("{} is the name of the account beside the table; use .csv", self.out.display());
             return Err(option("--out", &message));
         }
-        let inputs = [Some(&self.video), self.config.as_ref(), self.times.as_ref()];
-        let outputs = [("--out", Some(&self.out)), ("--out", beside.as_ref()), ("--overlay", self.overlay.as_ref())];
-        for (name, output) in outputs {
-            let Some(output) = output else { continue };
-            if inputs.iter().flatten().any(|input| is_same_file(input, output)) {
-                let message = format!("{} is an input and would be overwritten; use another name", output.display());
-                return Err(option(name, &message));
-            }
-        }
-        Ok(())
+        let inputs = [Some(&self.video), self.config.as_ref(), self.times.as_ref(), self.mask.as_ref()];
+        let inputs: Vec<&Path> = inputs.into_iter().flatten().map(PathBuf::as_path).collect();
+        words::keep_apart(&inputs, &[("--out".to_owned(), &beside)], "use another name")
     }
 
     fn most_bytes(&self) -> Result<Option<u64>> {

@@ -22,7 +22,7 @@ use super::mask::Mask;
 use super::plane::Plane;
 use super::{Blob, Detector, Hue};
 use crate::error::{Error, Result};
-use crate::output::OutputFile;
+use crate::output::{self, OutputFile};
 use crate::progress::Progress;
 use crate::video::{Frame, Orientation, Picture, Recording};
 
@@ -89,7 +89,7 @@ impl DebugFolder {
     /// # Errors
     /// [`Error::Unwritable`].
     pub fn create(folder: &Path) -> Result<Self> {
-        std::fs::create_dir_all(folder).map_err(|e| Error::unwritable(folder, e))?;
+        output::make_folder(folder)?;
         OutputFile::create(&folder.join("1_picture.png"))?;
         Ok(Self { folder: folder.to_owned() })
     }

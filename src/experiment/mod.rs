@@ -74,7 +74,15 @@ impl Experiment {
     /// As [`Experiment::read`].
     pub fn read_rig(path: &Path) -> Result<Self> {
         let text = std::fs::read_to_string(path).map_err(|e| Error::unreadable(path, e))?;
-        let text = unmeasured::without(&text);
+        Self::parse_rig(&text, path)
+    }
+
+    /// The same of a text; `path` only appears in errors.
+    ///
+    /// # Errors
+    /// [`Error::Config`].
+    pub fn parse_rig(text: &str, path: &Path) -> Result<Self> {
+        let text = unmeasured::without(text);
         let mut experiment = Self::parse(&text, path)?;
         if !unmeasured::states(&text, "link_lengths_m") {
             experiment.specimen.link_lengths_m.clear();
@@ -87,7 +95,16 @@ impl Experiment {
     /// # Errors
     /// As [`Experiment::read`], and [`Error::Config`] that asks for what is missing.
     pub fn read_with_specimen(path: &Path) -> Result<Self> {
-        let mut experiment = Self::read(path)?;
+        let text = std::fs::read_to_string(path).map_err(|e| Error::unreadable(path, e))?;
+        Self::parse_with_specimen(&text, path)
+    }
+
+    /// The same of a text; `path` only appears in errors.
+    ///
+    /// # Errors
+    /// [`Error::Config`].
+    pub fn parse_with_specimen(text: &str, path: &Path) -> Result<Self> {
+        let mut experiment = Self::parse(text, path)?;
         let missing = experiment.missing.take();
         let effects = &mut experiment.model.effects;
         effects.distributed_flexibility = effects.distributed_flexibility.or(experiment.bending_stiffness_n_m2);
@@ -119,7 +136,7 @@ impl Experiment {
         let wrong = |e: toml::de::Error| Error::Config {
             path: path.to_owned(),
             line: e.span().map(|s| text[..s.start.min(text.len())].matches('\n').count() + 1),
-            message: with_nearest_key(e.message()),
+            message: with_nearest_key(e.message(), e.span().map_or("", |span| key_at(text, span.start))),
         };
         unmeasured::refuse(text, path)?;
         let mut experiment: Self = toml::from_str(text).map_err(wrong)?;
@@ -147,8 +164,11 @@ impl Experiment {
 }
 
 /// Turns serde's "unknown field `a`, expected one of `b`, `c`" into a line that proposes the nearest key.
-fn with_nearest_key(message: &str) -> String {
+fn with_nearest_key(message: &str, key: &str) -> String {
     let message = message.lines().next().unwrap_or_default();
+    if let Some((is, wanted)) = message.strip_prefix("invalid type: ").and_then(|rest| rest.split_once(", expected ")) {
+        return format!("`{key}` is {}, and wants {}", in_words(is), in_words(wanted));
+    }
     if let Some(key) = message.strip_prefix("missing field `").and_then(|rest| rest.strip_suffix('`')) {
         return format!("`{key}` is missing{}", example(key));
     }
@@ -163,6 +183,48 @@ fn with_nearest_key(message: &str) -> String {
     match nearest {
         Some((_, key)) => format!("unknown key `{unknown}`; the nearest known one is `{key}`"),
         None => format!("unknown key `{unknown}`; this table takes no keys"),
+    }
+}
+
+/// The key whose value stands at a place of a text.
+fn key_at(text: &str, at: usize) -> &str {
+    let before = text.get(..at).unwrap_or_default();
+    let line = before.rsplit('\n').next().unwrap_or_default();
+    let key = line.rsplit_once('=').map_or(line, |(key, _)| key);
+    // within an inline table other keys stand before it
+    key.rsplit(['{', ',']).next().unwrap_or_default().trim()
+}
+
+/// A type as serde calls it, in plain words.
+fn in_words(kind: &str) -> String {
+    let plain = [
+        ("sequence", "a list"),
+        ("a sequence", "a list"),
+        ("map", "a table"),
+        ("a map", "a table"),
+        ("f64", "a number"),
+        ("f32", "a number"),
+        ("a string", "words in quotes"),
+        ("a boolean", "true or false"),
+        ("u8", "a whole number"),
+        ("u32", "a whole number"),
+        ("u64", "a whole number"),
+        ("usize", "a whole number"),
+        ("i32", "a whole number"),
+        ("i64", "a whole number"),
+    ];
+    if let Some((_, words)) = plain.iter().find(|(serde, _)| *serde == kind) {
+        return (*words).to_owned();
+    }
+    if let Some(count) = kind.strip_prefix("an array of length ") {
+        return format!("a list of {count}");
+    }
+    let value = [("string ", "the word "), ("integer ", ""), ("floating point ", ""), ("boolean ", "")];
+    let told = value.iter().find_map(|(serde, words)| Some(format!("{words}{}", kind.strip_prefix(serde)?)));
+    match told {
+        Some(told) => told.replace('`', ""),
+        None if kind.starts_with("struct ") => "a table".to_owned(),
+        None => kind.to_owned(),
     }
 }
 
@@ -216,6 +278,20 @@ mod tests {
         let text = "[rig]\ngravity_m_s2 = 9.81\nmirored = true\n";
         let error = Experiment::parse(text, Path::new("e.toml")).unwrap_err().to_string();
         assert_eq!(error, "e.toml:3: unknown key `mirored`; the nearest known one is `mirrored`");
+    }
+
+    #[test]
+    fn a_value_of_another_kind_is_told_with_what_the_key_wants() {
+        let of = |text: &str| Experiment::parse(text, Path::new("e.toml")).unwrap_err().to_string();
+        assert_eq!(of("[specimen]\nmass_kg = [1.0]\n"), "e.toml:2: `mass_kg` is a list, and wants a number");
+        assert_eq!(
+            of("[specimen]\nmass_kg = \"1 g\"\n"),
+            "e.toml:2: `mass_kg` is the word \"1 g\", and wants a number"
+        );
+        assert_eq!(of("[rig]\nmirrored = 1\n"), "e.toml:2: `mirrored` is 1, and wants true or false");
+        assert_eq!(of("[specimen]\nname = 5\n"), "e.toml:2: `name` is 5, and wants words in quotes");
+        let inline = of("[specimen]\nreflectivity = { specular = 0.6, diffuse = \"no\", absorbed = 0.1 }\n");
+        assert_eq!(inline, "e.toml:2: `diffuse` is the word \"no\", and wants a number");
     }
 
     #[test]

@@ -81,9 +81,9 @@ impl Format {
 /// Reads every column of a table.
 ///
 /// # Errors
-/// [`Error::Unreadable`], [`Error::EmptyFile`], [`Error::Table`].
+/// [`Error::Unreadable`], [`Error::EmptyFile`], [`Error::Table`] also of one that has no time stamps, or no rows.
 pub fn read(path: &Path) -> Result<Vec<Column>> {
-    let bytes = std::fs::read(path).map_err(|e| Error::unreadable(path, e))?;
+    let (path, bytes) = &crate::input::read(path)?;
     if bytes.is_empty() {
         return Err(Error::EmptyFile { path: path.to_owned() });
     }
@@ -98,10 +98,15 @@ pub fn read(path: &Path) -> Result<Vec<Column>> {
             _ => error.to_string(),
         },
     };
-    let text = bytes.strip_prefix("\u{feff}".as_bytes()).unwrap_or(&bytes);
+    let text = bytes.strip_prefix("\u{feff}".as_bytes()).unwrap_or(bytes);
     let mut reader = csv::ReaderBuilder::new().trim(csv::Trim::All).from_reader(text);
     let names: Vec<String> = reader.headers().map_err(wrong)?.iter().map(str::to_owned).collect();
     let rows = reader.records().collect::<std::result::Result<Vec<_>, _>>().map_err(wrong)?;
+    if !names.iter().any(|name| name == "t_s") || rows.is_empty() {
+        let lacks = if rows.is_empty() { "it has no rows" } else { "it has no column `t_s`" };
+        let message = format!("not a table of angles: {lacks}; give what `track` wrote");
+        return Err(Error::Table { path: path.to_owned(), line: None, message });
+    }
     let column = |(index, name): (usize, &String)| {
         let fields = || rows.iter().map(|row| row.get(index).unwrap_or_default());
         let number = |field: &str| if field.is_empty() { Some(f64::NAN) } else { field.parse().ok() };

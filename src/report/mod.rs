@@ -21,20 +21,17 @@ pub mod plot;
 pub mod png;
 pub mod svg;
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use rayon::prelude::*;
 
 pub use curves::{diagnosis_curves, fit_curves, where_curves};
 
 use crate::error::{Error, Result};
-use crate::output::OutputFile;
+use crate::output::{self, OutputFile};
 use chapters::Part;
 use left::Left;
 use page::Drawn;
-
-/// A figure's files.
-const EXTENSIONS: [&str; 3] = ["svg", "png", "csv"];
 
 /// Writes `report.html` and, for every plot on it, `figures/*.svg`, `*.png` and `*.csv`, from what a run left in the folder; all of them or none.
 /// Figures of an earlier page that are no longer made are removed.
@@ -60,7 +57,7 @@ pub fn write(folder: &Path) -> Result<()> {
         .collect::<Result<_>>()?;
     let figures = folder.join("figures");
     if !drawn.is_empty() {
-        std::fs::create_dir_all(&figures).map_err(|e| Error::unwritable(&figures, e))?;
+        output::make_folder(&figures)?;
     }
     let page = page::page(&left, &chapters, drawn.iter().map(|d| &d.0))?;
     let mut files = Vec::new();
@@ -79,13 +76,33 @@ pub fn write(folder: &Path) -> Result<()> {
     let gone = no_longer_made(&folder.join("report.html"), &drawn);
     keep(&folder.join("report.html"), page.as_bytes())?;
     files.into_iter().try_for_each(OutputFile::appear)?;
-    for path in gone.iter().flat_map(|id| EXTENSIONS.map(|extension| figures.join(format!("{id}.{extension}")))) {
+    for path in gone.iter().flat_map(|id| files_of(&figures, id)) {
         match std::fs::remove_file(&path) {
             Err(error) if error.kind() != std::io::ErrorKind::NotFound => return Err(Error::unwritable(&path, error)),
             _ => {}
         }
     }
     Ok(())
+}
+
+/// What the run of a folder has found, in a line; nothing where it has found nothing.
+///
+/// # Errors
+/// As [`write`].
+pub fn results(folder: &Path) -> Result<Option<String>> {
+    let results = chapters::results(&Left::read(folder)?);
+    Ok((!results.is_empty()).then(|| results.join(". ") + "."))
+}
+
+/// Every figure of the page in a folder, be it there or not.
+pub fn figures_on_page(folder: &Path) -> Vec<PathBuf> {
+    let Ok(page) = std::fs::read_to_string(folder.join("report.html")) else { return Vec::new() };
+    page::plots_of(&page).flat_map(|id| files_of(&folder.join("figures"), id)).collect()
+}
+
+/// A figure's files.
+fn files_of(figures: &Path, id: &str) -> [PathBuf; 3] {
+    ["svg", "png", "csv"].map(|extension| figures.join(format!("{id}.{extension}")))
 }
 
 /// Figures that stand on an earlier page and are not among those drawn now: what this program made, and nothing else.

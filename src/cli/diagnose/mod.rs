@@ -3,18 +3,20 @@
 mod figure;
 mod page;
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 use serde_json::json;
 
-use super::Console;
 use super::table::number;
+use super::{Console, Target};
 use crate::diagnose::{self, report::Limits};
 use crate::error::{Error, Result};
 use crate::experiment::Experiment;
+use crate::fit::Record;
 use crate::model::ForwardModel;
 use crate::output::OutputFile;
 use crate::report::{diagnosis_curves, where_curves};
+use crate::series::FEWEST_ROWS;
 use figure::Figure;
 
 /// Longest planned recording.
@@ -39,24 +41,24 @@ pub struct DiagnoseArgs {
     config: PathBuf,
     /// Write all of it as JSON; `-` for standard output.
     #[arg(long, value_name = "FILE")]
-    json: Option<PathBuf>,
+    json: Option<Target>,
     /// Draw before and after as SVG; `-` for standard output.
     #[arg(long, value_name = "FILE")]
-    figure: Option<PathBuf>,
+    figure: Option<Target>,
     /// Write the angles, measured and simulated before and after, row by row, as CSV; `-` for standard output.
     #[arg(long, value_name = "FILE")]
-    curves: Option<PathBuf>,
+    curves: Option<Target>,
     /// Write the missing torque by time, amplitude and phase as CSV; `-` for standard output.
     #[arg(long, value_name = "FILE")]
-    map: Option<PathBuf>,
+    map: Option<Target>,
     /// Use rows from this stamp on.
-    #[arg(long, value_name = "S", default_value_t = f64::NEG_INFINITY, hide_default_value = true, allow_negative_numbers = true)]
+    #[arg(long, value_name = "S", default_value_t = f64::NEG_INFINITY, hide_default_value = true)]
     from: f64,
     /// Use rows before this stamp.
-    #[arg(long, value_name = "S", default_value_t = f64::INFINITY, hide_default_value = true, allow_negative_numbers = true)]
+    #[arg(long, value_name = "S", default_value_t = f64::INFINITY, hide_default_value = true)]
     until: f64,
     /// Predict a single recording from this stamp on, fitted before it [default: two thirds through it].
-    #[arg(long, value_name = "S", allow_negative_numbers = true)]
+    #[arg(long, value_name = "S")]
     predict_from: Option<f64>,
     /// Judge the base model by this many recordings made from it and fitted anew, not by their residuals to first order.
     #[arg(long, value_name = "N", default_value_t = 0)]
@@ -84,13 +86,13 @@ impl DiagnoseArgs {
     /// # Errors
     /// One line: what, where, what to do.
     pub fn run(&self, console: &Console) -> Result<()> {
-        self.figure.as_deref().map(check_figure).transpose()?;
         let experiment = super::read_experiment(&self.config, console)?;
         if self.detectable {
             return self.plan(&experiment, console);
         }
         let marks = ForwardModel::of(&experiment)?.chain().groups().len();
         let records = super::recordings(&self.angles, marks, (self.from, self.until), console)?;
+        self.check_border(&records)?;
         let json = self.json.as_deref().map(OutputFile::create).transpose()?;
         let [figure, curves, map] =
             [&self.figure, &self.curves, &self.map].map(|path| path.as_deref().map(OutputFile::create).transpose());
@@ -109,6 +111,25 @@ impl DiagnoseArgs {
             }
         }
         super::deliver(&text, &json!(diagnosis), json, console)
+    }
+
+    /// Both sides of the border hold enough to be fitted and to be predicted.
+    fn check_border(&self, records: &[Record]) -> Result<()> {
+        let Some(border_s) = self.predict_from else { return Ok(()) };
+        let refused = |message: String| Err(Error::Option { option: "--predict-from".to_owned(), message });
+        let [record] = records else {
+            return refused("of several recordings the last is predicted from the others; leave it out".to_owned());
+        };
+        let before = record.t_s.iter().filter(|t_s| **t_s < border_s).count();
+        if before.min(record.len() - before) < FEWEST_ROWS {
+            return refused(format!(
+                "{border_s} s leaves {before} rows to fit and {} to predict, and each needs {FEWEST_ROWS}; give a stamp well between {} s and {} s",
+                record.len() - before,
+                record.t_s[0],
+                record.t_s[record.len() - 1]
+            ));
+        }
+        Ok(())
     }
 
     fn options(&self) -> diagnose::Options {
@@ -144,21 +165,4 @@ impl DiagnoseArgs {
         let text = if self.quiet { String::new() } else { heading + &page::limits_table(&limits) };
         super::deliver(&text, &json!({"schema": "freeswing.diagnosis/1", "detectable": Limits(limits)}), json, console)
     }
-}
-
-/// A figure is SVG, which its name must say.
-pub(super) fn check_figure(path: &Path) -> Result<()> {
-    let is_svg = path.extension().is_some_and(|e| e.eq_ignore_ascii_case("svg"));
-    // standard output and devices have no extension
-    if is_svg || path.as_os_str() == "-" || (path.exists() && !path.is_file()) {
-        return Ok(());
-    }
-    let svg = path.with_extension("svg");
-    let message = format!(
-        "{}: figures are SVG; name it {}, which browsers and office programs open (`rsvg-convert {} -o x.png` makes a PNG of it)",
-        path.display(),
-        svg.display(),
-        svg.display()
-    );
-    Err(Error::Option { option: "--figure".to_owned(), message })
 }

@@ -6,7 +6,7 @@ mod page;
 use std::fmt::Write;
 use std::path::{Path, PathBuf};
 
-use super::Console;
+use super::{Console, Target};
 use crate::error::{Error, Result};
 use crate::experiment::Experiment;
 use crate::force::plan::Wanted;
@@ -30,36 +30,36 @@ pub struct ForceArgs {
     config: PathBuf,
     /// The same as JSON, in full precision; `-` for standard output instead of the tables.
     #[arg(long, value_name = "FILE")]
-    json: Option<PathBuf>,
+    json: Option<Target>,
     /// Further points of the strip, below the hinge.
-    #[arg(long, value_name = "M,M,...", value_delimiter = ',')]
+    #[arg(long, value_name = "M,M,...", value_delimiter = ',', allow_hyphen_values = true)]
     at_m: Vec<f64>,
     /// Displacement over power, as SVG.
     #[arg(long, value_name = "FILE.svg")]
-    figure: Option<PathBuf>,
+    figure: Option<Target>,
     /// Say what an experiment needs to see the push: power, time, and what chopping the lamp gains.
     #[arg(long, conflicts_with_all = ["figure", "trace"])]
     plan: bool,
     /// With --plan: half the 95 % interval that is wanted, over the push.
-    #[arg(long, value_name = "SHARE", default_value_t = 0.05, requires = "plan", allow_negative_numbers = true)]
+    #[arg(long, value_name = "SHARE", default_value_t = 0.05, requires = "plan")]
     interval: f64,
     /// With --plan: standard deviation of one sample of the sensor; laser.resolution_m where it is absent.
-    #[arg(long, value_name = "M", requires = "plan", allow_negative_numbers = true)]
+    #[arg(long, value_name = "M", requires = "plan")]
     noise_m: Option<f64>,
     /// With --plan: how long the record is.
-    #[arg(long, value_name = "S", default_value_t = 600.0, requires = "plan", allow_negative_numbers = true)]
+    #[arg(long, value_name = "S", default_value_t = 600.0, requires = "plan")]
     time_s: f64,
     /// Write the motion of the sensor's point in time: the lamp as light.on_s, warm_up_s and chop_hz say.
     #[arg(long, value_name = "FILE.csv")]
-    trace: Option<PathBuf>,
+    trace: Option<Target>,
     /// With --trace: how long.
-    #[arg(long, value_name = "S", default_value_t = 60.0, requires = "trace", allow_negative_numbers = true)]
+    #[arg(long, value_name = "S", default_value_t = 60.0, requires = "trace")]
     duration_s: f64,
     /// Samples a second, of --plan and --trace.
-    #[arg(long, value_name = "HZ", default_value_t = 100.0, allow_negative_numbers = true)]
+    #[arg(long, value_name = "HZ", default_value_t = 100.0)]
     rate_hz: f64,
     /// Damping ratio of the modes, of --plan and --trace, as `identify` measures it.
-    #[arg(long, value_name = "SHARE", allow_negative_numbers = true)]
+    #[arg(long, value_name = "SHARE")]
     damping_ratio: Option<f64>,
 }
 
@@ -69,7 +69,7 @@ impl ForceArgs {
     /// # Errors
     /// One line: what, where, what to do.
     pub fn run(&self, console: &Console) -> Result<()> {
-        let create = |path: &Option<PathBuf>| path.as_deref().map(OutputFile::create).transpose();
+        let create = |path: &Option<Target>| path.as_deref().map(OutputFile::create).transpose();
         let (json, figure, trace) = (create(&self.json)?, create(&self.figure)?, create(&self.trace)?);
         let experiment = super::read_strip(&self.config, console)?;
         let setup = Setup::of(&experiment).map_err(|e| in_file(e, &self.config))?;

@@ -8,7 +8,7 @@ mod recording;
 mod top;
 
 pub use frequencies::moving as moving_modes;
-pub use top::sentence;
+pub use top::{results, sentence};
 
 use super::left::Left;
 use super::plot::Plot;

@@ -7,14 +7,19 @@ use crate::report::left::{Identified, Left};
 /// What a summary says after a range of damping ratios.
 const OVER_THE_RECORD: &str = " over the record, ";
 
-/// The result in two or three short sentences: the modes, whether the model reproduces the recording or what it lacks, and what stopped the run.
-pub fn sentence(left: &Left) -> String {
+/// The result in one or two short sentences: the modes, whether the model reproduces the recording or what it lacks.
+pub fn results(left: &Left) -> Vec<String> {
     let verdict = left.diagnosis.as_ref().map(|d| first_sentence(&d.verdict.statement)).filter(|s| !s.is_empty());
     let lacks = left.diagnosis.as_ref().is_some_and(|d| d.verdict.status != "adequate");
     // that something is missing says that the model without it does not reproduce the recording
     let fitted = reproduced(left).filter(|_| verdict.is_none() || !lacks);
     let results = [left.identified.as_ref().map(modes), fitted, verdict];
-    let mut sentences: Vec<String> = results.into_iter().flatten().filter(|s| !s.is_empty()).collect();
+    results.into_iter().flatten().filter(|s| !s.is_empty()).collect()
+}
+
+/// The results, and what stopped the run.
+pub fn sentence(left: &Left) -> String {
+    let mut sentences = results(left);
     if sentences.is_empty() {
         sentences.push("This run came to no result".to_owned());
     }
