@@ -157,6 +157,10 @@ fn what_may_yet_be_true_is_a_warning() {
         (strip(&[("\"red\", \"red\", \"red\"", "\"red\", \"red\"")]), "names 2 marks for 2 links: 3 are wanted"),
         (strip(&[("2.5e9", "2.5")]), "young_modulus_pa = 2.5: no solid is so soft"),
         (
+            "[specimen]\nlength_m = 0.2\nwidth_m = 0.5\n".to_owned(),
+            "width_m = 0.5: wider than the strip is long (0.2 m)",
+        ),
+        (
             ARMS.replace("length_m = 0.23", "length_m = 23"),
             "23 m is long for a specimen before a camera; if it is centimetres, write 0.23",
         ),

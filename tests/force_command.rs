@@ -169,6 +169,12 @@ fn a_plan_gets_cheaper_with_time_and_with_chopping() {
     let gain = number(&long, "/gain");
     let most = std::f64::consts::SQRT_2 * 2.0 / std::f64::consts::PI / (2.0 * 0.02);
     assert!(gain > 0.9 * most && gain < 1.15 * most, "{gain} {most}");
+    // however easy the wish, a swing has to die away after on and off, and to build up
+    let easy = desk.json(&["--plan", "--damping-ratio", "0.02", "--interval", "0.5"]);
+    for (way, settlings) in [("steps", 2.0), ("chopped", 1.0)] {
+        let of = |key: &str| number(&easy, &format!("/{way}/{key}"));
+        assert!(of("shortest_time_s") > settlings * of("settling_s"), "{way}");
+    }
     let text = String::from_utf8(desk.force(&["--plan", "--damping-ratio", "0.02"]).stdout).unwrap();
     assert!(text.contains("Chopping") && text.contains("least power"), "{text}");
     assert!(desk.refused(&["--plan"]).contains("--damping-ratio"));

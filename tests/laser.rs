@@ -191,6 +191,8 @@ fn what_is_no_record_is_one_line_and_exit_code_2() {
     assert!(text.contains("laser.height_m = 0.25: not on the strip"), "{text}");
     let late = folder.file("late.toml", CONFIG.replace("10.0, 30.0, 50.0, 70.0", "1000.0, 1010.0"));
     assert!(folder.refusal(&record, &late).contains("give light.on_s in the record's time"));
+    let once = folder.file("once.toml", CONFIG.replace("10.0, 30.0, 50.0, 70.0", "20.0"));
+    assert!(folder.refusal(&record, &once).contains("switched once within the record, at 20 s"));
     let calm =
         folder.record("t_s,y_um\n", |t, y| format!("{t},{:.3}", y - displacement_um(t) + 0.01 * (37.0 * t * t).sin()));
     let found = folder.file("found.toml", CONFIG.replace("on_s = [10.0, 30.0, 50.0, 70.0]\n", ""));

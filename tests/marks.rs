@@ -124,6 +124,45 @@ fn what_init_writes_is_enough_to_track_and_says_what_is_still_to_be_measured() {
 }
 
 #[test]
+fn a_hinge_below_all_that_swings_is_the_first_mark() {
+    let bench = Bench::of(&scene());
+    let flipped = Command::new("ffmpeg")
+        .args([
+            "-loglevel",
+            "error",
+            "-y",
+            "-i",
+            "swing.mp4",
+            "-vf",
+            "vflip",
+            "-c:v",
+            "libx264",
+            "-crf",
+            "18",
+            "up.mp4",
+        ])
+        .current_dir(bench.folder.path())
+        .status();
+    assert!(flipped.unwrap().success());
+    std::fs::rename(bench.path("up.mp4"), bench.path("swing.mp4")).unwrap();
+    let words = done(&bench.track(&[]));
+    assert!(!words.contains("px long"), "{words}");
+    let standing = column(&bench.table(), "theta1_rad").into_iter().filter(|theta| theta.cos() < 0.0).count();
+    assert_eq!(standing, column(&bench.table(), "t_s").len());
+}
+
+#[test]
+fn of_marks_that_are_alike_there_may_be_fewer_than_the_file_says() {
+    let bench = Bench::of(&scene());
+    std::fs::write(bench.path("three.toml"), "[rig]\nmarks = [\"red\", \"red\", \"red\"]\n").unwrap();
+    done(&bench.track(&["--config", "three.toml", "--markers", "1"]));
+    assert!(!column(&bench.table(), "displacement_px").is_empty());
+    std::fs::write(bench.path("two.toml"), "[rig]\nmarks = [\"red\", \"green\"]\n").unwrap();
+    let words = refused(&bench.track(&["--config", "two.toml", "--markers", "1"]));
+    assert!(words.contains("1 marks asked for, 2 colours given"), "{words}");
+}
+
+#[test]
 fn one_mark_alone_gives_its_displacement() {
     let bench = Bench::of(&scene());
     done(&bench.track(&["--markers", "1", "--overlay", "seen.mp4"]));

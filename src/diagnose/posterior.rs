@@ -62,7 +62,15 @@ pub fn weigh<'a>(fits: Vec<Refit<'a>>, effects: usize, settings: &Settings) -> P
         evidence::ln_evidence(f, scatter, least_without, &settings.prior, settings.misfit.counts)
             + evidence::ln_prior(&f.hypothesis, effects, &settings.prior)
     };
-    let mut posterior: Vec<f64> = fits.iter().map(ln).collect();
+    let is_seen = |fit: &Refit<'_>| {
+        fit.hypothesis.effects.iter().all(|effect| {
+            let rest = fit.hypothesis.without(*effect);
+            let without = fits.iter().find(|other| other.hypothesis.effects == rest.effects);
+            without.is_none_or(|without| law_of(*effect).is_seen(fit, without))
+        })
+    };
+    let mut posterior: Vec<f64> =
+        fits.iter().map(|fit| if is_seen(fit) { ln(fit) } else { f64::NEG_INFINITY }).collect();
     let best = (0..fits.len()).max_by(|a, b| posterior[*a].total_cmp(&posterior[*b])).unwrap_or(0);
     let latents = unknowns(&fits[best], fits[best].chi2 / values as f64, Assumed::BESIDE);
     let law_error_n_m = law_error_n_m(&fits[best], added_torque_n_m(&fits[best]));

@@ -73,6 +73,11 @@ pub trait Law: Sync {
         true
     }
 
+    /// Whether a fit that has it explains more, over the same fit without, than errors of the recording do that no noise of a row tells.
+    fn is_seen(&self, _fit: &Refit<'_>, _without: &Refit<'_>) -> bool {
+        true
+    }
+
     /// ln of how many kinds of it there are beyond its strength: signs, phases, frequencies, instants.
     fn ln_kinds(&self, fit: &Refit<'_>, effect: Effect, of: &Coefficients<'_>, settings: &PriorSettings) -> f64;
 

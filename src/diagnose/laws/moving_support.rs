@@ -50,6 +50,12 @@ impl Law for MovingSupport {
         !only_leans(fit)
     }
 
+    /// A codec lets a tracked mark wander over seconds, by no more than its errors in step with the swing.
+    fn is_seen(&self, fit: &Refit<'_>, without: &Refit<'_>) -> bool {
+        let share = fit.problem.records.iter().map(|record| record.in_step).fold(0.0, f64::max);
+        without.chi2 - fit.chi2 >= share * share * fit.values() as f64
+    }
+
     /// Any direction of the phase, and any frequency up to a multiple of the swing's.
     fn ln_kinds(&self, _fit: &Refit<'_>, effect: Effect, of: &Coefficients<'_>, settings: &PriorSettings) -> f64 {
         let amplitude_m = self.strength(effect, of).map_or(0.0, |strength| strength.0);

@@ -30,7 +30,7 @@ impl<'a> Search<'a, '_> {
         let mut early = Search { is_loose: self.is_loose, until: self.until, part, ..begun };
         early.usual();
         early.restarts();
-        early.allow(self.context.settings.search.shares.certified);
+        early.allow(self.context.settings.search.shares.restarts);
         early.round(Round::OneMore, &mut Tried::default());
         let Search { context, fits, rounds, undecided, .. } = early;
         self.context.fine_strip = context.fine_strip;
@@ -43,7 +43,7 @@ impl<'a> Search<'a, '_> {
         let found: Vec<Refit<'a>> = horizon::carried(&self.context, fits, part, noise);
         self.keep(found);
         self.learn_noise();
-        self.allow(self.context.settings.search.shares.certified);
+        self.allow(self.context.settings.search.shares.further);
         self.round(Round::Tied, &mut Tried::default());
         self.round(Round::OneMore, &mut Tried::default());
     }

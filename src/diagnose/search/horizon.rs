@@ -8,7 +8,7 @@ use rayon::prelude::*;
 use super::super::context::{FitContext, first_part};
 use super::super::effect::Effect;
 use super::super::hypothesis::Hypothesis;
-use super::super::misfit::needs;
+use super::super::misfit::{is_out_of_step, needs};
 use super::super::refit::{self, Refit, best_of_each_count, least, merged};
 use super::super::settings::SearchSettings;
 use super::beside::with_one_more;
@@ -48,7 +48,7 @@ pub fn continued<'a>(context: &FitContext<'a>, fits: &[Refit<'a>], effects: &[Ef
     descended(context, &noise, followed, steps.most_steps)
 }
 
-/// The best of some fits of the first part of the recordings, followed to their end.
+/// The best of some fits of the first part of the recordings, followed to their end; part after part those that would lose step.
 pub fn carried<'a>(context: &FitContext<'a>, fits: Vec<Refit<'_>>, part: f64, noise: &[RecordNoise]) -> Vec<Refit<'a>> {
     let (settings, steps) = (&context.settings.search, &context.settings.descent);
     // of a longer part each step costs more; what an effect has not earned does not come before the fit without it
@@ -60,12 +60,18 @@ pub fn carried<'a>(context: &FitContext<'a>, fits: Vec<Refit<'_>>, part: f64, no
         fits.truncate(settings.carried);
         to_follow(fits)
     };
-    let mut followed = few(foremost(fits, settings));
+    let keeps_step = |(hypothesis, x): &(Hypothesis, Vec<f64>)| {
+        let there = context.descend_from(hypothesis, noise, x.clone(), 0);
+        there.is_some_and(|fit| !is_out_of_step(&fit, &context.settings.misfit))
+    };
+    let (mut at_the_end, mut followed): (Vec<_>, Vec<_>) =
+        few(foremost(fits, settings)).into_iter().partition(keeps_step);
     for longer in PARTS.into_iter().filter(|longer| *longer > MUCH_LONGER * part) {
         let records = first_part(context.records, longer);
         followed = few(foremost(descended(&context.on(&records), noise, followed, steps.few_steps), settings));
     }
-    descended(context, noise, followed, steps.most_steps)
+    at_the_end.extend(followed);
+    descended(context, noise, at_the_end, steps.most_steps)
 }
 
 fn to_follow(fits: Vec<Refit<'_>>) -> Vec<(Hypothesis, Vec<f64>)> {
