@@ -71,8 +71,9 @@ impl Mode {
         let envelope = envelope.ok();
         let shape = shape(whole, mode);
         let amplitudes_rad: Vec<f64> = (0..whole.fit.poles.len()).map(|m| whole.fit.amplitude_rad(m)).collect();
-        let choice = estimators.choose(envelope.as_ref(), &amplitudes_rad, mode).beside_harmonic(whole.fit, mode);
         let duration_s = whole.signal.duration_s();
+        let choice =
+            estimators.choose(envelope.as_ref(), &amplitudes_rad, duration_s, mode).beside_harmonic(whole.fit, mode);
         let raw = estimators.raw;
         let changes =
             |e: &&Envelope| e.decay.is_some_and(|d| d.p_viscous < 0.01) || e.damping.is_some_and(|d| d.p_value < 0.01);
