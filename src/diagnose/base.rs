@@ -54,12 +54,16 @@ pub fn context<'a>(
     })
 }
 
-/// Where a base model's descent begins: what was not free when the start was sought, where the file has it.
+/// Where a base model's descent begins: what was not free when the start was sought, where the file has it; a strip of fewer rods may start in fewer shapes.
 fn beginning(prepared: &Prepared, x: &[f64], experiment: &Experiment, base: &[Parameter]) -> Result<Vec<f64>> {
-    let stated = Problem::new(&prepared.records, experiment, base)?.start_values()?;
+    let problem = Problem::new(&prepared.records, experiment, base)?;
+    let stated = problem.start_values()?;
     let sought = |parameter: &Parameter| prepared.base.iter().position(|p| p == parameter);
     let parameters = base.iter().zip(stated).map(|(parameter, stated)| sought(parameter).map_or(stated, |at| x[at]));
-    Ok(parameters.chain(x[prepared.base.len()..].iter().copied()).collect())
+    let starts = &x[prepared.base.len()..];
+    let halves = starts.chunks((starts.len() / (2 * prepared.records.len())).max(1));
+    let starts = halves.flat_map(|half| (0..problem.shapes()).map(|i| half.get(i).copied().unwrap_or(0.0)));
+    Ok(parameters.chain(starts).collect())
 }
 
 /// The base model's fit, with the noise that it leaves.
@@ -97,5 +101,46 @@ fn from_weaker_dampers<'a>(context: &FitContext<'a>, fit: Refit<'a>) -> Refit<'a
     match best {
         Some(best) if best.chi2 < fit.chi2 => best,
         _ => fit,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::fit::Record;
+    use crate::model::Work;
+
+    #[test]
+    fn a_strip_counted_anew_begins_in_as_many_shapes_as_it_has() {
+        let record = Record {
+            path: "made".into(),
+            t_s: (0..30).map(f64::from).collect(),
+            theta_rad: vec![vec![Some(0.1); 30]; 2],
+            relative_sd: vec![vec![1.0; 30]; 2],
+            in_step: 0.0,
+            continues: false,
+        };
+        let mut experiment = Experiment::default();
+        experiment.model.effects.distributed_flexibility = Some(1e-5);
+        let problem =
+            |experiment: &Experiment| Problem::new(std::slice::from_ref(&record), experiment, &[]).unwrap().shapes();
+        let usual = problem(&experiment);
+        // two angles and a further shape, then their rates
+        let prepared = Prepared {
+            records: vec![record.clone()],
+            part: 1.0,
+            noise: Vec::new(),
+            step_error_rad: 1e-6,
+            experiment: experiment.clone(),
+            base: Vec::new(),
+            begun: vec![0.1, 0.2, 0.3, 1.0, 2.0, 3.0],
+            ended: Vec::new(),
+            work: Work::default(),
+        };
+        assert_eq!(usual, 3);
+        assert_eq!(beginning(&prepared, &prepared.begun, &experiment, &[]).unwrap(), prepared.begun);
+        experiment.model.pieces = 1;
+        assert_eq!(problem(&experiment), 2);
+        assert_eq!(beginning(&prepared, &prepared.begun, &experiment, &[]).unwrap(), [0.1, 0.2, 1.0, 2.0]);
     }
 }

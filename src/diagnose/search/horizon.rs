@@ -71,7 +71,8 @@ pub fn carried<'a>(context: &FitContext<'a>, fits: Vec<Refit<'_>>, part: f64, no
         followed = few(foremost(descended(&context.on(&records), noise, followed, steps.few_steps), settings));
     }
     at_the_end.extend(followed);
-    descended(context, noise, at_the_end, steps.most_steps)
+    // those that are worth it go on once the noise is known
+    descended(context, noise, at_the_end, steps.few_steps)
 }
 
 fn to_follow(fits: Vec<Refit<'_>>) -> Vec<(Hypothesis, Vec<f64>)> {
