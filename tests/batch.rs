@@ -168,7 +168,7 @@ fn every_recording_has_a_row_and_a_bad_one_says_why_as_its_command_alone_does() 
         let told = said(&output);
         assert_eq!(
             Some(rows[name]["reason"].as_str()),
-            told.lines().rev().find_map(|line| line.strip_prefix("error: ")),
+            told.lines().rev().find(|line| line.starts_with("error: ")),
             "{name}"
         );
     }
@@ -217,7 +217,7 @@ fn what_may_not_be_read_has_a_row_that_says_so_and_is_done_once_it_may_be() {
         let line =
             format!("in/{file}: cannot be read: Permission denied (os error 13); check the path and its permissions");
         assert_eq!((alone.status.code(), said(&alone)), (Some(2), format!("error: {line}\n")), "{row}");
-        assert_eq!(rows[row]["reason"], line);
+        assert_eq!(rows[row]["reason"], format!("error: {line}"));
     }
     set_modes(0o755);
     let output = start(&batch);
@@ -609,7 +609,7 @@ fn what_is_passed_over_left_out_or_bound_to_fail_is_said_beforehand() {
     let rows = lab.rows("out");
     assert_eq!(rows["plain.csv"]["status"], "done");
     assert_eq!(rows["plain.csv"]["reason"], "no experiment file: not fitted, not diagnosed");
-    assert!(rows["typo.csv"]["reason"].starts_with("in/typo.toml:2: unknown key"), "{rows:?}");
+    assert!(rows["typo.csv"]["reason"].starts_with("error: in/typo.toml:2: unknown key"), "{rows:?}");
     let page = fs::read_to_string(lab.path("out/index.html")).unwrap();
     assert!(page.contains("done<br><small>no experiment file: not fitted, not diagnosed</small>"));
     // and why what was finished is done again

@@ -89,6 +89,14 @@ impl Cell {
     }
 }
 
+/// Why a run failed, as its command alone prints it; of one that ended well, what is to be noted.
+fn told(finished: &Finished) -> String {
+    match finished.status {
+        Status::Failed => format!("error: {}", finished.reason),
+        _ => finished.reason.clone(),
+    }
+}
+
 impl Row {
     /// Of a recording that was not run.
     pub fn skipped(name: &str, reason: &str) -> Self {
@@ -136,7 +144,7 @@ impl Row {
             heldout_after_rad: root_mean_square(&held_out.augmented_rmse_rad),
             sha256: word(&finished.fingerprint.recording_sha256),
             version: word(&finished.fingerprint.version),
-            ..Self::empty(name, finished.status, &finished.reason)
+            ..Self::empty(name, finished.status, &told(finished))
         }
     }
 

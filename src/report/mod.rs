@@ -88,7 +88,7 @@ pub fn write(folder: &Path) -> Result<()> {
 /// What the run of a folder has found, in a line; nothing where it has found nothing.
 ///
 /// # Errors
-/// As [`write`].
+/// As [`write()`].
 pub fn results(folder: &Path) -> Result<Option<String>> {
     let results = chapters::results(&Left::read(folder)?);
     Ok((!results.is_empty()).then(|| results.join(". ") + "."))
