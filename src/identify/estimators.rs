@@ -125,11 +125,11 @@ impl Estimators {
         let damping_ratio = sinusoids.and_then(|e| e.damping_ratio).unwrap_or(self.raw[1]);
         // what amplitude may have changed, by the bounds on κ and λ
         let decays = std::f64::consts::TAU * frequency_hz.value * damping_ratio.value * duration_s;
-        let Unfollowed { slower, frequency, damping } = unfollowed(amplitudes_rad, decays, mode);
-        let (changed_hz, changed_xi) = (frequency * frequency_hz.value, damping * damping_ratio.value);
+        let [changed_hz, changed_xi] = unfollowed(amplitudes_rad, decays, mode);
+        let (changed_hz, changed_xi) = (changed_hz * frequency_hz.value, changed_xi * damping_ratio.value);
         let squares: f64 = lawful_rad.iter().map(|a| a * a).sum();
         let omitted = Bounds::of(mode == 0).fourth.map(|bound| bound * squares * squares);
-        let felt = changed_hz.hypot(slower * frequency_hz.value) > 0.3 * frequency_hz.sd;
+        let felt = changed_hz > 0.3 * frequency_hz.sd;
         // a law that reaches far beyond the steps it was laid through tells nothing at its end
         let sound = |e: &Envelope, law: &FrequencyLaw| {
             e.steps.iter().any(|s| (law.f0_hz.value / s.frequency_hz.value - 1.0).abs() < FARTHEST_LAW)
@@ -146,7 +146,7 @@ impl Estimators {
                 basis: "windows: f and ξ at small amplitude".to_owned(),
             },
             None if felt || self.residual_excess > 1.0 => Choice {
-                frequency_hz: frequency_hz.blurred(changed_hz).times(1.0 + slower),
+                frequency_hz: frequency_hz.blurred(changed_hz),
                 damping_ratio: damping_ratio.blurred(changed_xi),
                 basis: "damped sinusoids over the whole record; widened for what amplitude may have changed".to_owned(),
             },
@@ -196,29 +196,19 @@ fn relatively_blurred(estimate: Estimate, relative: f64) -> Estimate {
     estimate.blurred(relative * estimate.value)
 }
 
-/// What amplitudes that cannot be followed do to a mode, relative to frequency and damping.
-struct Unfollowed {
-    /// By how much it is likely to be slower over the record than at small amplitude.
-    slower: f64,
-    /// Standard deviation of that.
-    frequency: f64,
-    /// The same of the damping.
-    damping: f64,
-}
-
-/// `decays`: e-foldings of the mode's amplitude over the record.
-fn unfollowed(amplitudes_rad: &[f64], decays: f64, mode: usize) -> Unfollowed {
-    let (mut slower, mut f2, mut xi2) = (0.0, 0.0, 0.0);
+/// Relative standard deviation of frequency and damping of a mode whose dependence on the amplitudes cannot be followed. `decays`: e-foldings of its amplitude over
+/// the record.
+fn unfollowed(amplitudes_rad: &[f64], decays: f64, mode: usize) -> [f64; 2] {
+    let rms = |[mean, sd]: [f64; 2]| mean.hypot(sd);
+    let (mut f2, mut xi2) = (0.0, 0.0);
     for (other, amplitude_rad) in amplitudes_rad.iter().enumerate() {
         // least squares sees A² weighed by A²: half of its own A₀² where it dies away, all of it where it hardly decays, and all of another mode's that outlives it
         let own = 0.5 * (1.0 + (-2.0 * decays.max(0.0)).exp());
         let (bounds, share) = if other == mode { (Bounds::of(mode == 0), own) } else { (Bounds::OTHER, 1.0) };
-        let square = share * amplitude_rad.powi(2);
-        slower += square * bounds.kappa[0];
-        f2 += (square * bounds.kappa[1]).powi(2);
-        xi2 += (square * bounds.lambda[0].hypot(bounds.lambda[1])).powi(2);
+        f2 += (share * amplitude_rad.powi(2) * rms(bounds.kappa)).powi(2);
+        xi2 += (share * amplitude_rad.powi(2) * rms(bounds.lambda)).powi(2);
     }
-    Unfollowed { slower, frequency: f2.sqrt(), damping: xi2.sqrt() }
+    [f2.sqrt(), xi2.sqrt()]
 }
 
 fn spectral(whole: &Whole, alone: &Signal, mode: usize, xi: f64) -> Estimator {
