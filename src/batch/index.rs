@@ -182,7 +182,7 @@ fn row(text: &mut String, folder: &Path, row: &Row, columns: &[Column], with_pic
             let _ = write!(text, "<td{by}>{}</td>", escaped(&(column.shown)(row)));
         }
     } else {
-        let reason = escaped(row.reason.trim_start_matches("error: "));
+        let reason = escaped(&row.reason);
         let _ = write!(text, "<td class=\"reason\" colspan=\"{}\">{reason}</td>", columns.len());
     }
     text.push_str("</tr>\n");

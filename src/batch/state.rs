@@ -82,9 +82,7 @@ impl Fingerprint {
             version: env!("CARGO_PKG_VERSION").to_owned(),
         })
     }
-}
 
-impl Fingerprint {
     /// What differs, in words.
     pub fn changed_to(&self, now: &Self) -> String {
         if *self == Self::default() {

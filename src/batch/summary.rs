@@ -89,14 +89,6 @@ impl Cell {
     }
 }
 
-/// Why a run failed, as its command alone prints it; of one that ended well, what is to be noted.
-fn told(finished: &Finished) -> String {
-    match finished.status {
-        Status::Failed => format!("error: {}", finished.reason),
-        _ => finished.reason.clone(),
-    }
-}
-
 impl Row {
     /// Of a recording that was not run.
     pub fn skipped(name: &str, reason: &str) -> Self {
@@ -144,7 +136,7 @@ impl Row {
             heldout_after_rad: root_mean_square(&held_out.augmented_rmse_rad),
             sha256: word(&finished.fingerprint.recording_sha256),
             version: word(&finished.fingerprint.version),
-            ..Self::empty(name, finished.status, &told(finished))
+            ..Self::empty(name, finished.status, &finished.reason)
         }
     }
 
@@ -155,10 +147,15 @@ impl Row {
     /// The columns in order.
     fn cells(&self) -> Vec<(&'static str, Cell)> {
         let text = |text: &str| Cell::Text(Some(text.to_owned()));
+        let reason = match self.status {
+            // as its command alone prints it
+            Status::Failed => Some(format!("error: {}", self.reason)),
+            _ => (!self.reason.is_empty()).then(|| self.reason.clone()),
+        };
         vec![
             ("recording", text(&self.recording)),
             ("status", text(self.status.id())),
-            ("reason", Cell::Text((!self.reason.is_empty()).then(|| self.reason.clone()))),
+            ("reason", Cell::Text(reason)),
             ("specimen", Cell::Text(self.specimen.clone())),
             ("frames", Cell::Count(self.frames)),
             ("duration_s", Cell::Number(self.duration_s)),

@@ -265,9 +265,7 @@ impl TrackArgs {
             [] => (Some(MarkColour::red()), self.markers.unwrap_or(usual)),
             [one] if self.color.len() == 1 => (Some(one.clone()), self.markers.unwrap_or(configured.len().max(usual))),
             // of marks that are all alike there may be more or fewer than the file says
-            [one, others @ ..]
-                if self.color.is_empty() && self.markers.is_some() && others.iter().all(|other| other == one) =>
-            {
+            [one, others @ ..] if self.color.is_empty() && others.iter().all(|other| other == one) => {
                 (Some(one.clone()), self.markers.unwrap_or(given.len()))
             }
             several => (None, several.len()),

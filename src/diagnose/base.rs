@@ -61,9 +61,8 @@ fn beginning(prepared: &Prepared, x: &[f64], experiment: &Experiment, base: &[Pa
     let sought = |parameter: &Parameter| prepared.base.iter().position(|p| p == parameter);
     let parameters = base.iter().zip(stated).map(|(parameter, stated)| sought(parameter).map_or(stated, |at| x[at]));
     let starts = &x[prepared.base.len()..];
-    let halves = starts.chunks((starts.len() / (2 * prepared.records.len())).max(1));
-    let starts = halves.flat_map(|half| (0..problem.shapes()).map(|i| half.get(i).copied().unwrap_or(0.0)));
-    Ok(parameters.chain(starts).collect())
+    let shapes = starts.len() / (2 * prepared.records.len());
+    Ok(parameters.chain(problem.starts_in_shapes(starts, shapes)).collect())
 }
 
 /// The base model's fit, with the noise that it leaves.

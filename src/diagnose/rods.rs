@@ -16,6 +16,7 @@ const FEWEST: usize = 3;
 const MOST: usize = 20;
 /// Links that are rigid between the marks: no parabola leads there.
 const RIGID: usize = 1;
+
 /// How well each fit does, what it needs being paid for, over what the best of them leaves.
 struct Weights<'s> {
     scatter: f64,
@@ -62,8 +63,8 @@ pub fn preferred(context: &FitContext<'_>, fits: &[Refit<'_>]) -> Option<usize> 
         // the parabola is only a guide
         let is_new = !points.iter().any(|(tried, _)| *tried == pieces);
         let bent = (pieces, if is_new { left_with(fit, pieces)? } else { left });
-        let rigid = left_with(fit, RIGID).filter(|left| unexplained && *left < bent.1).map(|left| (RIGID, left));
-        Some(rigid.unwrap_or(bent))
+        let rigid = unexplained.then(|| left_with(fit, RIGID)).flatten().filter(|left| *left < bent.1);
+        Some(rigid.map_or(bent, |left| (RIGID, left)))
     });
     let (pieces, value) = promised.min_by(|a, b| a.1.total_cmp(&b.1))?;
     (pieces != usual && value < weights.weight(best) - weights.settings.search.worth_a_count).then_some(pieces)

@@ -107,7 +107,12 @@ impl<'a> Problem<'a> {
 
     /// The starts that variables of another problem hold, in the shapes of this one: what that one lacks is at rest.
     pub fn starts_from(&self, other: &Problem<'_>, x: &[f64]) -> Vec<f64> {
-        let halves = x[other.free.len()..].chunks(other.shapes());
+        self.starts_in_shapes(&x[other.free.len()..], other.shapes())
+    }
+
+    /// Starts in so many shapes, in the shapes of this problem: what they lack is at rest.
+    pub fn starts_in_shapes(&self, starts: &[f64], shapes: usize) -> Vec<f64> {
+        let halves = starts.chunks(shapes);
         halves.flat_map(|half| (0..self.shapes()).map(|i| half.get(i).copied().unwrap_or(0.0))).collect()
     }
 

@@ -198,73 +198,58 @@ impl Filter {
 
     /// The innovations of a column, each over its standard deviation.
     pub fn whiten(&self, column: &[f64]) -> Vec<f64> {
-        self.states_of(column, |_, _| ())
+        let [white] = self.states_of([column], |_| ());
+        white
     }
 
-    /// The same of several columns, some side by side: nothing takes more time than these loops.
+    /// The same of several columns, some side by side: nothing takes more time than this loop, and each of its steps waits for the one before.
     pub fn whiten_all<C: AsRef<[f64]>>(&self, columns: &[C]) -> Vec<Vec<f64>> {
-        let some = |columns: &[C]| match (columns, self.turns.len()) {
-            ([only], _) => vec![self.whiten(only.as_ref())],
-            (_, 1) => self.followed_together::<1, C>(columns),
-            (_, 2) => self.followed_together::<2, C>(columns),
-            _ => self.followed_together::<3, C>(columns),
+        let some = |columns: &[C]| match columns {
+            [only] => vec![self.whiten(only.as_ref())],
+            _ => {
+                // a lane without a column of its own follows the first
+                let lanes: [&[f64]; LANES] = std::array::from_fn(|k| columns.get(k).unwrap_or(&columns[0]).as_ref());
+                self.states_of(lanes, |_| ()).into_iter().take(columns.len()).collect()
+            }
         };
         columns.chunks(LANES).flat_map(some).collect()
     }
 
-    /// Up to [`LANES`] columns, each as [`Self::followed`] does it.
-    fn followed_together<const SWINGS: usize, C: AsRef<[f64]>>(&self, columns: &[C]) -> Vec<Vec<f64>> {
+    /// The levels that columns lead to, after each cell, beside the innovations.
+    fn states_of<const N: usize>(&self, columns: [&[f64]; N], after: impl FnMut([f64; N])) -> [Vec<f64>; N] {
+        match self.turns.len() {
+            1 => self.followed::<1, N>(columns, after),
+            2 => self.followed::<2, N>(columns, after),
+            _ => self.followed::<3, N>(columns, after),
+        }
+    }
+
+    /// The same with so many swings, known when this is compiled.
+    fn followed<const SWINGS: usize, const N: usize>(
+        &self,
+        columns: [&[f64]; N],
+        mut after: impl FnMut([f64; N]),
+    ) -> [Vec<f64>; N] {
         let turns: [[f64; 2]; SWINGS] = std::array::from_fn(|k| self.turns.get(k).copied().unwrap_or([0.0; 2]));
-        // a lane without a column of its own follows the first
-        let lanes: [&[f64]; LANES] = std::array::from_fn(|lane| columns.get(lane).unwrap_or(&columns[0]).as_ref());
-        let (mut level, mut a, mut b) = ([0.0; LANES], [[0.0; LANES]; SWINGS], [[0.0; LANES]; SWINGS]);
-        let mut white: Vec<Vec<f64>> = columns.iter().map(|column| Vec::with_capacity(column.as_ref().len())).collect();
+        let (mut level, mut a, mut b) = ([0.0; N], [[0.0; N]; SWINGS], [[0.0; N]; SWINGS]);
+        let mut white = columns.map(|column| Vec::with_capacity(column.len()));
         for (cell, (gain, scale)) in self.cells.iter().enumerate() {
-            let held = if *scale > 0.0 { 1.0 } else { 0.0 };
-            let off: [f64; LANES] = std::array::from_fn(|lane| {
+            let off: [f64; N] = std::array::from_fn(|lane| {
                 let foreseen = level[lane] + a.iter().map(|a| a[lane]).sum::<f64>();
-                held * (lanes[lane][cell] - foreseen)
+                if *scale > 0.0 { columns[lane][cell] - foreseen } else { 0.0 }
             });
-            for lane in 0..LANES {
+            for lane in 0..N {
                 level[lane] += gain[0] * off[lane];
             }
             for k in 0..SWINGS {
                 let [c, s] = turns[k];
-                for lane in 0..LANES {
+                for lane in 0..N {
                     let (x, y) = (a[k][lane] + gain[1 + 2 * k] * off[lane], b[k][lane] + gain[2 + 2 * k] * off[lane]);
                     (a[k][lane], b[k][lane]) = (c * x - s * y, s * x + c * y);
                 }
             }
             white.iter_mut().zip(off).for_each(|(white, off)| white.push(off * scale));
-        }
-        white
-    }
-
-    /// The states that a column leads to, after each cell, beside the innovations.
-    fn states_of(&self, column: &[f64], after: impl FnMut(usize, f64)) -> Vec<f64> {
-        match self.turns.len() {
-            1 => self.followed::<1>(column, after),
-            2 => self.followed::<2>(column, after),
-            _ => self.followed::<3>(column, after),
-        }
-    }
-
-    /// The same with so many swings, known when this is compiled.
-    fn followed<const SWINGS: usize>(&self, column: &[f64], mut after: impl FnMut(usize, f64)) -> Vec<f64> {
-        let turns: [[f64; 2]; SWINGS] = std::array::from_fn(|k| self.turns.get(k).copied().unwrap_or([0.0; 2]));
-        let (mut level, mut a, mut b) = (0.0, [0.0; SWINGS], [0.0; SWINGS]);
-        let mut white = Vec::with_capacity(column.len());
-        for (cell, ((gain, scale), y)) in self.cells.iter().zip(column).enumerate() {
-            let foreseen = level + a.iter().sum::<f64>();
-            let off = if *scale > 0.0 { y - foreseen } else { 0.0 };
-            level += gain[0] * off;
-            for k in 0..SWINGS {
-                let (x, y) = (a[k] + gain[1 + 2 * k] * off, b[k] + gain[2 + 2 * k] * off);
-                let [c, s] = turns[k];
-                (a[k], b[k]) = (c * x - s * y, s * x + c * y);
-            }
-            white.push(off * scale);
-            after(cell, level);
+            after(level);
         }
         white
     }
@@ -272,7 +257,7 @@ impl Filter {
     /// The level after each cell, from what came before and the cell itself.
     pub fn level(&self, column: &[f64]) -> Vec<f64> {
         let mut all = Vec::with_capacity(column.len());
-        self.states_of(column, |_, level| all.push(level));
+        self.states_of([column], |[level]| all.push(level));
         all
     }
 

@@ -172,9 +172,9 @@ fn jumps_of(bench: &Bench<'_>, fit: &Fit, stage: &Stage) -> Vec<f64> {
 
 /// How probable an effect is, over all candidates that hold it.
 pub fn inclusion(candidates: &[Candidate], effect: Effect) -> f64 {
-    // the sum of none is −0
-    let sum: f64 = candidates.iter().filter(|c| c.fit.effects().contains(&effect)).map(|c| c.probability).sum();
-    sum.clamp(0.0, 1.0) + 0.0
+    let with_it = candidates.iter().filter(|c| c.fit.effects().contains(&effect)).map(|c| c.probability);
+    // `sum` of none is −0
+    with_it.fold(0.0, |sum, probability| sum + probability).min(1.0)
 }
 
 /// The push over all candidates: mean and standard deviation of the mixture.

@@ -16,7 +16,7 @@ use crate::progress::Progress;
 use crate::rejected::Rejected;
 use crate::steady::Background;
 use crate::track::{FrameBlobs, MarkSlot, Tracker, Tracks};
-use crate::video::{DamageSpread, Decoded, Outcome, Recording, StillTimes, StreamInfo, Timing};
+use crate::video::{DamageSpread, Decoded, Outcome, OwnedPicture, Recording, StillTimes, StreamInfo, Timing};
 use view::{Seen, View, frame_blobs};
 
 /// Whether the camera's own motion is taken out.
@@ -131,6 +131,8 @@ pub struct Session<'a> {
     calibration: Calibration,
     area: Area,
     album: Album,
+    /// Those pictures, where it is not known yet what is sought.
+    pictures: Vec<OwnedPicture>,
     hues: Vec<Hue>,
     siting: Option<Siting>,
     slots: Vec<MarkSlot>,
@@ -160,6 +162,7 @@ impl<'a> Session<'a> {
         };
         let (siting, (background, camera)) = rayon::join(marks, || survey::camera(&pictures, options, &stream));
         let siting = siting?;
+        let pictures = if hues.is_empty() { pictures } else { Vec::new() };
         let (path, stamps_s) = (path.to_owned(), Vec::new());
         Ok(Self {
             path,
@@ -169,6 +172,7 @@ impl<'a> Session<'a> {
             calibration,
             area,
             album,
+            pictures,
             hues,
             siting,
             slots,
@@ -226,7 +230,7 @@ impl<'a> Session<'a> {
             self.stamps_s.clear();
             self.camera = self.first_camera;
         }
-        let siting = survey::siting(&survey::pictures(&self.recording)?, &hues)?;
+        let siting = survey::siting(&self.pictures, &hues)?;
         let detector = Detector::new(hues).with_siting(siting);
         let mut frames = Vec::new();
         self.each_frame(&detector, progress, &mut |frame| frames.push(frame))?;

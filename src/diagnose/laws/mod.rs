@@ -121,5 +121,10 @@ pub fn scores(screen: &Screen<'_, '_>, effects: &[Effect]) -> Vec<Score> {
 
 /// The effects that are screened: a hysteresis in each joint of a strip of many links costs more than all others, and is only fitted alone.
 pub fn cheap_to_score(context: &FitContext<'_>, effects: &[Effect]) -> Vec<Effect> {
-    effects.iter().copied().filter(|effect| !(context.is_strip() && effect.has_corners())).collect()
+    effects.iter().copied().filter(|effect| !has_corners_in_every_joint(context, *effect)).collect()
+}
+
+/// Whether an effect has corners in every joint of a strip.
+pub fn has_corners_in_every_joint(context: &FitContext<'_>, effect: Effect) -> bool {
+    context.is_strip() && effect.has_corners()
 }

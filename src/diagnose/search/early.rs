@@ -6,7 +6,7 @@
 use super::super::context::first_part;
 use super::super::effect::{Cost, Effect};
 use super::super::misfit::needs;
-use super::super::refit::{Refit, least};
+use super::super::refit::{self, Refit, least};
 use super::super::settings::MisfitSettings;
 use super::rounds::{Round, Tried};
 use super::{Search, horizon};
@@ -53,14 +53,10 @@ impl<'a> Search<'a, '_> {
 fn tied(fits: &[Refit<'_>], settings: &MisfitSettings) -> Vec<Effect> {
     let Some(best) = least(fits) else { return Vec::new() };
     let least = fits.iter().map(|fit| needs(fit, best, settings)).fold(f64::INFINITY, f64::min);
-    let mut singles: Vec<(f64, Effect)> = fits
-        .iter()
-        .filter_map(|fit| match fit.hypothesis.effects[..] {
-            [only] if only.entry().cost == Cost::Ordinary => Some((needs(fit, best, settings) - least, only)),
-            _ => None,
-        })
-        .filter(|(behind, _)| *behind < 2.0 * settings.counts)
-        .collect();
-    singles.sort_by(|a, b| a.0.total_cmp(&b.0));
-    singles.into_iter().map(|(_, effect)| effect).collect()
+    let is_tied = |fit: &Refit<'_>| match fit.hypothesis.effects[..] {
+        [only] => only.entry().cost == Cost::Ordinary && needs(fit, best, settings) < least + 2.0 * settings.counts,
+        _ => false,
+    };
+    let order = refit::best(fits, usize::MAX, is_tied, |fit| needs(fit, best, settings));
+    order.into_iter().flat_map(|place| fits[place].hypothesis.effects.clone()).collect()
 }

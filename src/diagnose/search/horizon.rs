@@ -52,13 +52,10 @@ pub fn continued<'a>(context: &FitContext<'a>, fits: &[Refit<'a>], effects: &[Ef
 pub fn carried<'a>(context: &FitContext<'a>, fits: Vec<Refit<'_>>, part: f64, noise: &[RecordNoise]) -> Vec<Refit<'a>> {
     let (settings, steps) = (&context.settings.search, &context.settings.descent);
     // of a longer part each step costs more; what an effect has not earned does not come before the fit without it
-    let few = |mut fits: Vec<Refit<'_>>| {
-        if let Some(best) = least(&fits).cloned() {
-            let needs = |fit: &Refit<'_>| needs(fit, &best, &context.settings.misfit);
-            fits.sort_by(|a, b| needs(a).total_cmp(&needs(b)));
-        }
-        fits.truncate(settings.carried);
-        to_follow(fits)
+    let few = |fits: Vec<Refit<'_>>| {
+        let Some(least) = least(&fits) else { return Vec::new() };
+        let chosen = refit::best(&fits, settings.carried, |_| true, |fit| needs(fit, least, &context.settings.misfit));
+        chosen.into_iter().map(|place| (fits[place].hypothesis.clone(), fits[place].x.clone())).collect()
     };
     let keeps_step = |(hypothesis, x): &(Hypothesis, Vec<f64>)| {
         let there = context.descend_from(hypothesis, noise, x.clone(), 0);

@@ -163,12 +163,15 @@ impl<'a, 'p> Search<'a, 'p> {
     /// # Errors
     /// As [`Self::of_base_model`].
     pub fn counted(self, counted: &'a OnceLock<Experiment>) -> Result<Self> {
-        if self.misfit().is_some_and(|misfit| misfit.unexplained) {
-            return Ok(self);
-        }
-        let Some(again) = self.with_the_preferred_count(counted)? else { return Ok(self) };
+        let again = if self.is_adequate() { self.with_the_preferred_count(counted)? } else { None };
+        let Some(again) = again else { return Ok(self) };
         let is_kept = rods::is_kept(&self.context, &self.fits, &again.fits);
         Ok(if is_kept { again } else { self })
+    }
+
+    /// Whether the base model leaves no more than noise.
+    fn is_adequate(&self) -> bool {
+        !Misfit::of(&self.context, self.base(), &[]).unexplained
     }
 
     /// The base model's fit with another number of rods, if the recordings ask for it.
@@ -184,8 +187,7 @@ impl<'a, 'p> Search<'a, 'p> {
     /// # Errors
     /// As [`Self::of_base_model`].
     pub fn recounted(self, counted: &'a OnceLock<Experiment>) -> Result<Self> {
-        let is_counted = !Misfit::of(&self.context, self.base(), &[]).unexplained;
-        let again = if is_counted { None } else { self.with_the_preferred_count(counted)? };
+        let again = if self.is_adequate() { None } else { self.with_the_preferred_count(counted)? };
         let Some(mut again) = again else { return Ok(self) };
         again.run();
         let is_kept = rods::is_kept(&self.context, &self.fits, &again.fits);

@@ -115,8 +115,8 @@ impl Round {
         match self {
             Self::Asked => search.asked(),
             Self::Singles => search.singles(),
-            Self::DearSingles => search.dear_singles(|effect, is_strip| !(is_strip && effect.has_corners())),
-            Self::StripCorners => search.dear_singles(|effect, is_strip| is_strip && effect.has_corners()),
+            Self::DearSingles => search.dear_singles(false),
+            Self::StripCorners => search.dear_singles(true),
             Self::Tied => search.tied(),
             Self::FromTheLeader => search.begun_at_the_leader(),
             Self::Pairs => search.pairs(),
@@ -162,19 +162,19 @@ impl<'a> Search<'a, '_> {
         })
     }
 
-    /// The others of a kind, of a strip or not.
-    fn dear_singles(&self, is_of_kind: fn(Effect, bool) -> bool) -> Vec<Proposal<'_, 'a>> {
+    /// The others: the corners of a strip, or all but them.
+    fn dear_singles(&self, corners: bool) -> Vec<Proposal<'_, 'a>> {
         let misfit = Misfit::of(&self.context, self.base(), &self.scores).beside(&self.fits[1..]);
-        let is_strip = self.context.is_strip();
-        self.beside_base(misfit, |effect| effect.entry().cost != Cost::Ordinary && is_of_kind(effect, is_strip))
+        let is_meant = |effect| laws::has_corners_in_every_joint(&self.context, effect) == corners;
+        self.beside_base(misfit, |effect| effect.entry().cost != Cost::Ordinary && is_meant(effect))
     }
 
     /// Along the motion of the best fit of the whole; where that has no effect, beside it, those first that the whole promises.
     fn tied(&self) -> Vec<Proposal<'_, 'a>> {
         let settings = self.context.settings;
         let Some(best) = least(&self.fits) else { return Vec::new() };
-        let needs_of = |fit: &Refit<'a>| needs(fit, best, &settings.misfit);
-        let leader = self.fits.iter().min_by(|a, b| needs_of(a).total_cmp(&needs_of(b))).unwrap_or(best);
+        let needs = |fit: &Refit<'a>| needs(fit, best, &settings.misfit);
+        let leader = self.fits.iter().min_by(|a, b| needs(a).total_cmp(&needs(b))).unwrap_or(best);
         let is_new = |effect: &Effect| !self.fits.iter().any(|fit| fit.hypothesis.effects == [*effect]);
         let mut tied: Vec<Effect> = self.tied.iter().copied().filter(is_new).collect();
         if !leader.hypothesis.effects.is_empty() {
