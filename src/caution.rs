@@ -7,7 +7,7 @@ use crate::track::{Point, Spare};
 
 /// A link whose length scatters by more than this share is no rigid link in the plane of the picture: lenses bend by
 /// less.
-const MOST_LENGTH_SPREAD: f64 = 0.01;
+pub const MOST_LENGTH_SPREAD: f64 = 0.01;
 /// And by more than so many times what the marks' scatter explains.
 const LENGTH_SCATTERS: f64 = 4.0;
 /// Frames below which nothing is said about a link or a mark.
@@ -22,7 +22,7 @@ const LEAST_TRAVEL: f64 = 0.05;
 /// Change of the distance from a still thing, over the motion, up to which that is the hinge.
 const HINGE_STRETCH: f64 = 0.1;
 /// Share of the largest angle, and standard deviations of a link's own, below which it does not turn.
-const LEAST_TURN: f64 = 0.02;
+pub const LEAST_TURN: f64 = 0.02;
 const STILL_DEVIATIONS: f64 = 4.0;
 /// Things that are listed one by one.
 const LISTED: usize = 4;

@@ -208,3 +208,28 @@ fn a_file_with_two_thousand_spoilt_bytes_exchanges_no_marks() {
     }
     assert!(longest_gap > 30, "the damage is too short to matter: {longest_gap} frames");
 }
+
+#[test]
+fn of_two_like_pendulums_the_one_about_the_pivot_is_followed() {
+    let pivots_px = [[300.0, 40.0], [640.0, 60.0]];
+    for (wanted, pivot_px) in pivots_px.into_iter().enumerate() {
+        let mut tracker = Tracker::new(vec![MarkSlot { hue: 0 }], Some(pivot_px));
+        for frame in 0..300 {
+            let t_s = f64::from(frame) / 30.0;
+            let at = |k: usize| {
+                let (sin, cos) = (0.25 * ((5.0 + 0.4 * k as f64) * t_s + k as f64).cos()).sin_cos();
+                [pivots_px[k][0] + 290.0 * sin, pivots_px[k][1] + 290.0 * cos]
+            };
+            let sighting = |k: usize| Sighting {
+                hue: 0,
+                measured: Measured { position_px: at(k), covariance_px2: [1e-3, 1e-3, 0.0], area_px2: 400.0 },
+                cut: false,
+            };
+            tracker.push(FrameBlobs { t_s, damaged: false, sightings: vec![sighting(0), sighting(1)] });
+        }
+        let (tracks, _) = tracker.finish();
+        let x_px = tracks.marks[0][0].measured.unwrap().position_px[0];
+        let other = pivots_px[1 - wanted][0];
+        assert!((x_px - pivot_px[0]).abs() < (x_px - other).abs(), "{x_px} about {pivot_px:?}");
+    }
+}

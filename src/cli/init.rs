@@ -84,6 +84,12 @@ impl InitArgs {
             }
         }
         console.remark(hinge_in_words(finding));
+        if let Some(other) = finding.apart.first() {
+            let [[x, y], [ox, oy]] = [finding.marks[0].thing.place_px(), other.place_px()];
+            console.warning(format!(
+                "{video}: more than one thing like this swings: the one about {x:.0}, {y:.0} px is measured, not the one about {ox:.0}, {oy:.0} px; roi_px in {out} picks another"
+            ));
+        }
         match &self.preview {
             Some(picture) => {
                 console.remark(format!("look at {} to see whether these are the marks", picture.display()))
@@ -114,10 +120,10 @@ fn hinge_in_words(finding: &Finding) -> String {
             )
         }
         None if finding.marks.len() == 1 => {
-            "it swings too little to show where it hangs: its displacement is measured, no angle".to_owned()
+            "its path does not show where it hangs: its displacement is measured, no angle".to_owned()
         }
         None => {
-            "the first mark swings too little to show where it hangs: angles are measured between the marks".to_owned()
+            "the path of the first mark does not show where it hangs: angles are measured between the marks".to_owned()
         }
     }
 }

@@ -1,6 +1,7 @@
 //! Which of the things that last are the marks, and in which order.
 
 use super::arc::Arc;
+use crate::caution::LEAST_TURN;
 use crate::track::Thing;
 
 /// Change of a distance over the motion beyond which two things are not on one link.
@@ -71,11 +72,15 @@ fn of_look(
     let crowd = movers.len();
     // every mover may be the one that the others are like; the largest set that hangs from something counts
     let sets = movers.iter().filter_map(|first| {
-        let mut marks = rigid_set(things, &movers, *first);
+        let mut marks = without_shadows(things, rigid_set(things, &movers, *first));
         order(things, &mut marks);
         hangs(things, &marks).filter(|_| !is_part(&marks)).map(|arc| (marks, arc))
     });
-    let (mut marks, arc) = sets.max_by(|a, b| value(things, &a.0).total_cmp(&value(things, &b.0)))?;
+    // of two like ones that which swings farther
+    let farthest_px = |marks: &[usize]| marks.iter().map(|i| things[*i].travel_px).fold(0.0, f64::max);
+    let (mut marks, arc) = sets.max_by(|(a, _), (b, _)| {
+        value(things, a).total_cmp(&value(things, b)).then(farthest_px(a).total_cmp(&farthest_px(b)))
+    })?;
     let mut hinge_marked = false;
     let blurred = arc.map_or(0.0, |arc| arc.residual_px / (MOST_OFF_ARC * things[marks[0]].travel_px));
     if let Some(arc) = arc
@@ -124,8 +129,13 @@ fn hangs(things: &[Thing], marks: &[usize]) -> Option<Option<Arc>> {
             let shows_centre = arc.sd_px[0].max(arc.sd_px[1]) < arc.radius_px && arc.radius_px > own_radius_px;
             (arc.residual_px < most_px && (is_no_cover || shows_centre)).then_some(Some(arc))
         }
-        None => (marks.len() > 1 && off_line_px(&path) < most_px).then_some(None),
+        None => (is_no_cover && off_line_px(&path) < most_px).then_some(None),
     }
+}
+
+/// It swings by itself as a mark does.
+pub fn hangs_alone(thing: &Thing) -> bool {
+    thing.presence > LEAST_PRESENCE && hangs(std::slice::from_ref(thing), &[0]).is_some()
 }
 
 /// Root mean square distance of points from the straight line through them.
@@ -142,14 +152,16 @@ fn value(things: &[Thing], marks: &[usize]) -> f64 {
     marks.iter().map(|i| things[*i].presence).sum()
 }
 
-/// Of things in one place, such as one mark seen by two looks, the first.
+/// Of things in one place, such as one mark seen by two looks, the first. And of things that are hardly seen side by
+/// side: one is the other, found again.
 fn distinct(things: &[Thing], movers: &[usize]) -> Vec<usize> {
     let mut kept: Vec<usize> = Vec::new();
     for i in movers {
         let width = things[*i].area_px2.sqrt();
         let doubled = |k: &usize| {
             let other = things[*k].area_px2.sqrt();
-            things[*i].distance_px(&things[*k]).is_none_or(|d| d < 0.6 * width.max(other))
+            !things[*i].is_seen_beside(&things[*k])
+                || things[*i].distance_px(&things[*k]).is_none_or(|d| d < 0.6 * width.max(other))
         };
         if !kept.iter().any(doubled) {
             kept.push(*i);
@@ -173,6 +185,23 @@ fn rigid_set(things: &[Thing], movers: &[usize], first: usize) -> Vec<usize> {
             _ => return set,
         }
     }
+}
+
+/// Of things that move as one and never turn about each other, such as a ball and its shadow, the one whose path is the
+/// clearer: there is no link between them that has an angle.
+fn without_shadows(things: &[Thing], mut marks: Vec<usize>) -> Vec<usize> {
+    let off_arc_px = |i: &usize| {
+        let path: Vec<[f64; 2]> = things[*i].path.iter().flatten().copied().collect();
+        Arc::of(&path, radius_px(&things[*i])).map_or_else(|| off_line_px(&path), |arc| arc.residual_px)
+    };
+    marks.sort_by(|a, b| off_arc_px(a).total_cmp(&off_arc_px(b)));
+    let mut kept: Vec<usize> = Vec::new();
+    for i in marks {
+        if kept.iter().all(|k| things[i].moves_against(&things[*k]) > LEAST_TURN) {
+            kept.push(i);
+        }
+    }
+    kept
 }
 
 /// From the hinge down: what swings farther is lower, and what is lower in the picture where both swing alike.
@@ -277,7 +306,12 @@ mod tests {
 
     #[test]
     fn spots_at_the_edge_of_a_swinging_ball_are_parts_of_it() {
-        let beside = |dx: f64, dy: f64| move |t: f64| [joint(t)[0] + dx, joint(t)[1] + dy];
+        let beside = |dx: f64, dy: f64| {
+            move |t: f64| {
+                let (sin, cos) = (0.4 * (3.0 * t).sin()).sin_cos();
+                [joint(t)[0] + dx * cos + dy * sin, joint(t)[1] + dy * cos - dx * sin]
+            }
+        };
         let mut things = vec![Thing { area_px2: 2900.0, ..thing(0, joint, true) }];
         for (dx, dy) in [(26.0, 0.0), (-26.0, 0.0), (0.0, 26.0), (0.0, -26.0)] {
             things.push(Thing { area_px2: 200.0, ..thing(1, beside(dx, dy), true) });
@@ -291,6 +325,56 @@ mod tests {
         // dark marks on a light plate are marks
         things[0] = Thing { area_px2: 2900.0, ..thing(0, joint, true) };
         assert_eq!(longest(&things, &names("light")).unwrap().marks.len(), 4);
+    }
+
+    #[test]
+    fn one_mark_followed_in_two_pieces_is_not_two_marks() {
+        let mut pieces = [thing(1, tip, true), thing(1, tip, true)];
+        for i in 0..300 {
+            if i < 140 {
+                pieces[0].path[i] = None
+            } else if i >= 150 {
+                pieces[1].path[i] = None
+            }
+        }
+        // while both are seen, one of them is its gloss
+        pieces[1].path[140..150].iter_mut().flatten().for_each(|p| p[0] += 30.0);
+        pieces[0].presence = 0.53;
+        pieces[1].presence = 0.5;
+        let [first, second] = pieces;
+        let things = [thing(1, joint, true), first, second, thing(0, joint, true), thing(0, tip, true)];
+        let chain = longest(&things, &["#c01010".to_owned(), "light".to_owned()]).unwrap();
+        assert_eq!(chain.marks, [3, 4]);
+    }
+
+    #[test]
+    fn the_shadow_of_a_ball_is_no_joint() {
+        let shadow = |t: f64| [joint(t)[0] + 80.0 + 0.3 * (50.0 * t).sin(), joint(t)[1] + 50.0];
+        let names = ["dark".to_owned()];
+        let things = [thing(0, shadow, true), thing(0, joint, true)];
+        assert_eq!(longest(&things, &names).unwrap().marks, [1]);
+    }
+
+    #[test]
+    fn a_ball_that_goes_up_and_down_on_a_straight_line_is_a_mark() {
+        let bounces = thing(0, |t| [400.0, 300.0 + 50.0 * (4.0 * t).sin()], true);
+        let bounces = Thing { travel_px: 50.0, ..bounces };
+        assert_eq!(longest(&[bounces], &["#20a040".to_owned()]).unwrap().arc, None);
+    }
+
+    #[test]
+    fn of_two_like_pendulums_the_one_that_swings_farther_is_followed() {
+        let other = |t: f64| {
+            [700.0 + 60.0 * (3.3 * t).sin(), 60.0 + (200f64.powi(2) - (60.0 * (3.3 * t).sin()).powi(2)).sqrt()]
+        };
+        for turned in [false, true] {
+            let mut things = vec![thing(0, joint, true), thing(0, other, true)];
+            if turned {
+                things.reverse()
+            }
+            let chain = longest(&things, &["#20a040".to_owned()]).unwrap();
+            assert_eq!(chain.marks, [usize::from(turned)]);
+        }
     }
 
     #[test]

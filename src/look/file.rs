@@ -3,6 +3,8 @@
 use std::fmt::Write as _;
 
 use super::Finding;
+use crate::caution::MOST_LENGTH_SPREAD;
+use crate::statistics::median;
 
 /// Standard deviation of the pivot, over the radius, beyond which it is only a remark.
 const MOST_PIVOT_SD: f64 = 0.15;
@@ -10,7 +12,21 @@ const MOST_PIVOT_SD: f64 = 0.15;
 impl Finding {
     /// The pivot is known well enough to measure angles from it, and no mark shows it.
     pub fn states_pivot(&self) -> bool {
-        !self.hinge_marked && self.arc.is_some_and(|arc| arc.sd_px[0].max(arc.sd_px[1]) < MOST_PIVOT_SD * arc.radius_px)
+        !self.hinge_marked && self.shows_pivot() && self.keeps_distance()
+    }
+
+    /// Enough of a circle is swung to show its centre.
+    fn shows_pivot(&self) -> bool {
+        self.arc.is_some_and(|arc| arc.sd_px[0].max(arc.sd_px[1]) < MOST_PIVOT_SD * arc.radius_px)
+    }
+
+    /// The first mark keeps its distance from the centre as nearly as `track` asks of a link.
+    fn keeps_distance(&self) -> bool {
+        let Some((arc, first)) = self.arc.as_ref().zip(self.marks.first()) else { return false };
+        let [x, y] = arc.centre_px;
+        let distances = first.thing.path.iter().flatten().map(|p| (p[0] - x).hypot(p[1] - y));
+        let mut off: Vec<f64> = distances.map(|d| (d - arc.radius_px).abs()).collect();
+        median(&mut off).is_some_and(|spread| 1.4826 * spread < MOST_LENGTH_SPREAD * arc.radius_px)
     }
 
     /// Links that will have an angle.
@@ -65,6 +81,15 @@ fn rig(text: &mut String, finding: &Finding) {
         let places: Vec<String> =
             finding.still.iter().take(4).map(|t| t.place_px()).map(|[x, y]| format!("({x:.0}, {y:.0})")).collect();
         let _ = writeln!(text, "# of the same look but standing still, and not taken for marks: {}", places.join(", "));
+    }
+    if !finding.apart.is_empty() {
+        let places: Vec<String> =
+            finding.apart.iter().take(4).map(|t| t.place_px()).map(|[x, y]| format!("({x:.0}, {y:.0})")).collect();
+        let _ = writeln!(
+            text,
+            "# of the same look but swinging by themselves, and not measured: about {}; roi_px picks one of them",
+            places.join(", ")
+        );
     }
     if finding.camera.taken_out {
         let _ = writeln!(
@@ -127,7 +152,12 @@ fn pivot(text: &mut String, finding: &Finding) {
     } else {
         let _ = writeln!(
             text,
-            "# pivot_px = [{x:.1}, {y:.1}]  # {what}: too little is swung to use it; set it by hand if it is known"
+            "# pivot_px = [{x:.1}, {y:.1}]  # {what}: {}; set it by hand if it is known",
+            if finding.shows_pivot() {
+                "the first mark does not keep its distance from there, so it is not the pivot"
+            } else {
+                "too little is swung to use it"
+            }
         );
     }
 }

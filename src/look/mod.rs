@@ -57,6 +57,8 @@ pub struct Finding {
     pub links_px: Vec<f64>,
     /// Things of the marks' look that stand still and are none.
     pub still: Vec<Thing>,
+    /// Things of the marks' look that swing by themselves.
+    pub apart: Vec<Thing>,
     /// Turns a second of the first mark that swings.
     pub frequency_hz: Option<f64>,
     /// Time stamps.
@@ -144,11 +146,14 @@ fn measured(session: &mut Session<'_>, looks: Vec<(Hue, String)>, progress: &dyn
     let beside = |t: &Thing, m: &Mark| {
         m.thing.distance_px(t).is_some_and(|d| d > m.thing.area_px2.sqrt().max(t.area_px2.sqrt()))
     };
-    let still = all.iter().filter(|t| !t.moves && marks.iter().any(|m| m.thing.hue == t.hue));
-    let still = still.filter(|t| marks.iter().all(|m| beside(t, m)));
+    let alike = |t: &&Thing| marks.iter().any(|m| m.thing.hue == t.hue) && marks.iter().all(|m| beside(t, m));
+    let still = all.iter().filter(|t| !t.moves).filter(alike);
+    let swings_apart = |t: &&Thing| t.moves && chain::hangs_alone(t) && marks.iter().all(|m| m.thing.is_seen_beside(t));
+    let apart = all.iter().filter(swings_apart).filter(alike);
     Ok(Some(Finding {
         frequency_hz: marks.get(swinging).and_then(|m| turns_per_second(&m.thing, &t_s)),
         still: still.cloned().collect(),
+        apart: apart.cloned().collect(),
         links_px,
         marks,
         arc: chain.arc,

@@ -6,9 +6,9 @@
 
 use std::cmp::Ordering;
 
-use super::tracklet::{Tracklet, link};
+use super::tracklet::Tracklet;
 use super::{FrameBlobs, MarkSlot, Sighting};
-use crate::statistics::{median, median_step_s};
+use crate::statistics::median;
 
 /// Which tracklet is which mark.
 #[derive(Debug, Clone, Default, PartialEq)]
@@ -53,22 +53,24 @@ const SPARE_CANDIDATES: usize = 5;
 const SAME_AREA: f64 = 0.1;
 
 /// A tracklet as a candidate.
-struct Candidate {
+pub(super) struct Candidate {
     tracklet: usize,
-    hue: u8,
-    presence: f64,
+    pub hue: u8,
+    pub presence: f64,
     /// Share of the window that is over when it is first seen.
     lateness: f64,
-    ln_area: f64,
+    pub ln_area: f64,
     /// How far down the picture it comes, or how far from the pivot; one frame in twenty apart.
     order: f64,
     /// Half the range of its motion, the outermost twentieths apart.
-    travel_px: f64,
-    moves: bool,
+    pub travel_px: f64,
+    pub moves: bool,
     /// It moves while it is seen whole, too.
     moves_whole: bool,
+    /// How much its distance from the pivot changes; see [`stretch`].
+    pivot_stretch: f64,
     /// Position by frame.
-    path: Vec<Option<[f64; 2]>>,
+    pub path: Vec<Option<[f64; 2]>>,
 }
 
 /// Chooses a tracklet for every slot.
@@ -188,7 +190,8 @@ fn is_hinge(kept: &[&Candidate], assignment: &[Option<usize>], slot: usize) -> b
         && next.is_some_and(|next| kept[*next].moves && stretch(kept[own], kept[*next]) < MOST_STRETCH)
 }
 
-fn candidates(tracklets: &[Tracklet], window: &[FrameBlobs], pivot_px: Option<[f64; 2]>) -> Vec<Candidate> {
+/// Everything that lasts.
+pub(super) fn candidates(tracklets: &[Tracklet], window: &[FrameBlobs], pivot_px: Option<[f64; 2]>) -> Vec<Candidate> {
     let least = ((window.len() as f64 * LEAST_PRESENCE) as usize).max(2);
     tracklets
         .iter()
@@ -217,6 +220,7 @@ fn candidates(tracklets: &[Tracklet], window: &[FrameBlobs], pivot_px: Option<[f
                 lateness: t.sightings.first().map_or(1.0, |s| s.0 as f64 / window.len() as f64),
                 ln_area: median(&mut ln_areas).unwrap_or(0.0),
                 order: order(&path, pivot_px),
+                pivot_stretch: pivot_px.map_or(0.0, |p| stretch_of(&vec![Some(p); path.len()], &path, travel_px)),
                 path,
             }
         })
@@ -259,7 +263,9 @@ fn score(kept: &[&Candidate], assignment: &[Option<usize>]) -> f64 {
     let chosen: Vec<&Candidate> = assignment.iter().flatten().map(|i| kept[*i]).collect();
     // of two halves of a track, before a gap and after it, the first: what follows it will be found again
     let presence: f64 = chosen.iter().map(|c| c.presence - c.lateness).sum();
-    let stretch = chosen.windows(2).map(|w| stretch(w[0], w[1])).fold(0.0, f64::max);
+    // of two like pendulums, the one that swings about the pivot
+    let from_pivot = assignment.first().copied().flatten().map_or(0.0, |first| kept[first].pivot_stretch);
+    let stretch = chosen.windows(2).map(|w| stretch(w[0], w[1])).fold(from_pivot, f64::max);
     let mean = chosen.iter().map(|c| c.ln_area).sum::<f64>() / chosen.len().max(1) as f64;
     let unlike = (chosen.iter().map(|c| (c.ln_area - mean).powi(2)).sum::<f64>() / chosen.len().max(1) as f64).sqrt();
     let swings = kept.iter().any(|c| c.moves);
@@ -311,7 +317,8 @@ fn stretch(a: &Candidate, b: &Candidate) -> f64 {
     stretch_of(&a.path, &b.path, a.travel_px.max(b.travel_px))
 }
 
-fn stretch_of(a: &[Option<[f64; 2]>], b: &[Option<[f64; 2]>], travel_px: f64) -> f64 {
+/// The same of two paths of things that move by this much.
+pub(super) fn stretch_of(a: &[Option<[f64; 2]>], b: &[Option<[f64; 2]>], travel_px: f64) -> f64 {
     let between: Vec<[f64; 2]> = a
         .iter()
         .zip(b)
@@ -328,61 +335,4 @@ fn stretch_of(a: &[Option<[f64; 2]>], b: &[Option<[f64; 2]>], travel_px: f64) ->
     let change = lengths.iter().map(|l| (l - usual).abs()).sum::<f64>() / n;
     let moved_px = motion.max(travel_px * 0.05);
     if moved_px <= 0.0 { 1.0 } else { (change / moved_px).max(change / usual).min(1.0) }
-}
-
-/// A lasting thing in a recording, whatever it is.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Thing {
-    /// Index of its hue.
-    pub hue: u8,
-    /// Share of the frames that show it.
-    pub presence: f64,
-    /// Usual area.
-    pub area_px2: f64,
-    /// Half the range of its motion.
-    pub travel_px: f64,
-    /// It swings.
-    pub moves: bool,
-    /// Position by frame.
-    pub path: Vec<Option<[f64; 2]>>,
-}
-
-impl Thing {
-    /// How much its distance from another changes, as a share of how they move against each other; 1 where they do
-    /// not, or are never seen together.
-    pub fn stretch(&self, other: &Self) -> f64 {
-        stretch_of(&self.path, &other.path, self.travel_px.max(other.travel_px))
-    }
-
-    /// Usual distance from another; `None` where they are never seen together.
-    pub fn distance_px(&self, other: &Self) -> Option<f64> {
-        let apart = |(p, q): (&Option<[f64; 2]>, &Option<[f64; 2]>)| {
-            let (p, q) = (p.as_ref()?, q.as_ref()?);
-            Some((p[0] - q[0]).hypot(p[1] - q[1]))
-        };
-        median(&mut self.path.iter().zip(&other.path).filter_map(apart).collect::<Vec<_>>())
-    }
-
-    /// Usual place.
-    pub fn place_px(&self) -> [f64; 2] {
-        [0, 1].map(|axis| median(&mut self.path.iter().flatten().map(|p| p[axis]).collect::<Vec<_>>()).unwrap_or(0.0))
-    }
-}
-
-/// Everything that lasts in these frames.
-pub fn things(window: &[FrameBlobs]) -> Vec<Thing> {
-    let stamps: Vec<f64> = window.iter().map(|frame| frame.t_s).collect();
-    let Some(step_s) = median_step_s(&stamps) else { return Vec::new() };
-    let tracklets = link(window, step_s);
-    candidates(&tracklets, window, None)
-        .into_iter()
-        .map(|c| Thing {
-            hue: c.hue,
-            presence: c.presence,
-            area_px2: c.ln_area.exp(),
-            travel_px: c.travel_px,
-            moves: c.moves,
-            path: c.path,
-        })
-        .collect()
 }

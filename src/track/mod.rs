@@ -9,14 +9,16 @@ mod kalman;
 mod noise;
 mod sighting;
 mod smooth;
+mod thing;
 mod tracker;
 mod tracklet;
 mod tracks;
 
-pub use choose::{Spare, Thing, things};
+pub use choose::Spare;
 pub use kalman::{Belief, Measurement, Motion};
 pub use noise::Scatter;
 pub use sighting::{FrameBlobs, Sighting};
+pub use thing::{Thing, things};
 pub use tracker::{MarkFound, MarkSlot, Tracker};
 pub use tracks::Tracks;
 

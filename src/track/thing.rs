@@ -1,0 +1,86 @@
+//! What lasts in a recording, whatever it is: paths of things of which it is not known yet which are marks.
+
+use super::FrameBlobs;
+use super::choose::{candidates, stretch_of};
+use super::tracklet::link;
+use crate::statistics::{median, median_step_s};
+
+/// A lasting thing in a recording, whatever it is.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Thing {
+    /// Index of its hue.
+    pub hue: u8,
+    /// Share of the frames that show it.
+    pub presence: f64,
+    /// Usual area.
+    pub area_px2: f64,
+    /// Half the range of its motion.
+    pub travel_px: f64,
+    /// It swings.
+    pub moves: bool,
+    /// Position by frame.
+    pub path: Vec<Option<[f64; 2]>>,
+}
+
+impl Thing {
+    /// How much its distance from another changes, as a share of how they move against each other; 1 where they do
+    /// not, or are never seen together.
+    pub fn stretch(&self, other: &Self) -> f64 {
+        stretch_of(&self.path, &other.path, self.travel_px.max(other.travel_px))
+    }
+
+    /// How far it moves against another, as a share of how far both move: next to nothing where one is the other's shadow
+    /// or a part of it, and all of it where one stands still.
+    pub fn moves_against(&self, other: &Self) -> f64 {
+        let apart: Vec<[f64; 2]> = self
+            .path
+            .iter()
+            .zip(&other.path)
+            .filter_map(|(p, q)| p.zip(*q))
+            .map(|(p, q)| [q[0] - p[0], q[1] - p[1]])
+            .collect();
+        let n = apart.len().max(1) as f64;
+        let mean = [0, 1].map(|axis| apart.iter().map(|d| d[axis]).sum::<f64>() / n);
+        let motion_px = apart.iter().map(|d| (d[0] - mean[0]).hypot(d[1] - mean[1])).sum::<f64>() / n;
+        motion_px / self.travel_px.max(other.travel_px).max(f64::MIN_POSITIVE)
+    }
+
+    /// Usual distance from another; `None` where they are never seen together.
+    pub fn distance_px(&self, other: &Self) -> Option<f64> {
+        let apart = |(p, q): (&Option<[f64; 2]>, &Option<[f64; 2]>)| {
+            let (p, q) = (p.as_ref()?, q.as_ref()?);
+            Some((p[0] - q[0]).hypot(p[1] - q[1]))
+        };
+        median(&mut self.path.iter().zip(&other.path).filter_map(apart).collect::<Vec<_>>())
+    }
+
+    /// Where the rarer of the two is seen, the other is as well, more often than not: they are two.
+    pub fn is_seen_beside(&self, other: &Self) -> bool {
+        let seen = |thing: &Self| thing.path.iter().flatten().count();
+        let both = self.path.iter().zip(&other.path).filter(|(p, q)| p.is_some() && q.is_some()).count();
+        2 * both > seen(self).min(seen(other))
+    }
+
+    /// Usual place.
+    pub fn place_px(&self) -> [f64; 2] {
+        [0, 1].map(|axis| median(&mut self.path.iter().flatten().map(|p| p[axis]).collect::<Vec<_>>()).unwrap_or(0.0))
+    }
+}
+
+/// Everything that lasts in these frames.
+pub fn things(window: &[FrameBlobs]) -> Vec<Thing> {
+    let stamps: Vec<f64> = window.iter().map(|frame| frame.t_s).collect();
+    let Some(step_s) = median_step_s(&stamps) else { return Vec::new() };
+    let tracklets = link(window, step_s);
+    candidates(&tracklets, window, None)
+        .into_iter()
+        .map(|c| Thing {
+            hue: c.hue,
+            presence: c.presence,
+            area_px2: c.ln_area.exp(),
+            travel_px: c.travel_px,
+            moves: c.moves,
+            path: c.path,
+        })
+        .collect()
+}
