@@ -56,11 +56,11 @@ impl Target {
     fn accepts(&self, part: &Part) -> bool {
         let [least, most] = self.samples;
         let size = part.points.len();
-        (least..=most).contains(&size) && (!self.round || part.roundness() >= LEAST_ROUNDNESS)
+        (least..=most).contains(&size) && (!self.round || part.shape() >= LEAST_ROUNDNESS)
     }
 }
 
-/// A disc has 1, a black and white target 0.5, a line next to nothing.
+/// A disc has 1, as has a black and white target; a line next to nothing.
 pub(super) const LEAST_ROUNDNESS: f64 = 0.4;
 /// Blobs of one hue that are measured in a frame, the largest ones.
 const MOST_BLOBS: usize = 40;
@@ -82,7 +82,12 @@ pub(super) fn find(
         let silhouette = silhouette(picture, target, part, plane.as_deref());
         let samples = part.points.len() as u32;
         let binary_px = silhouette.centre_px;
-        if let Some(centroid) = centroid::measure(picture, target.axis, &silhouette, channels) {
+        let centroid = match channels {
+            Channels::Chroma => None,
+            _ if part.is_target() => centroid::of_target(picture, &silhouette),
+            _ => None,
+        };
+        if let Some(centroid) = centroid.or_else(|| centroid::measure(picture, target.axis, &silhouette, channels)) {
             blobs.push(Blob { hue: target.hue, centroid, binary_px, samples });
         }
     }

@@ -37,7 +37,7 @@ const STILL_COUNTS: f64 = 0.3;
 pub struct Spot {
     /// Its samples at the trial's level.
     pub part: Part,
-    /// Shape; see [`Part::roundness`].
+    /// Shape; see [`Part::shape`].
     pub roundness: f64,
     /// Something in it moves.
     pub moves: bool,
@@ -295,7 +295,7 @@ fn spots_of(plane: &Plane, mask: &Mask, least: usize, moved: Option<&[bool]>) ->
         let moving = moved.map_or(0, |m| part.points.iter().filter(|p| m[at(p)]).count());
         let top = part.points.iter().map(|p| plane.values[at(p)]).max().unwrap_or(0);
         let summit = Summit { top: 0.0, saddle: 0.0, samples: part.points.len(), moved: moving };
-        Spot { roundness: part.roundness(), moves: summit.moves(), top: to_255(f64::from(top)), part }
+        Spot { roundness: part.shape(), moves: summit.moves(), top: to_255(f64::from(top)), part }
     });
     spots.collect()
 }

@@ -161,6 +161,14 @@ impl Runs {
     }
 }
 
+/// Two opposite quadrants have a roundness of 0.5 and a fill of 0.65; a stretched disc is as little round only from 3.7 : 1
+/// on, and its fill is 1. The bounds lie half way.
+const LEAST_TARGET_ROUNDNESS: f64 = 0.4;
+const MOST_TARGET_ROUNDNESS: f64 = 0.75;
+const MOST_TARGET_FILL: f64 = 0.82;
+/// Of an outline that is a sample off here and there, nearly all samples have their mirror image.
+const LEAST_MIRRORED: f64 = 0.8;
+
 /// One connected region: the columns and rows of its samples.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Part {
@@ -185,6 +193,45 @@ impl Part {
         let n = self.points.len() as f64;
         let squares: f64 = self.points.iter().map(|p| (p[0] as f64 - cx).powi(2) + (p[1] as f64 - cy).powi(2)).sum();
         n / (std::f64::consts::TAU * (squares / n + 1.0 / 6.0))
+    }
+
+    /// How much it looks like a mark, 1 for a disc: [`Part::roundness`], of a target that of the disc which it half fills.
+    pub fn shape(&self) -> f64 {
+        let roundness = self.roundness();
+        if self.is_target() { (2.0 * roundness).min(1.0) } else { roundness }
+    }
+
+    /// Two opposite quadrants of a disc: hollow, and the same when turned by half a turn.
+    pub fn is_target(&self) -> bool {
+        (LEAST_TARGET_ROUNDNESS..MOST_TARGET_ROUNDNESS).contains(&self.roundness())
+            && self.fill() < MOST_TARGET_FILL
+            && self.mirrored_share() > LEAST_MIRRORED
+    }
+
+    /// Area over that of the ellipse with the same second moments: 1 for an ellipse, 0.95 for a rectangle, however long,
+    /// 0.65 for two opposite quadrants.
+    ///
+    /// ```text
+    /// fill = A / (4π √det μ)
+    /// ```
+    fn fill(&self) -> f64 {
+        let [cx, cy] = self.centre();
+        let n = self.points.len() as f64;
+        let moment = |f: &dyn Fn(f64, f64) -> f64| {
+            self.points.iter().map(|p| f(p[0] as f64 - cx, p[1] as f64 - cy)).sum::<f64>() / n
+        };
+        let (xx, yy, xy) =
+            (moment(&|x, _| x * x) + 1.0 / 12.0, moment(&|_, y| y * y) + 1.0 / 12.0, moment(&|x, y| x * y));
+        n / (2.0 * std::f64::consts::TAU * (xx * yy - xy * xy).max(0.0).sqrt())
+    }
+
+    /// Share of its samples whose mirror images through its centre belong to it.
+    fn mirrored_share(&self) -> f64 {
+        let [cx, cy] = self.centre();
+        let own: std::collections::HashSet<[i64; 2]> = self.points.iter().map(|p| p.map(|v| v as i64)).collect();
+        let mirrored =
+            |p: &&[i64; 2]| own.contains(&[(2.0 * cx).round() as i64 - p[0], (2.0 * cy).round() as i64 - p[1]]);
+        own.iter().filter(mirrored).count() as f64 / own.len().max(1) as f64
     }
 
     /// Its samples in the picture.
@@ -268,6 +315,14 @@ mod tests {
         let quadrants = part(|x, y| x.hypot(y) < 20.5 && x * y >= 0.0).roundness();
         // the two lines of samples on the axes belong to it as well
         assert!((quadrants - 0.5).abs() < 0.05, "{quadrants}");
+        assert!(part(|x, y| x.hypot(y) < 20.5 && x * y >= 0.0).shape() > 0.9);
+        assert!(part(|x, y| x.hypot(y) < 20.5 && (x + y) * (x - y) >= 0.0).is_target());
+        let disc_stretched_disc_two_discs: [fn(f64, f64) -> bool; 3] = [
+            |x, y| x.hypot(y) < 20.5,
+            |x, y| (x / 3.0).hypot(y) < 9.0,
+            |x, y| (x - 10.0).hypot(y) < 10.5 || (x + 10.0).hypot(y) < 10.5,
+        ];
+        assert!(!disc_stretched_disc_two_discs.iter().any(|inside| part(inside).is_target()));
         assert!(part(|x, y| x.abs() < 28.0 && y.abs() < 3.0).roundness() < 0.3);
     }
 

@@ -11,6 +11,8 @@
 //! 3. What the band holds beside disc and background is the scatter of each sector; α and the disc are made anew
 //!    with it. So luma counts where one background explains it, and the strip's edge nowhere.
 //!
+//! A target of two dark quadrants is no disc: its centre is that of its [symmetry].
+//!
 //! The variance is that of least squares. Where no disc fits, the centroid is the first moment
 //!
 //! ```text
@@ -26,6 +28,7 @@ mod profile;
 mod rim;
 mod share;
 mod surroundings;
+mod symmetry;
 mod zones;
 
 use super::component::HueAxis;
@@ -38,6 +41,7 @@ use profile::Profile;
 use rim::Rim;
 use share::Share;
 use surroundings::Surroundings;
+pub use symmetry::of_target;
 use zones::Zones;
 
 /// Which channels a mark is measured by.
