@@ -2,6 +2,7 @@
 
 use std::ops::Range;
 
+use super::LEAST_AREA_PX2;
 use super::component::{HueAxis, luma_row};
 use crate::statistics::median;
 use crate::video::{Matrix, Picture};
@@ -173,7 +174,7 @@ impl Album {
     pub fn hues(&self, centre_rad: f64, half_width_rad: f64) -> Vec<HuePeak> {
         let bin_rad = std::f64::consts::TAU / BINS as f64;
         let mut weights = [0.0f64; BINS];
-        let mut samples: Vec<(f64, f64)> = Vec::new();
+        let mut samples: Vec<(f64, f64, bool)> = Vec::new();
         for (n, picture) in self.pictures.iter().enumerate() {
             for at in 0..picture.cb.len() {
                 let [b, r] = picture.chroma(at);
@@ -186,10 +187,11 @@ impl Album {
                 if off.abs() > half_width_rad {
                     continue;
                 }
-                let weight = chroma * if self.moved.get(n).is_none_or(|m| m[at]) { 1.0 } else { STILL_SHARE };
+                let moves = self.moved.get(n).is_none_or(|m| m[at]);
+                let weight = chroma * if moves { 1.0 } else { STILL_SHARE };
                 let bin = ((off / bin_rad).round() as i64).rem_euclid(BINS as i64) as usize;
                 weights[bin] += weight;
-                samples.push((off, weight));
+                samples.push((off, weight, moves));
             }
         }
         let smooth: Vec<f64> =
@@ -201,10 +203,15 @@ impl Album {
             })
             .map(|i| {
                 let middle = turn(i as f64 * bin_rad);
-                let near = samples.iter().filter(|(off, _)| turn(off - middle).abs() < HALF_PEAK_RAD);
-                let (sum, weight) =
-                    near.fold((0.0, 0.0), |(s, w), (off, weight)| (s + weight * turn(off - middle), w + weight));
-                HuePeak { angle_rad: turn(centre_rad + middle + sum / weight.max(1e-9)), weight }
+                let near = || samples.iter().filter(|(off, ..)| turn(off - middle).abs() < HALF_PEAK_RAD);
+                let weight = near().map(|(_, weight, _)| weight).sum();
+                // a wall of nearly the marks' hue does not turn it: where enough moves to be marks, that alone tells
+                let enough = near().filter(|(.., moves)| *moves).count() as f64 * self.sample_px2()
+                    >= LEAST_AREA_PX2 * self.pictures.len() as f64;
+                let telling = near().filter(|(.., moves)| *moves || !enough);
+                let (sum, told) =
+                    telling.fold((0.0, 0.0), |(s, w), (off, weight, _)| (s + weight * turn(off - middle), w + weight));
+                HuePeak { angle_rad: turn(centre_rad + middle + sum / f64::max(told, 1e-9)), weight }
             })
             .collect();
         peaks.sort_by(|a, b| b.weight.total_cmp(&a.weight));
@@ -255,6 +262,21 @@ mod tests {
             (samples.cb[40 * j + 39], samples.cr[40 * j + 39]) = (100, 170);
         }
         samples
+    }
+
+    #[test]
+    fn a_wall_of_nearly_the_marks_hue_does_not_turn_it() {
+        let mut pictures: Vec<Samples> = (0..5).map(|i| picture(6 * i, 68, 193)).collect();
+        for (cb, cr) in pictures.iter_mut().flat_map(|p| p.cb.iter_mut().zip(&mut p.cr)) {
+            if (*cb, *cr) == (128, 128) {
+                (*cb, *cr) = (98, 153);
+            }
+        }
+        let mut album = Album { pictures, ..Album::default() };
+        album.compare();
+        let moving = 65.0f64.atan2(-60.0);
+        let peaks = album.hues(moving, 0.35);
+        assert!(turn(peaks[0].angle_rad - moving).abs() < 0.01, "{peaks:?}");
     }
 
     #[test]

@@ -40,12 +40,17 @@ impl Summit {
 
     /// Something in it moves.
     pub fn moves(&self) -> bool {
-        self.moved >= 2 && self.moved as f64 >= MOVING_SHARE * self.samples as f64
+        moves(self.moved, self.samples)
     }
 
     fn threshold(&self) -> f64 {
         self.saddle + POSITION * self.persistence()
     }
+}
+
+/// So many of some samples move that what they make up does.
+fn moves(moved: usize, samples: usize) -> bool {
+    moved >= 2 && moved as f64 >= MOVING_SHARE * samples as f64
 }
 
 /// The component as a landscape over the samples, as far as it rises above a floor.
@@ -96,9 +101,7 @@ impl<'a> Relief<'a> {
                 (y + 1 < height).then(|| at + width as u32),
             ];
             for neighbour in neighbours.into_iter().flatten() {
-                if let Some(ended) = forest.join(tree, neighbour) {
-                    found.push((ended, level));
-                }
+                found.extend(forest.join(tree, neighbour).into_iter().flatten().map(|ended| (ended, level)));
             }
         }
         found.extend(forest.survivors().map(|tree| (tree, floor)));
@@ -152,6 +155,12 @@ struct Tree {
     moved: usize,
 }
 
+impl Tree {
+    fn moves(&self) -> bool {
+        moves(self.moved, self.samples)
+    }
+}
+
 const ABSENT: u32 = u32::MAX;
 
 impl Forest {
@@ -180,26 +189,52 @@ impl Forest {
         place
     }
 
-    /// Joins a tree with that of a neighbouring sample; returns the lower one, which ends here.
-    fn join(&mut self, tree: u32, neighbour: u32) -> Option<Tree> {
+    /// Joins a tree with that of a neighbouring sample; returns what ends here: the lower one, and the higher one as well
+    /// where it moves and the lower one is the larger and stands still. That is a mark on a wall of its own hue.
+    fn join(&mut self, tree: u32, neighbour: u32) -> [Option<Tree>; 2] {
         let other = self.place[neighbour as usize];
         if other == ABSENT {
-            return None;
+            return [None, None];
         }
         let (ra, rb) = (self.root(tree), self.root(other));
         if ra == rb {
-            return None;
+            return [None, None];
         }
         let (ta, tb) = (self.trees[ra as usize], self.trees[rb as usize]);
         let (high, low, ended) = if ta.top >= tb.top { (ra, rb, tb) } else { (rb, ra, ta) };
         self.parent[low as usize] = high;
-        self.trees[high as usize].samples += ended.samples;
-        self.trees[high as usize].moved += ended.moved;
-        Some(ended)
+        let mark = self.trees[high as usize];
+        let on_wall = mark.moves() && !ended.moves() && ended.samples > mark.samples;
+        let grown = &mut self.trees[high as usize];
+        grown.samples += ended.samples;
+        // what goes on from here is the wall, which stands still
+        grown.moved = if on_wall { 0 } else { mark.moved + ended.moved };
+        [Some(ended), on_wall.then_some(mark)]
     }
 
     fn survivors(&self) -> impl Iterator<Item = Tree> + '_ {
         let roots = self.parent.iter().enumerate().filter(|(place, parent)| *place == **parent as usize);
         roots.map(|(place, _)| self.trees[place])
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_mark_on_a_wall_of_its_own_hue_ends_where_the_wall_begins() {
+        let (width, height) = (160, 120);
+        let inside = |at: usize| (at % width).abs_diff(20) < 6 && (at / width).abs_diff(20) < 6;
+        let code = |at: usize| {
+            if inside(at) { 150.0 + 4.0 * (at % 5) as f64 } else { 70.0 + 3.0 * (0.2 * (at % width) as f64).sin() }
+        };
+        let values: Vec<i16> = (0..width * height).map(|at| from_255(code(at))).collect();
+        let plane = Plane { width, height, level: 0, values };
+        let moved: Vec<bool> = (0..width * height).map(inside).collect();
+        let mut summits = Relief::new(&plane, Some(&moved), LEAST_COMPONENT).summits(3);
+        summits.retain(Summit::moves);
+        let threshold = choose(&[summits], 1, LEAST_COMPONENT).unwrap();
+        assert!(threshold > 80.0 && threshold < 140.0, "{threshold}");
     }
 }
