@@ -370,6 +370,9 @@ fn missing(name: &str, names: &[&str]) -> String {
     if names.iter().all(|n| n.parse::<f64>().is_ok()) {
         return format!("no header, the first row is {list}; put t_s,theta1_rad,theta2_rad above it");
     }
+    if names.contains(&"displacement_px") {
+        return "holds the displacement of one mark and no angle; say where the mark hangs, with --pivot or pivot_px in [rig], and track again".to_owned();
+    }
     let degrees = name.replace("_rad", "_deg");
     if degrees != name && names.contains(&degrees.as_str()) {
         return format!("no column `{name}` but `{degrees}`; multiply it by π/180 and rename it");
@@ -443,6 +446,12 @@ mod tests {
 
     fn swing(t: f64) -> f64 {
         0.3 * (6.0 * t).cos()
+    }
+
+    #[test]
+    fn a_displacement_without_an_angle_is_refused_with_what_to_do() {
+        let refused = refusal("frame,t_s,m1_x_px,m1_y_px,displacement_px,displacement_sd_px\n0,0.0,1.0,1.0,0.1,0.1\n");
+        assert!(refused.contains("--pivot"), "{refused}");
     }
 
     #[test]
