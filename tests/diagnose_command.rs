@@ -238,6 +238,19 @@ fn a_tilted_camera_is_not_told_from_a_side_force_without_a_plumb_line() {
 }
 
 #[test]
+fn a_camera_that_looks_askew_is_named_with_its_stretch_and_its_shear() {
+    let folder = Folder::new();
+    let angles = folder.swing(BASE, "camera_oblique = { stretch = -0.02, shear = 0.03 }\n");
+    let report = folder.diagnosis(&angles, BASE, &[]);
+    assert_eq!(names(&report["verdict"]["effects"]), ["camera_oblique"], "{:#}", report["verdict"]);
+    for (id, true_value) in [("camera_oblique.stretch", -0.02), ("camera_oblique.shear", 0.03)] {
+        let found = &report["candidates"][0]["parameters"][id];
+        let [value, sd] = ["value", "sd"].map(|key| found[key].as_f64().unwrap());
+        assert!((value - true_value).abs() < 4.0 * sd && sd < 1e-3, "{id}: {found}");
+    }
+}
+
+#[test]
 fn one_link_is_diagnosed_alone_and_together_with_another_recording_of_it() {
     let folder = Folder::new();
     let first = folder.swing(ONE_LINK, "hinge_coulomb = 4e-3\n");

@@ -59,6 +59,7 @@ impl<'a> FitContext<'a> {
             beliefs: &mut beliefs,
             experiment: &mut experiment,
             yield_rad: self.yield_rad(),
+            view: self.settings.prior.view,
             rods: self.fine_strip.unwrap_or(CANDIDATE_RODS),
         };
         hypothesis.effects.iter().for_each(|effect| effect.set_up(&mut set_up));

@@ -18,6 +18,8 @@ pub enum Effect {
     CameraTilt,
     /// A common gain of the angles.
     AngleGain,
+    /// A camera that looks at the plane of the swing askew.
+    CameraOblique,
     /// θ₂ is sampled later than θ₁.
     DifferentialLag,
     /// Viscous friction of the hinge.
@@ -176,6 +178,8 @@ pub struct SetUp<'s> {
     pub experiment: &'s mut Experiment,
     /// A yield angle to expect, and its standard deviation.
     pub yield_rad: (f64, f64),
+    /// Standard deviation of the stretch and of the shear of a view to expect.
+    pub view: f64,
     /// Rods between two marks of a strip.
     pub rods: usize,
 }
@@ -196,6 +200,12 @@ impl SetUp<'_> {
         let (yield_rad, sd) = self.yield_rad;
         self.beliefs.push(Belief { parameter: Parameter::HysteresisYield, value: yield_rad, sd });
         self.experiment.model.effects.joint_hysteretic = Some(Hysteresis { torque_n_m: 0.0, yield_rad });
+    }
+
+    /// A camera looks askew by no more than its owner fails to see.
+    fn looks_askew(&mut self) {
+        let of = |parameter| Belief { parameter, value: 0.0, sd: self.view };
+        self.beliefs.extend([Parameter::ViewStretch, Parameter::ViewShear].map(of));
     }
 }
 
@@ -234,7 +244,7 @@ const fn velocity(entry: Entry) -> Entry {
 }
 
 /// The table, those of the camera first: an error of measurement is not to be blamed on physics.
-static TABLE: [Entry; 17] = {
+static TABLE: [Entry; 18] = {
     use Acts::{Loss, Motion, Otherwise, Pace};
     use Parameter as P;
     use Place::{Air, Camera, Hinge, Joint};
@@ -249,8 +259,18 @@ static TABLE: [Entry; 17] = {
             &[P::AngleGain],
             Camera,
             Otherwise,
-            "a common gain of the angles (oblique view, pixels that are not square)",
+            "a common gain of the angles (a sensor's scale; of small swings, a view askew)",
         )),
+        Entry {
+            id: "camera_oblique",
+            set_up: |problem| problem.looks_askew(),
+            ..position(entry(
+                &[P::ViewStretch, P::ViewShear],
+                Camera,
+                Otherwise,
+                "a camera that looks askew (oblique view, pixels that are not square)",
+            ))
+        },
         Entry {
             needs: Needs::Joint,
             ..velocity(entry(
@@ -314,11 +334,12 @@ static TABLE: [Entry; 17] = {
 
 impl Effect {
     /// Every effect, in the order of the table.
-    pub const ALL: [Self; 17] = [
+    pub const ALL: [Self; 18] = [
         Self::TimeBase,
         Self::DroppedFrames,
         Self::CameraTilt,
         Self::AngleGain,
+        Self::CameraOblique,
         Self::DifferentialLag,
         Self::HingeViscous,
         Self::HingeCoulomb,
@@ -439,6 +460,7 @@ mod tests {
             "dropped_frames",
             "camera_tilt",
             "angle_gain",
+            "camera_oblique",
             "differential_lag",
             "hinge_viscous",
             "hinge_coulomb",

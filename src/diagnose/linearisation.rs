@@ -15,7 +15,7 @@ use super::effect::Place;
 use super::refit::Refit;
 use crate::fit::whitening::Whitening;
 use crate::model::observe::{chord_angles_rad, chord_slopes};
-use crate::model::{Chain, ForwardModel, Hinge, Motion, Parameter, Partials, Trajectory};
+use crate::model::{Camera, Chain, ForwardModel, Hinge, Motion, Parameter, Partials, Trajectory};
 
 /// The swing goes on by at most this much while the matrix is held: with more, the linear motion would grow of its own.
 const HELD_RAD: f64 = 0.3;
@@ -98,8 +98,8 @@ impl Linearisation {
         let prediction = problem.predict(record, &fit.x, false).ok()?;
         let (model, swing, true_s) = fit.motion(record)?;
         let chain = model.chain();
-        let gain = 1.0 + fit.value(Parameter::AngleGain).unwrap_or(0.0);
-        let mut rows: Vec<Row> = true_s.iter().map(|t| row(chain, &swing, *t, gain)).collect();
+        let (_, camera) = problem.model(record, &fit.x[..problem.free.len()]).ok()?;
+        let mut rows: Vec<Row> = true_s.iter().map(|t| row(chain, &swing, *t, &camera)).collect();
         for value in &prediction.values {
             let sd_rad = problem.sd_rad(record, value.link, value.row);
             let row = &mut rows[value.row];
@@ -246,20 +246,17 @@ impl Linearisation {
     }
 }
 
-fn row(chain: &Chain, swing: &Trajectory, t_s: f64, gain: f64) -> Row {
+fn row(chain: &Chain, swing: &Trajectory, t_s: f64, camera: &Camera) -> Row {
     let state = swing.at(t_s);
-    let observed = chord_slopes(chain, &state.theta_rad) * gain;
+    let chord_rad = chord_angles_rad(chain, &state.theta_rad);
+    let mut observed = chord_slopes(chain, &state.theta_rad);
+    for (mut of_mark, theta_rad) in observed.row_iter_mut().zip(&chord_rad) {
+        of_mark *= camera.seen_slope(*theta_rad);
+    }
     let marks = observed.nrows();
     let mut rate = state.omega_rad_s;
     rate.extend(state.hidden);
-    Row {
-        chord_rad: chord_angles_rad(chain, &state.theta_rad),
-        theta_rad: state.theta_rad,
-        rate,
-        observed,
-        left_rad: vec![None; marks],
-        sd_rad: vec![1.0; marks],
-    }
+    Row { chord_rad, theta_rad: state.theta_rad, rate, observed, left_rad: vec![None; marks], sd_rad: vec![1.0; marks] }
 }
 
 /// The instant of a motion, with its accelerations.

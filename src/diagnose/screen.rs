@@ -105,20 +105,25 @@ impl<'g, 'a> Screen<'g, 'a> {
         if let (Some(law), Some(yield_rad)) = (&mut problem.experiment.model.effects.joint_hysteretic, yield_rad) {
             law.yield_rad = yield_rad;
         }
-        // only the first coefficient of each counts; the rest of a law keeps its value
-        let first: Vec<Parameter> = effects.iter().map(|c| c.parameters()[0]).collect();
+        // only the coefficients in proportion to which it acts count; the rest of a law keeps its value
+        let of = |effect: &Effect| effect.parameters().iter().copied().filter(|p| p.is_proportional());
         let own = &self.fit.problem;
-        problem.free = own.free.iter().copied().chain(first.iter().copied()).collect();
+        problem.free = own.free.iter().copied().chain(effects.iter().flat_map(of)).collect();
         problem.dropped_at_s.clone_from(&own.dropped_at_s);
-        let (free, added) = (own.free.len(), first.len());
+        // residuals are those of the fit: what is known of a further coefficient is none of them
+        problem.beliefs.clone_from(&own.beliefs);
+        let free = own.free.len();
         let mut x = self.fit.x[..free].to_vec();
-        x.extend(vec![0.0; added]);
+        x.resize(problem.free.len(), 0.0);
         x.extend_from_slice(&self.fit.x[free..]);
         let blocks = problem.blocks(&x)?;
         let (_, slopes) = crate::fit::problem::stacked(&blocks, x.len());
-        let scored = effects.iter().enumerate().filter_map(|(k, effect)| {
-            let column = slopes.columns(free + k, 1).into_owned();
-            self.score(*effect, column, &first[k..=k], None)
+        let mut first = free;
+        let scored = effects.iter().filter_map(|effect| {
+            let own: Vec<Parameter> = of(effect).collect();
+            let columns = slopes.columns(first, own.len()).into_owned();
+            first += own.len();
+            self.score(*effect, columns, &own, None)
         });
         Some(scored.collect())
     }

@@ -210,6 +210,8 @@ pub struct PriorSettings {
     pub yields: f64,
     /// Of a support's frequency, over the swing's.
     pub frequencies: f64,
+    /// Standard deviation of the stretch and of the shear of a view: half the square of the angle by which it is askew (judgement: set up by eye, to some 20°).
+    pub view: f64,
     /// Coefficients of less than this many standard deviations are not told from zero (statistics).
     pub told_from_zero: f64,
     /// From this variance on, over the noise's, a fall of χ² counts instead of a standard deviation (training bank).
@@ -386,6 +388,7 @@ impl Default for PriorSettings {
             sizes: 9.2,
             yields: 3.4,
             frequencies: 10.0,
+            view: 0.06,
             told_from_zero: 1.5,
             much_left: 4.0,
             none: 0.25,

@@ -200,8 +200,16 @@ fn to_decide(effects: &[Effect], class: &[Effect], marks: usize) -> Option<Strin
     ]) {
         advice.push("release it at twice the angle and record until it is at rest: the losses differ in how they fall with amplitude");
     }
-    if has(&[Effect::AngleGain, Effect::JointCubicStiffness, Effect::RestCurl, Effect::AddedMass]) {
-        advice.push("film a grid in the plane of the swing, which fixes the gain of the angles");
+    if has(&[
+        Effect::AngleGain,
+        Effect::CameraOblique,
+        Effect::JointCubicStiffness,
+        Effect::RestCurl,
+        Effect::AddedMass,
+    ]) {
+        advice.push(
+            "film a grid in the plane of the swing, which fixes the gain of the angles and from where the camera looks",
+        );
     }
     if has(&[Effect::DifferentialLag, Effect::DroppedFrames, Effect::TimeBase]) {
         advice.push("film a running clock beside the strip");

@@ -28,6 +28,16 @@ pub struct SupportMotion {
     pub phase_rad: f64,
 }
 
+/// A camera that looks at the plane of the swing askew: tan φ = (1 + s) sin θ / (cos θ + b sin θ).
+#[derive(Debug, Clone, Copy, Default, PartialEq, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct ObliqueView {
+    /// s (1).
+    pub stretch: f64,
+    /// b (1).
+    pub shear: f64,
+}
+
 /// The physics beyond springs, dampers and gravity, by identifier. Absent means off.
 #[derive(Debug, Clone, Default, PartialEq, Deserialize)]
 #[serde(default, deny_unknown_fields)]
@@ -64,6 +74,8 @@ pub struct Effects {
     pub camera_tilt: Option<f64>,
     /// Common gain of both angles (1).
     pub angle_gain: Option<f64>,
+    /// A camera that looks askew.
+    pub camera_oblique: Option<ObliqueView>,
     /// θ₂ sampled later than θ₁ (s).
     pub differential_lag: Option<f64>,
 }
@@ -139,6 +151,8 @@ impl Effects {
             ("joint_hysteretic.yield_rad", self.joint_hysteretic.map(|h| h.yield_rad)),
             ("support_motion.frequency_hz", self.support_motion.map(|s| s.frequency_hz)),
             ("distributed_flexibility", self.distributed_flexibility),
+            // of a plane that is seen from its edge or from behind nothing is told
+            ("camera_oblique: 1 + stretch", self.camera_oblique.map(|view| 1.0 + view.stretch)),
         ] {
             checked(id, value, positive)?;
         }
@@ -151,6 +165,7 @@ impl Effects {
             ("dropped_frames", self.dropped_frames),
             ("camera_tilt", self.camera_tilt),
             ("angle_gain", self.angle_gain),
+            ("camera_oblique.shear", self.camera_oblique.map(|view| view.shear)),
             ("differential_lag", self.differential_lag),
         ] {
             checked(id, value, finite)?;

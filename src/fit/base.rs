@@ -37,6 +37,8 @@ pub fn base_parameters(experiment: &Experiment, marks: usize) -> Vec<Parameter> 
         (effects.time_base, Parameter::TimeBase),
         (effects.camera_tilt, Parameter::CameraTilt),
         (effects.angle_gain, Parameter::AngleGain),
+        (effects.camera_oblique.map(|view| view.stretch), Parameter::ViewStretch),
+        (effects.camera_oblique.map(|view| view.shear), Parameter::ViewShear),
         (effects.differential_lag, Parameter::DifferentialLag),
     ];
     let named = named.into_iter().filter_map(|(value, parameter)| value.map(|_| parameter));

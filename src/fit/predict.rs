@@ -87,13 +87,13 @@ pub fn predict(model: &ForwardModel, request: &Request<'_>) -> Result<Prediction
             row_slopes.fill(0.0);
             let (theta, omega) = seen(chain, &swing, camera.true_time_s(t_s, link), link, &mut row_slopes)
                 .ok_or_else(|| Error::Simulation { detail: "a motion of no length".into() })?;
-            let gain = 1.0 + camera.gain;
-            row_slopes.iter_mut().for_each(|s| *s *= gain);
+            let seen_slope = camera.seen_slope(theta);
+            row_slopes.iter_mut().for_each(|s| *s *= seen_slope);
             for (column, parameter) in parameters.iter().enumerate().take(columns) {
                 row_slopes[column] += camera.slope(*parameter, t_s, link, theta, omega);
             }
             flat.extend_from_slice(&row_slopes);
-            values.push(Value { link, row, predicted_rad: camera.seen_rad(theta), rate_rad_s: gain * omega });
+            values.push(Value { link, row, predicted_rad: camera.seen_rad(theta), rate_rad_s: seen_slope * omega });
         }
     }
     let slopes = DMatrix::from_row_slice(values.len(), columns, &flat);
@@ -159,12 +159,8 @@ fn end_of(
     slopes.rows_mut(marks, marks).copy_from(&(&along * rate.rows(0, n)));
     // the camera's clock moves the instant itself
     for (column, parameter) in request.parameters.iter().enumerate() {
+        let moved = camera.true_time_slope(*parameter, request.until_s, 0);
         for link in 0..marks {
-            let clock = Camera { gain: 0.0, ..*camera };
-            let moved = match parameter {
-                Parameter::TimeBase | Parameter::DroppedFrames => clock.slope(*parameter, request.until_s, 0, 0.0, 1.0),
-                _ => 0.0,
-            };
             let acceleration: f64 = (0..n).map(|i| along[(link, i)] * instant.acceleration[i]).sum();
             slopes[(link, column)] += moved * values[marks + link];
             slopes[(marks + link, column)] += moved * acceleration;

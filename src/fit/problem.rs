@@ -134,13 +134,8 @@ impl<'a> Problem<'a> {
         let mut lower = vec![f64::NEG_INFINITY; self.variables()];
         let stated: Vec<(Parameter, f64)> = self.experiment.model.law.iter().flat_map(least_values).collect();
         for (bound, parameter) in lower.iter_mut().zip(&self.free) {
-            if let Some((_, least)) = stated.iter().find(|(stated, _)| stated == parameter) {
-                *bound = *least;
-            }
-            if parameter.is_not_negative() {
-                // a yield angle or a frequency of zero has no meaning
-                *bound = if parameter.is_proportional() { 0.0 } else { 1e-4 };
-            }
+            let of_law = stated.iter().find(|(stated, _)| stated == parameter);
+            *bound = of_law.map_or(parameter.least(), |(_, least)| *least);
         }
         lower
     }
@@ -342,6 +337,9 @@ fn switch_on(experiment: &mut Experiment, parameter: Parameter) {
         Parameter::DroppedFrames => on(&mut effects.dropped_frames),
         Parameter::CameraTilt => on(&mut effects.camera_tilt),
         Parameter::AngleGain => on(&mut effects.angle_gain),
+        Parameter::ViewStretch | Parameter::ViewShear => {
+            effects.camera_oblique.get_or_insert_default();
+        }
         Parameter::DifferentialLag => on(&mut effects.differential_lag),
     }
 }

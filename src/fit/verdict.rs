@@ -19,6 +19,8 @@ const CROSSING: f64 = 3.0;
 /// Errors of a clock and of a scale that a camera may have.
 const CLOCK: f64 = 0.05;
 const GAIN: f64 = 0.3;
+/// A camera set up by eye before a swing looks no further askew than half a right angle: a stretch or a shear of about as much as this.
+const VIEW: f64 = 0.3;
 
 /// Why a residual without a misfit is no proof that the model reproduces the recording.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -178,7 +180,13 @@ impl Verdict {
                 let value = fit.estimate(parameter)?.value;
                 (value.abs() > most).then_some(Doubt::Implausible { id: parameter.id(), value })
             };
-            far(Parameter::TimeBase, CLOCK).or_else(|| far(Parameter::AngleGain, GAIN))
+            let likely = [
+                (Parameter::TimeBase, CLOCK),
+                (Parameter::AngleGain, GAIN),
+                (Parameter::ViewStretch, VIEW),
+                (Parameter::ViewShear, VIEW),
+            ];
+            likely.into_iter().find_map(|(parameter, most)| far(parameter, most))
         };
         Self { doubt: verdict.doubt.or(of_fit).or_else(implausible), ..verdict }
     }

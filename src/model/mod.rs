@@ -19,6 +19,7 @@
 //! | [`observe`] | the angles between marks |
 //! | `rest` | the chain at rest |
 //! | [`camera`] | what a camera makes of them |
+//! | [`view`] | of these, a camera that looks askew |
 //! | [`modes`] | small vibrations: frequencies, damping ratios, shapes |
 //! | [`strip`] | the strip as a beam in gravity, by finite elements |
 //! | [`light`] | the pressure of light |
@@ -47,6 +48,7 @@ pub mod strip;
 #[cfg(test)]
 mod tests;
 pub mod trajectory;
+pub mod view;
 pub mod work;
 
 pub use camera::Camera;

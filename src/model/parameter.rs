@@ -88,6 +88,10 @@ pub enum Parameter {
     CameraTilt,
     /// Common gain of the angles.
     AngleGain,
+    /// s of a view askew.
+    ViewStretch,
+    /// b of a view askew.
+    ViewShear,
     /// θ₂ is sampled later than θ₁.
     DifferentialLag,
     /// Of a law that the file states.
@@ -122,6 +126,8 @@ impl Parameter {
             Self::DroppedFrames => "dropped_frames",
             Self::CameraTilt => "camera_tilt",
             Self::AngleGain => "angle_gain",
+            Self::ViewStretch => "camera_oblique.stretch",
+            Self::ViewShear => "camera_oblique.shear",
             Self::DifferentialLag => "differential_lag",
             Self::Law(coefficient) => coefficient.id,
         }
@@ -143,7 +149,7 @@ impl Parameter {
             Self::SupportSine | Self::SupportCosine | Self::Link(_, OfLink::Com | OfLink::Length) => "m",
             Self::Link(_, OfLink::Inertia) => "kg m2",
             Self::SupportFrequency => "Hz",
-            Self::TimeBase | Self::AngleGain => "1",
+            Self::TimeBase | Self::AngleGain | Self::ViewStretch | Self::ViewShear => "1",
             Self::DroppedFrames | Self::DifferentialLag => "s",
             Self::Law(coefficient) => coefficient.unit,
         }
@@ -185,6 +191,8 @@ impl Parameter {
             | Self::DroppedFrames
             | Self::CameraTilt
             | Self::AngleGain
+            | Self::ViewStretch
+            | Self::ViewShear
             | Self::DifferentialLag
             | Self::Law(_) => false,
             Self::JointStiffness
@@ -203,8 +211,20 @@ impl Parameter {
         }
     }
 
+    /// The least value that it may take in a fit.
+    pub fn least(self) -> f64 {
+        match self {
+            // seen from its edge, a plane is a line
+            Self::ViewStretch => -0.99,
+            // a yield angle or a frequency of zero has no meaning
+            Self::HysteresisYield | Self::SupportFrequency => 1e-4,
+            other if other.is_not_negative() => 0.0,
+            _ => f64::NEG_INFINITY,
+        }
+    }
+
     /// Every parameter but those of links and of stated laws.
-    pub const ALL: [Self; 22] = [
+    pub const ALL: [Self; 24] = [
         Self::JointStiffness,
         Self::JointDamping,
         Self::RestCurl,
@@ -226,6 +246,8 @@ impl Parameter {
         Self::DroppedFrames,
         Self::CameraTilt,
         Self::AngleGain,
+        Self::ViewStretch,
+        Self::ViewShear,
         Self::DifferentialLag,
     ];
 }

@@ -1,5 +1,7 @@
 //! The model's motion, and where the camera sees the marks.
 
+use std::f64::consts::FRAC_PI_2;
+
 use crate::error::Result;
 use crate::experiment::Experiment;
 use crate::model::observe::chord_angles_rad;
@@ -49,6 +51,11 @@ impl Swing {
 
     /// φ at a stamp, top to bottom: what a perfect measurement reads.
     pub fn angles_rad(&self, t_s: f64) -> Vec<f64> {
+        self.true_angles_rad(t_s).into_iter().map(|theta_rad| self.camera.seen_rad(theta_rad)).collect()
+    }
+
+    /// θ at the instants at which the camera saw it.
+    fn true_angles_rad(&self, t_s: f64) -> Vec<f64> {
         let chords = |t_s: f64| chord_angles_rad(self.model.chain(), &self.trajectory.at(t_s).theta_rad);
         let times = |link: usize| self.camera.true_time_s(t_s, link);
         let upper = chords(times(0));
@@ -57,21 +64,24 @@ impl Swing {
             Some(angles) if i > 0 => angles[i],
             _ => upper[i],
         };
-        (0..self.lengths_m.len()).map(|i| self.camera.seen_rad(theta(i))).collect()
+        (0..self.lengths_m.len()).map(theta).collect()
     }
 
     /// The hinge, the joints and the tip at a stamp, in the undistorted picture.
     pub fn nodes_px(&self, t_s: f64) -> Vec<[f64; 2]> {
         let pivot_px = self.scale_px_per_m * self.model.pivot_m(self.camera.true_time_s(t_s, 0));
         let side = if self.mirrored { -1.0 } else { 1.0 };
-        let mut node = [
-            self.hinge_px[0] + side * pivot_px * self.camera.tilt_rad.cos(),
-            self.hinge_px[1] - pivot_px * self.camera.tilt_rad.sin(),
-        ];
+        let view = self.camera.view;
+        let beside = |node: [f64; 2], length_px: f64, angle_rad: f64| {
+            [node[0] + side * length_px * angle_rad.sin(), node[1] + length_px * angle_rad.cos()]
+        };
+        // the pivot moves level, whatever the gain of the angles
+        let level_rad = view.angle_rad(FRAC_PI_2) + self.camera.tilt_rad;
+        let mut node = beside(self.hinge_px, pivot_px * view.length(FRAC_PI_2), level_rad);
         let mut nodes = vec![node];
-        for (length_m, angle_rad) in self.lengths_m.iter().zip(self.angles_rad(t_s)) {
-            let length_px = length_m * self.scale_px_per_m;
-            node = [node[0] + side * length_px * angle_rad.sin(), node[1] + length_px * angle_rad.cos()];
+        for (length_m, theta_rad) in self.lengths_m.iter().zip(self.true_angles_rad(t_s)) {
+            let length_px = length_m * self.scale_px_per_m * view.length(theta_rad);
+            node = beside(node, length_px, self.camera.seen_rad(theta_rad));
             nodes.push(node);
         }
         nodes
@@ -91,6 +101,7 @@ impl Swing {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::experiment::ObliqueView;
 
     fn short() -> Experiment {
         let mut experiment = Experiment::default();
@@ -115,6 +126,18 @@ mod tests {
         let mirrored = Swing::of(&experiment).unwrap().nodes_px(0.2);
         for (p, m) in plain.iter().zip(&mirrored) {
             assert!((p[0] + m[0] - 1280.0).abs() < 1e-9 && p[1] == m[1]);
+        }
+    }
+
+    #[test]
+    fn a_camera_that_looks_askew_maps_the_whole_plane() {
+        let mut experiment = short();
+        let plain = Swing::of(&experiment).unwrap().nodes_px(0.2);
+        experiment.model.effects.camera_oblique = Some(ObliqueView { stretch: -0.05, shear: 0.1 });
+        let askew = Swing::of(&experiment).unwrap().nodes_px(0.2);
+        for (p, a) in plain.iter().zip(&askew) {
+            let [x, y] = [p[0] - 640.0, p[1] - 96.0];
+            assert!((a[0] - 640.0 - 0.95 * x).abs() < 1e-9 && (a[1] - 96.0 - (y + 0.1 * x)).abs() < 1e-9, "{a:?}");
         }
     }
 

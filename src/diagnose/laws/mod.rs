@@ -6,12 +6,14 @@
 //! | [`missing_frames`] | at which instant frames are missing |
 //! | [`moving_support`] | at which frequency a support moves |
 //! | [`hysteresis`] | where its fit starts |
+//! | `oblique_view` | a camera that looks askew, with its stretch and its shear |
 //! | [`bending`] | a strip that bends everywhere, as finely as it needs |
 
 pub mod bending;
 pub mod hysteresis;
 pub mod missing_frames;
 pub mod moving_support;
+mod oblique_view;
 mod ordinary;
 
 use rayon::prelude::*;
@@ -92,6 +94,7 @@ pub fn law_of(effect: Effect) -> &'static dyn Law {
     match effect {
         Effect::DroppedFrames => &missing_frames::MissingFrames,
         Effect::SupportMotion => &moving_support::MovingSupport,
+        Effect::CameraOblique => &oblique_view::ObliqueView,
         Effect::JointHysteretic => &hysteresis::Hysteresis,
         Effect::DistributedFlexibility => &bending::Bending,
         _ => &ordinary::Ordinary,

@@ -1,0 +1,34 @@
+//! A camera that looks askew: a stretch and a shear of the picture.
+//!
+//! Turned aside by α and down by β, both small, it has s = (β² − α²)/2 and b = αβ: half the square of α + iβ but for signs. If no direction of α + iβ is likelier
+//! than another, none of (s, b) is: so the size is ρ = √(s² + b²), and the direction any.
+
+use super::super::effect::Effect;
+use super::super::refit::Refit;
+use super::super::settings::PriorSettings;
+use super::ordinary::Ordinary;
+use super::{Coefficients, Law, Sought};
+use crate::model::Parameter;
+
+/// The law.
+pub struct ObliqueView;
+
+impl Law for ObliqueView {
+    fn beside<'a>(&self, sought: &Sought<'_, 'a>) -> Option<Refit<'a>> {
+        Ordinary.beside(sought)
+    }
+
+    /// ρ, as many standard deviations from zero as the stretch or the shear.
+    fn strength(&self, _effect: Effect, of: &Coefficients<'_>) -> Option<(f64, f64)> {
+        let ((stretch, of_stretch), (shear, of_shear)) = (of(Parameter::ViewStretch), of(Parameter::ViewShear));
+        let size = stretch.hypot(shear);
+        let deviations = (stretch / of_stretch).abs().max((shear / of_shear).abs());
+        Some((size, size / deviations.max(f64::MIN_POSITIVE)))
+    }
+
+    /// Any direction.
+    fn ln_kinds(&self, _fit: &Refit<'_>, effect: Effect, of: &Coefficients<'_>, _settings: &PriorSettings) -> f64 {
+        let size = self.strength(effect, of).map_or(0.0, |strength| strength.0);
+        (std::f64::consts::TAU * size).ln()
+    }
+}
