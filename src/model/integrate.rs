@@ -62,7 +62,7 @@ pub(super) fn integrate(
     let mut run = Run::new(model, place, directions, accuracy)?;
     let columns = run.slopes.as_ref().map_or(0, |(theta, _)| theta.ncols());
     let ended = run.go_to(until_s, visit);
-    model.work().add(run.steps, model.rates(), columns);
+    model.work().add(run.steps, (model.rates(), run.balance.rates()), columns);
     ended
 }
 

@@ -3,7 +3,7 @@
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 
-/// A step's work beside that for each pair of rates, which is 1.
+/// A step's work beside that for each pair of a rate and a coordinate's rate, which is 1.
 const OF_STEP: u64 = 12;
 /// Derivatives in so many directions cost as much as the step itself.
 const DIRECTIONS_PER_STEP: u64 = 4;
@@ -15,9 +15,10 @@ const DIRECTIONS_PER_STEP: u64 = 4;
 pub struct Work(Arc<AtomicU64>);
 
 impl Work {
-    /// Adds an integration's steps, of so many rates, with derivatives in so many directions.
-    pub fn add(&self, steps: usize, rates: usize, directions: usize) {
-        let (steps, pairs) = (steps as u64, (rates * rates) as u64);
+    /// Adds an integration's steps, of so many rates of links and laws sought by so many along coordinates (fewer where a strip is a sum of shapes), with
+    /// derivatives in so many directions.
+    pub fn add(&self, steps: usize, (rates, sought): (usize, usize), directions: usize) {
+        let (steps, pairs) = (steps as u64, (rates * sought) as u64);
         self.0.fetch_add(steps * (OF_STEP + pairs) * (1 + directions as u64 / DIRECTIONS_PER_STEP), Ordering::Relaxed);
     }
 
