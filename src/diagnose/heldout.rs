@@ -3,11 +3,13 @@
 use rayon::prelude::*;
 
 use super::context::{FitContext, without_errors_in_step};
+use super::effect::Effect;
 use super::hypothesis::Hypothesis;
 use super::misfit::{is_beyond_noise, leaves_more_than_noise};
-use super::posterior::{Posterior, weigh};
+use super::posterior::{Candidate, Posterior, weigh};
 use super::refit::Refit;
 use super::search::horizon::continued_alone;
+use crate::experiment::Law;
 use crate::fit::{Belief, Problem, Record, Residuals, recordings, residuals_of};
 
 /// A frozen coefficient may move by this part of itself.
@@ -33,13 +35,33 @@ pub struct Prediction {
     pub rmse_rad: Vec<f64>,
     /// What is left of the whole recording, where a part of it was fitted.
     pub left: Option<Residuals>,
+    /// By how many standard deviations what was fitted told the amplitude of each law of the file from zero.
+    pub told: Vec<f64>,
 }
 
 impl HeldOut {
-    /// What the names leave, as a part of what the base model leaves: root mean squares of all angles.
+    /// What the names leave, as a part of what the base model leaves.
     pub fn leaves(&self) -> f64 {
-        let square = |of: &Prediction| of.rmse_rad.iter().map(|r| r * r).sum::<f64>();
-        (square(&self.augmented) / square(&self.baseline).max(1e-300)).sqrt()
+        self.augmented.over(&self.baseline)
+    }
+}
+
+impl Prediction {
+    /// Of nothing yet, from what was fitted.
+    fn from(fitted: &Refit<'_>, laws: &[Law]) -> Self {
+        let variance = (fitted.chi2 / fitted.values().max(1) as f64).max(1.0);
+        let deviations = |law: &Law| {
+            let (amplitude, _) = law.coefficients().next()?;
+            let sd = (variance * fitted.covariance(&[amplitude]).get((0, 0))?).sqrt();
+            Some(fitted.value(amplitude)?.abs() / sd)
+        };
+        Self { rmse_rad: Vec::new(), left: None, told: laws.iter().map(|law| deviations(law).unwrap_or(0.0)).collect() }
+    }
+
+    /// What it leaves, as a part of what another one does: root mean squares of all angles.
+    pub fn over(&self, other: &Self) -> f64 {
+        let square = |of: &Self| of.rmse_rad.iter().map(|r| r * r).sum::<f64>();
+        (square(self) / square(other).max(1e-300)).sqrt()
     }
 }
 
@@ -57,7 +79,7 @@ pub fn borne_out<'a>(
     let best = posterior.best();
     let fewer = (best.hypothesis.effects.len() > most && is_beyond_noise(best, &settings.noise)).then(|| {
         let few = fits.into_iter().filter(|fit| fit.hypothesis.effects.len() <= most);
-        weigh(few.collect(), effects, settings)
+        weigh(few.collect(), effects, posterior.compared, settings)
     });
     let named: Vec<&Refit<'a>> = std::iter::once(&posterior).chain(&fewer).map(Posterior::best).collect();
     let mut proofs = held_out(context, posterior.base(), &named, from_s).into_iter();
@@ -66,6 +88,34 @@ pub fn borne_out<'a>(
     match (fewer, proofs.next().flatten()) {
         (Some(fewer), other) if leaves(&proof) > settings.verdict.borne_out * leaves(&other) => (fewer, other),
         _ => (posterior, proof),
+    }
+}
+
+/// The posterior led by the effects that are more probable than not each by itself, where a law that was learnt has put one of them in the place of a name; and
+/// its proof.
+pub fn led_by_likely<'a>(
+    context: &FitContext<'a>,
+    posterior: Posterior<'a>,
+    proof: Option<HeldOut>,
+    from_s: Option<f64>,
+) -> (Posterior<'a>, Option<HeldOut>) {
+    let inclusions = posterior.inclusions(context.settings);
+    let likely: Vec<Effect> =
+        inclusions.iter().filter(|own| own.1 > context.settings.verdict.even).map(|own| own.0).collect();
+    let is_meant = |candidate: &Candidate<'_>| {
+        let effects = &candidate.fit.hypothesis.effects;
+        let is_of_likely = effects.len() == likely.len() && effects.iter().all(|effect| likely.contains(effect));
+        is_of_likely && candidate.ln_posterior.is_finite()
+    };
+    let is_new = |effect: &Effect| !posterior.best().hypothesis.has(*effect);
+    let takes_a_place = !posterior.needed.is_empty() && likely.iter().any(is_new);
+    match posterior.candidates.iter().position(is_meant).filter(|_| takes_a_place) {
+        Some(place) => {
+            let posterior = posterior.led_by(place);
+            let proof = held_out(context, posterior.base(), &[posterior.best()], from_s).into_iter().next().flatten();
+            (posterior, proof)
+        }
+        None => (posterior, proof),
     }
 }
 
@@ -147,7 +197,8 @@ fn along(context: &FitContext<'_>, fit: &Refit<'_>, rows: usize) -> Option<Predi
     let refitted = grown.into_iter().chain([refitted]).min_by(|a, b| a.chi2.total_cmp(&b.chi2))?;
     let whole = context.problem(&fit.hypothesis, &fit.problem.noise).ok()?;
     let rmse_rad = errors(&whole.predict(0, &refitted.x, false).ok()?.values, record, rows)?;
-    Some(Prediction { rmse_rad, left: residuals_of(&whole, &refitted.x, 0).ok() })
+    let left = residuals_of(&whole, &refitted.x, 0).ok();
+    Some(Prediction { rmse_rad, left, ..Prediction::from(&refitted, &context.laws) })
 }
 
 /// The pieces up to the border are fitted; from the last of them on all is predicted as one motion.
@@ -168,7 +219,7 @@ fn beyond(context: &FitContext<'_>, fit: &Refit<'_>, pieces: usize) -> Option<Pr
     let rmse_rad = errors(&problem.predict(0, &x, false).ok()?.values, &rest[0], context.records[last].len())?;
     let before = (0..last).map(|piece| fitted.residuals(piece));
     let left = before.chain([residuals_of(&problem, &x, 0).ok()]).collect::<Option<_>>().and_then(Residuals::joined);
-    Some(Prediction { rmse_rad, left })
+    Some(Prediction { rmse_rad, left, ..Prediction::from(&fitted, &context.laws) })
 }
 
 fn across(context: &FitContext<'_>, fit: &Refit<'_>, last: usize) -> Option<Prediction> {
@@ -193,7 +244,7 @@ fn across(context: &FitContext<'_>, fit: &Refit<'_>, last: usize) -> Option<Pred
     let hypothesis = Hypothesis { dropped: None, ..hypothesis };
     let seen = alone.refit(&hypothesis, &begun, &[])?;
     let rmse_rad = errors(&seen.problem.predict(0, &seen.x, false).ok()?.values, &whole[0], 0)?;
-    Some(Prediction { rmse_rad, left: None })
+    Some(Prediction { rmse_rad, ..Prediction::from(&fitted, &context.laws) })
 }
 
 /// Root mean square error of each angle from a row on.

@@ -116,8 +116,9 @@ pub fn diagnose(
     let (posterior, held_out) = heldout::borne_out(&context, posterior, fits, effects.len(), options.predict_from_s);
     // 8. what they leave
     progress.begin("law", None);
-    let (needed, learnt) = learnt::beside(&context, &posterior, held_out.as_ref(), options.predict_from_s);
+    let (needed, learnt) = learnt::beside(&context, &posterior, &effects, held_out.as_ref(), options.predict_from_s);
     let posterior = Posterior { needed, ..posterior };
+    let (posterior, held_out) = heldout::led_by_likely(&context, posterior, held_out, options.predict_from_s);
     // 9. the base model by itself, and the verdict
     let adequacy = adequacy::adequacy(&context, posterior.base(), &effects, options.bootstraps, progress);
     let verdict = verdict::Verdict::of(&posterior, context.marks(), held_out.as_ref(), settings);
@@ -149,7 +150,7 @@ fn weighed<'a, 'p>(
 ) -> (Search<'a, 'p>, Posterior<'a>) {
     let weigh = |search: &Search<'a, 'p>| {
         progress.begin("weighing", None);
-        posterior::weigh(search.fits.clone(), search.effects.len(), settings)
+        posterior::weigh(search.fits.clone(), search.effects.len(), search.compared(), settings)
     };
     let at_once = (!search.leaves_more_than_noise()).then(|| weigh(&search));
     match at_once {

@@ -45,12 +45,15 @@ pub struct Posterior<'a> {
     pub uncertified: Vec<Vec<Effect>>,
     /// That something around the likeliest fit, at each place.
     pub unknowns: Vec<Latent>,
+    /// How many effects of a hypothesis have been held against every other.
+    pub compared: usize,
     /// How probable each name of the likeliest fit is where any law may stand in its place, as far as that was asked.
     pub needed: Vec<(Effect, f64)>,
 }
 
-/// Weighs the hypotheses of some fits, out of so many candidate effects, beside the unknown around the likeliest of them.
-pub fn weigh<'a>(fits: Vec<Refit<'a>>, effects: usize, settings: &Settings) -> Posterior<'a> {
+/// Weighs the hypotheses of some fits, out of so many candidate effects, beside the unknown around the likeliest of them. So many effects of each have been held
+/// against every other.
+pub fn weigh<'a>(fits: Vec<Refit<'a>>, effects: usize, compared: usize, settings: &Settings) -> Posterior<'a> {
     let values = fits.first().map_or(0, Refit::values);
     let least = refit::least(&fits);
     let scatter = least.map_or(Scatter::NOISE, |best| Scatter::of(best, values));
@@ -83,7 +86,7 @@ pub fn weigh<'a>(fits: Vec<Refit<'a>>, effects: usize, settings: &Settings) -> P
         at_best[*rival] = at_best[*rival].max(posterior[best] + ln_prior(&fits[*rival]) - ln_prior(&fits[best]));
     }
     let others: Vec<&Refit<'_>> = fits.iter().collect();
-    let genuine: Vec<f64> = fits.iter().map(|fit| genuine(fit, &others, settings)).collect();
+    let genuine: Vec<f64> = fits.iter().map(|fit| genuine(fit, &others, compared, settings)).collect();
     let lowest = normalised(&at_best)[best] * genuine[best];
     let uncertified = rivals.iter().map(|rival| fits[*rival].hypothesis.effects.clone()).collect();
     let if_named = normalised(&posterior[..fits.len()]);
@@ -111,7 +114,7 @@ pub fn weigh<'a>(fits: Vec<Refit<'a>>, effects: usize, settings: &Settings) -> P
     // where the unknown takes all, or next to all, their order among themselves still counts
     candidates
         .sort_by(|a, b| (b.probability.total_cmp(&a.probability)).then(b.ln_posterior.total_cmp(&a.ln_posterior)));
-    Posterior { candidates, unknown, remains, lowest, uncertified, unknowns: latents, needed: Vec::new() }
+    Posterior { candidates, unknown, remains, lowest, uncertified, unknowns: latents, compared, needed: Vec::new() }
 }
 
 /// The names in layers: P(S) = (1 − z) P(S | nothing remains) + z g P(S | something remains), z being the probability that something does, and g the odds
@@ -177,20 +180,20 @@ fn uncertified_within_reach(fits: &[Refit<'_>], best: usize, settings: &Settings
 }
 
 /// The odds that a fit's effects are what has been filmed, and stand for nothing else.
-fn genuine(fit: &Refit<'_>, others: &[&Refit<'_>], settings: &Settings) -> f64 {
+fn genuine(fit: &Refit<'_>, others: &[&Refit<'_>], compared: usize, settings: &Settings) -> f64 {
     let effects = &fit.hypothesis.effects;
     if effects.is_empty() {
         return 1.0;
     }
     let odds: f64 = effects.iter().map(|effect| law_of(*effect).odds(fit, others, settings)).product();
-    let beyond_two = effects.len().saturating_sub(settings.search.main_effects) as i32;
-    odds * (1.0 - settings.prior.imitated) * settings.prior.beyond_two.powi(beyond_two)
+    let further = effects.len().saturating_sub(compared) as i32;
+    odds * (1.0 - settings.prior.imitated) * settings.prior.not_compared.powi(further)
 }
 
 /// The same of one of them: what another one beside it stands for is not its concern.
 fn genuine_alone(effect: Effect, is_further: bool, fit: &Refit<'_>, others: &[&Refit<'_>], settings: &Settings) -> f64 {
-    let beyond_two = if is_further { settings.prior.beyond_two } else { 1.0 };
-    law_of(effect).odds(fit, others, settings) * (1.0 - settings.prior.imitated) * beyond_two
+    let further = if is_further { settings.prior.not_compared } else { 1.0 };
+    law_of(effect).odds(fit, others, settings) * (1.0 - settings.prior.imitated) * further
 }
 
 /// By how much the torque of a fit's laws may be wrong.
@@ -227,6 +230,12 @@ impl<'a> Posterior<'a> {
         &self.candidates[0].fit
     }
 
+    /// The same with one of the candidates first.
+    pub fn led_by(mut self, place: usize) -> Self {
+        self.candidates[..=place].rotate_right(1);
+        self
+    }
+
     /// The fit of some effects and no others.
     pub fn of(&self, effects: &[Effect]) -> Option<&Refit<'a>> {
         self.candidates.iter().find(|c| c.fit.hypothesis.effects == effects).map(|c| &c.fit)
@@ -243,15 +252,15 @@ impl<'a> Posterior<'a> {
         let others: Vec<&Refit<'_>> = self.candidates.iter().map(|c| &c.fit).collect();
         let genuine = |fit: &Refit<'_>| {
             let explaining = self.by_what_they_explain(fit);
-            let is_further = explaining.iter().skip(settings.search.main_effects).any(|further| *further == effect);
+            let is_further = explaining.iter().skip(self.compared).any(|further| *further == effect);
             genuine_alone(effect, is_further, fit, &others, settings)
         };
-        let with = self.candidates.iter().filter(|c| c.in_layers > NEGLIGIBLE && c.fit.hypothesis.has(effect));
-        let of_table = with.map(|c| c.in_layers * genuine(&c.fit)).fold(0.0, |sum, p| sum + p).min(1.0);
+        let with = || self.candidates.iter().filter(|c| c.fit.hypothesis.has(effect));
+        let counts = with().filter(|c| c.in_layers > NEGLIGIBLE);
+        let of_table = counts.map(|c| c.in_layers * genuine(&c.fit)).fold(0.0, |sum, p| sum + p).min(1.0);
         let needed = self.needed.iter().find(|own| own.0 == effect);
-        let beside = |(_, needed): &(Effect, f64)| {
-            (1.0 - self.remains) * of_table + self.remains * needed * genuine(self.best())
-        };
+        let likeliest = with().next().map_or(1.0 - settings.prior.imitated, |c| genuine(&c.fit));
+        let beside = |(_, needed): &(Effect, f64)| (1.0 - self.remains) * of_table + self.remains * needed * likeliest;
         needed.map_or(of_table, beside)
     }
 

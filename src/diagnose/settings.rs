@@ -235,8 +235,9 @@ pub struct PriorSettings {
     pub model_error_decades: f64,
     /// The part of names that stand for something outside the table (training bank: names stated at 0.99 were right in 97 of 100 cases).
     pub imitated: f64,
-    /// Each name beyond two is with these odds what it seems to be (judgement: no bank has calibrated them).
-    pub beyond_two: f64,
+    /// Each name that has not been held against every other effect, as those beyond two are not, and fewer where the budget ends before, is with these odds what it
+    /// seems to be (judgement: no bank has calibrated them).
+    pub not_compared: f64,
     /// A support in step with the swing is with these odds what it seems to be (training bank: four times out of five).
     pub support_in_step: f64,
     /// The same beside a law of physics where it gains little: three free numbers complete a law that is only nearly right (training bank).
@@ -291,10 +292,10 @@ pub struct LawSettings {
     pub most: usize,
     /// … for each of which the budget must allow so many motions with derivatives (cost).
     pub evaluations: f64,
+    /// Odds of a term that gives energy: what hangs and is let go takes none from anywhere, and such a term corrects others (judgement: one in ten).
+    pub active: f64,
     /// The shortest descriptions of which it is asked what they predict (cost).
-    pub proven: usize,
-    /// Predictions that leave at most this many times what the best one does are alike (judgement: a tenth).
-    pub alike: f64,
+    pub foretold: usize,
     /// Other formulas are told whose description is longer by less than so many nats (statistics: beyond it odds are e⁻⁵).
     pub alternatives: f64,
 }
@@ -400,7 +401,7 @@ impl Default for PriorSettings {
             imitated_down_to: 1e-3,
             model_error_decades: 6.0,
             imitated: 0.03,
-            beyond_two: 0.7,
+            not_compared: 0.7,
             support_in_step: 0.8,
             support_beside_a_law: 0.35,
             slight: 25.0,
@@ -453,8 +454,8 @@ impl Default for LawSettings {
             fewest: 2,
             most: 6,
             evaluations: 80.0,
-            proven: 4,
-            alike: 1.1,
+            active: 0.1,
+            foretold: 12,
             alternatives: 5.0,
         }
     }

@@ -1,22 +1,24 @@
 //! What is fitted: names with and without laws of the grammar, in full simulation, and the length of each description.
 
-use nalgebra::DVector;
 use rayon::prelude::*;
 
 use super::super::context::FitContext;
-use super::super::effect::{Effect, Phase};
+use super::super::effect::Effect;
 use super::super::evidence::{Scatter, normalised};
 use super::super::grammar::Term;
 use super::super::hypothesis::Hypothesis;
+use super::super::posterior::Posterior;
 use super::super::refit::Refit;
+use super::Needed;
+use super::along::{Along, is_of_kind};
 use super::sought::{Candidate, candidates};
-use crate::experiment::Law;
-use crate::model::effects::Effect as _;
-use crate::model::effects::formula::Formula;
-use crate::model::{ForwardModel, Motion, Parameter, Partials};
+use crate::experiment::{Coefficient, Law};
+use crate::model::Parameter;
 
 /// Scales of a term's state to begin with, over those that it had beside a name.
 const SCALED: [f64; 3] = [1.0, 0.7, 1.4];
+/// A scale that many times the one from which it began has run away.
+const AWAY: f64 = 100.0;
 
 /// Terms that were fitted beside some effects, with the length of the description.
 pub struct Described<'a> {
@@ -28,30 +30,48 @@ pub struct Described<'a> {
     pub length: f64,
 }
 
+impl Described<'_> {
+    /// How many coefficients it has beside those of the base model.
+    pub fn coefficients(&self) -> usize {
+        self.fit.added().len() + self.terms.iter().map(|term| term.law.parameters.len()).sum::<usize>()
+    }
+}
+
 /// Names with and without laws of the grammar, fitted in full simulation, the shortest description first.
-pub fn descriptions<'a>(context: &FitContext<'a>, best: &Refit<'a>) -> Option<Vec<Described<'a>>> {
+pub fn descriptions<'a>(
+    context: &FitContext<'a>,
+    posterior: &Posterior<'a>,
+    effects: usize,
+) -> Option<Vec<Described<'a>>> {
+    let best = posterior.best();
     let before = context.work.done();
     let linearised = best.linearised()?;
     let each = (context.work.done() - before).max(1) as f64;
     let (search, law) = (&context.settings.search, &context.settings.law);
     let allowed = search.shares.law * search.budget as f64 / each;
     let count = ((allowed / law.evaluations) as usize).clamp(law.fewest, law.most);
-    let begun: Vec<(Candidate, Refit<'a>)> = candidates(best, &linearised, count, law)?
+    let (candidates, terms) = candidates(best, &linearised, count, law)?;
+    let prior = Prior::of(context, best, effects, terms)?;
+    let begun: Vec<(Candidate, Refit<'a>)> = candidates
         .into_par_iter()
         .with_max_len(1)
         .filter_map(|candidate| Some((candidate.clone(), begun_fit(context, best, &candidate, count > law.fewest)?)))
         .collect();
-    let ended = |(candidate, fit): (Candidate, Refit<'a>)| ended(context, candidate, fit);
-    let fitted: Vec<(Vec<Term>, Refit<'a>)> =
-        foremost(begun, count).into_par_iter().with_max_len(1).map(ended).chain([(Vec::new(), best.clone())]).collect();
-    let mut order = described(fitted)?;
+    let ended = |(candidate, fit): (Candidate, Refit<'a>)| ended(context, candidate.terms, fit);
+    // what the table has been fitted with is a description, too
+    let possible = posterior.candidates.iter().filter(|candidate| candidate.ln_posterior.is_finite());
+    let of_table = possible.map(|candidate| (Vec::new(), candidate.fit.clone()));
+    let with_laws =
+        foremost(begun, count, search.hopeless).into_par_iter().with_max_len(1).filter_map(ended).collect::<Vec<_>>();
+    let fitted: Vec<(Vec<Term>, Refit<'a>)> = with_laws.into_iter().chain(of_table).collect();
+    let mut order = described(fitted, &prior)?;
     // a term that is nearly right makes names superfluous that were needed without it
     for _ in 0..best.hypothesis.effects.len() {
         let without_one = without_a_name(context, &order[0]);
         let none_shorter = without_one.is_empty();
         let shortest = order[0].fit.hypothesis.clone();
         let all = order.into_iter().map(|own| (own.terms, own.fit)).chain(without_one);
-        order = described(all.collect())?;
+        order = described(all.collect(), &prior)?;
         if none_shorter || order[0].fit.hypothesis == shortest {
             break;
         }
@@ -74,7 +94,7 @@ fn without_a_name<'a>(context: &FitContext<'a>, own: &Described<'a>) -> Vec<(Vec
             with.begin(&hypothesis, &own.fit, &start)
         };
         let begun = SCALED.map(from).into_iter().flatten().min_by(|a, b| a.chi2.total_cmp(&b.chi2))?;
-        Some(ended(context, Candidate { terms: own.terms.clone(), hypothesis, gain: 0.0 }, begun))
+        ended(context, own.terms.clone(), begun)
     };
     names.par_iter().with_max_len(1).filter_map(fewer).collect()
 }
@@ -87,8 +107,8 @@ pub fn with_laws<'a>(context: &FitContext<'a>, terms: &[Term]) -> FitContext<'a>
     FitContext { laws, base, ..context.clone() }
 }
 
-/// The first steps of a candidate, where it promises anything. What the names do together is not linear in each: in their place it begins along the motion that they
-/// follow, where there is time for that.
+/// The first steps of a candidate, where it promises anything, from where the linear approximation leads. What the names do together is not linear in each: where
+/// that leaves more than was promised in their place, it begins along the motion that they follow, if there is time for that.
 fn begun_fit<'a>(
     context: &FitContext<'a>,
     best: &Refit<'a>,
@@ -97,14 +117,20 @@ fn begun_fit<'a>(
 ) -> Option<Refit<'a>> {
     (candidate.gain > context.settings.misfit.counts).then_some(())?;
     let (with, hypothesis) = (with_laws(context, &candidate.terms), &candidate.hypothesis);
-    let begun = with.begin(hypothesis, best, &[]);
-    let along = (has_time && *hypothesis != best.hypothesis).then(|| with.refit_along(hypothesis, best, &[])).flatten();
+    let led = Refit { x: best.x.iter().zip(&candidate.step).map(|(x, step)| x + step).collect(), ..best.clone() };
+    let begun = with.begin(hypothesis, &led, &[]);
+    let promised = context.settings.search.keeps_up * (best.chi2 - candidate.gain).max(best.values() as f64);
+    let is_as_promised = begun.as_ref().is_some_and(|begun| begun.chi2 < promised);
+    let has_time = has_time && !is_as_promised && *hypothesis != best.hypothesis;
+    let along = has_time.then(|| with.refit_along(hypothesis, best, &[])).flatten();
     begun.into_iter().chain(along).min_by(|a, b| a.chi2.total_cmp(&b.chi2))
 }
 
-/// Of what was begun the best, and the best term and the best pair beside each set of names.
-fn foremost<'a>(mut begun: Vec<(Candidate, Refit<'a>)>, most: usize) -> Vec<(Candidate, Refit<'a>)> {
+/// Of what was begun the best, and the best term and the best pair beside each set of names, but for those without hope.
+fn foremost<'a>(mut begun: Vec<(Candidate, Refit<'a>)>, most: usize, hopeless: f64) -> Vec<(Candidate, Refit<'a>)> {
     begun.sort_by(|a, b| a.1.chi2.total_cmp(&b.1.chi2));
+    let least = begun.first().map_or(0.0, |own| own.1.chi2);
+    begun.retain(|own| own.1.chi2 < hopeless * least);
     let mut seen: Vec<(Hypothesis, usize)> = Vec::new();
     let mut rank = 0;
     begun.retain(|(candidate, _)| {
@@ -117,105 +143,86 @@ fn foremost<'a>(mut begun: Vec<(Candidate, Refit<'a>)>, most: usize) -> Vec<(Can
     begun
 }
 
-/// A candidate to the end, its coefficients those of the fit.
-fn ended<'a>(context: &FitContext<'a>, candidate: Candidate, begun: Refit<'a>) -> (Vec<Term>, Refit<'a>) {
-    let mut terms = candidate.terms;
+/// A candidate to the end, its coefficients those of the fit; `None` where one has run away, and its term is another one of the grammar.
+fn ended<'a>(context: &FitContext<'a>, mut terms: Vec<Term>, begun: Refit<'a>) -> Option<(Vec<Term>, Refit<'a>)> {
     let steps = context.settings.descent.most_steps;
     let with = with_laws(context, &terms);
     let fit = if begun.converged { begun } else { with.go_on(&begun, steps).unwrap_or(begun) };
     for term in &mut terms {
         let fitted: Vec<Option<f64>> = term.law.coefficients().map(|(parameter, _)| fit.value(parameter)).collect();
+        // the amplitude comes first; the others were begun within the range of the state
+        let begun = term.law.parameters.values().skip(1).map(|own| own.start.abs()).fold(0.0, f64::max);
         for (own, value) in term.law.parameters.values_mut().zip(fitted) {
             own.start = value.unwrap_or(own.start);
         }
+        let has_run_away = |own: &Coefficient| own.start.abs() > AWAY * begun;
+        if term.law.parameters.values().skip(1).any(has_run_away) {
+            return None;
+        }
     }
-    (terms, fit)
+    Some((terms, fit))
+}
+
+/// What names and terms cost before anything was seen (nats).
+struct Prior {
+    /// To say which effect of the table is meant.
+    of_effect: f64,
+    /// To say which term.
+    of_term: f64,
+    /// More of a term that gives energy.
+    of_active: f64,
+    /// The motion along which it does.
+    along: Along,
+}
+
+impl Prior {
+    fn of(context: &FitContext<'_>, best: &Refit<'_>, effects: usize, terms: usize) -> Option<Self> {
+        let [of_effect, of_term] = [effects, terms].map(|kinds| (kinds.max(1) as f64).ln());
+        let (of_active, along) = (-context.settings.law.active.ln(), Along::of(context, best, &[])?);
+        Some(Self { of_effect, of_term, of_active, along })
+    }
+
+    fn of_description(&self, terms: &[Term], hypothesis: &Hypothesis) -> f64 {
+        let is_active = |term: &&Term| term.state != "angle" && self.along.gives_energy(term);
+        hypothesis.effects.len() as f64 * self.of_effect
+            + terms.len() as f64 * self.of_term
+            + terms.iter().filter(is_active).count() as f64 * self.of_active
+    }
 }
 
 /// The fits with the lengths of their descriptions, the shortest first.
-fn described(fitted: Vec<(Vec<Term>, Refit<'_>)>) -> Option<Vec<Described<'_>>> {
+fn described<'a>(fitted: Vec<(Vec<Term>, Refit<'a>)>, prior: &Prior) -> Option<Vec<Described<'a>>> {
     let least = fitted.iter().map(|(_, fit)| fit).min_by(|a, b| a.chi2.total_cmp(&b.chi2))?;
     let scatter = Scatter::of(least, least.values());
     let together = (scatter.of_all / scatter.of_values).max(1.0);
-    let length = |terms: &[Term], fit: &Refit<'_>| {
-        let count = fit.added().len() + terms.iter().map(|term| term.law.parameters.len()).sum::<usize>();
-        0.5 * fit.chi2 / scatter.of_all + 0.5 * count as f64 * (fit.values() as f64 / together).ln()
+    let of = |(terms, fit): (Vec<Term>, Refit<'a>)| {
+        let mut own = Described { terms, fit, length: 0.0 };
+        own.length = 0.5 * own.fit.chi2 / scatter.of_all
+            + 0.5 * own.coefficients() as f64 * (own.fit.values() as f64 / together).ln()
+            + prior.of_description(&own.terms, &own.fit.hypothesis);
+        own
     };
-    let mut order: Vec<Described<'_>> =
-        fitted.into_iter().map(|(terms, fit)| Described { length: length(&terms, &fit), terms, fit }).collect();
+    let mut order: Vec<Described<'a>> = fitted.into_iter().map(of).collect();
     order.sort_by(|a, b| a.length.total_cmp(&b.length));
     Some(order)
 }
 
-/// The probability of each name of a fit among all descriptions: of those that have it, and of those with a term that does what it does.
-pub fn needed(order: &[Described<'_>], best: &Refit<'_>, the_same_law: f64) -> Vec<(Effect, f64)> {
+/// The probability of each effect among all descriptions: of those that name it, and of those with a term that does what it does along the motion of a fit.
+pub fn needed(context: &FitContext<'_>, order: &[Described<'_>], best: &Refit<'_>, effects: &[Effect]) -> Needed {
     let weights = normalised(&order.iter().map(|own| -own.length).collect::<Vec<f64>>());
-    let along = Along::of(best);
-    let of_name = |effect: &Effect| {
-        let own = along.as_ref().and_then(|along| along.of_effect(best, *effect));
-        let is_it = |term: &Term| {
-            if !is_of_kind(term, *effect) {
-                return false;
-            }
-            let torques = own.as_ref().zip(along.as_ref().and_then(|along| along.of_term(term)));
-            torques.is_some_and(|(own, other)| own.dot(&other) > the_same_law * own.norm() * other.norm())
+    let is_termed = |effect: &Effect| order.iter().flat_map(|own| &own.terms).any(|term| is_of_kind(term, *effect));
+    let termed: Vec<Effect> = effects.iter().copied().filter(is_termed).collect();
+    let along = Along::of(context, best, &termed);
+    let stands_for =
+        |term: &Term| along.as_ref().map_or(Vec::new(), |along| along.stands_for(term, &termed, &context.settings.law));
+    let shares: Vec<Vec<(Effect, f64)>> =
+        order.iter().map(|own| own.terms.iter().flat_map(stands_for).collect()).collect();
+    let of_effect = |effect: &Effect| {
+        let share = |(own, shares): (&Described<'_>, &Vec<(Effect, f64)>)| {
+            let of_terms = shares.iter().filter(|share| share.0 == *effect).map(|share| share.1).fold(0.0, f64::max);
+            if own.fit.hypothesis.has(*effect) { 1.0 } else { of_terms }
         };
-        let has_it = |own: &Described<'_>| own.fit.hypothesis.has(*effect) || own.terms.iter().any(is_it);
-        let with = order.iter().zip(&weights).filter(|(own, _)| has_it(own));
-        (*effect, with.map(|(_, weight)| weight).sum())
+        (*effect, order.iter().zip(&shares).map(share).zip(&weights).map(|(share, weight)| share * weight).sum())
     };
-    best.hypothesis.effects.iter().map(of_name).collect()
-}
-
-/// Whether a term has the state and the shape of an effect's law.
-fn is_of_kind(term: &Term, effect: Effect) -> bool {
-    let entry = effect.entry();
-    entry.shapes.contains(&term.shape) && (term.state == "angle") == (entry.phase == Some(Phase::Position))
-}
-
-/// A fit's motion through every recording, row after row.
-struct Along(Vec<(ForwardModel, Vec<Motion>)>);
-
-impl Along {
-    fn of(fit: &Refit<'_>) -> Option<Self> {
-        let of_record = |record: usize| {
-            let (model, swing, true_s) = fit.motion(record)?;
-            let at = |t_s: &f64| {
-                let state = swing.at(*t_s);
-                model.motion(*t_s, &state.theta_rad, &[state.omega_rad_s, state.hidden].concat())
-            };
-            let motions = true_s.iter().map(at).collect();
-            Some((model, motions))
-        };
-        (0..fit.problem.records.len()).map(of_record).collect::<Option<_>>().map(Self)
-    }
-
-    /// Torques on the links, one instant after another.
-    fn torques(&self, torque: impl Fn(&ForwardModel, &Motion, &mut [f64])) -> DVector<f64> {
-        let mut all = Vec::new();
-        for (model, motion) in self.0.iter().flat_map(|(model, motions)| motions.iter().map(move |m| (model, m))) {
-            let mut q = vec![0.0; model.rates()];
-            torque(model, motion, &mut q);
-            all.extend_from_slice(&q[..model.chain().count()]);
-        }
-        DVector::from_vec(all)
-    }
-
-    /// Of an effect of the fit, in the direction in which it acts.
-    fn of_effect(&self, fit: &Refit<'_>, effect: Effect) -> Option<DVector<f64>> {
-        let parameter = effect.parameters()[0];
-        let sign = fit.value(parameter)?.signum();
-        Some(self.torques(|model, motion, q| {
-            let mut partials = Partials::zero(model.chain().count(), model.rates());
-            model.partials(motion, &mut partials);
-            model.sensitivity(parameter, motion, &partials, q);
-            q.iter_mut().for_each(|q| *q *= sign);
-        }))
-    }
-
-    /// Of a term with its coefficients.
-    fn of_term(&self, term: &Term) -> Option<DVector<f64>> {
-        let formula = Formula::of(&term.law)?;
-        Some(self.torques(|model, motion, q| formula.add_torque(model.chain(), motion, q)))
-    }
+    effects.iter().map(of_effect).collect()
 }

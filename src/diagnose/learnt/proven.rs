@@ -41,34 +41,50 @@ fn formula_of(terms: &[Term]) -> String {
     terms.iter().map(Term::with_numbers).collect::<Vec<_>>().join(" + ").replace("+ -", "- ")
 }
 
-/// Of the shortest descriptions the one that leaves least of what was not fitted, if that is clearly less than the names do.
-pub fn best_proven<'a>(
+/// The foremost descriptions, each with what it predicts where it is fitted to a part only, in the order of
+///
+/// ```text
+/// L + 2 Σ ln e      L: length of the description
+///                   e: root mean square error of what was predicted, angle by angle
+/// ```
+///
+/// An error that grows along a motion is one of its amplitude and one of its phase: two numbers, of unknown size, however many values show them. (Describing what
+/// comes later by what was learnt before is Dawid's prequential description, Journal of the Royal Statistical Society A 147 (1984) 278.)
+pub fn foretold<'a>(
     context: &FitContext<'a>,
-    order: &[Described<'a>],
-    proof: &HeldOut,
+    order: Vec<Described<'a>>,
     from_s: Option<f64>,
+) -> Vec<(Described<'a>, Prediction)> {
+    let (law, told) = (&context.settings.law, context.settings.prior.told_from_zero);
+    let predict = |mut own: Described<'a>| {
+        let prediction = heldout::predicted(&with_laws(context, &own.terms), &own.fit, from_s)?;
+        let missed = prediction.rmse_rad.iter().map(|error| error.max(f64::MIN_POSITIVE).ln());
+        own.length += 2.0 * missed.sum::<f64>();
+        // a law that sets in later was not learnt from what was fitted
+        prediction.told.iter().all(|deviations| *deviations > told).then_some((own, prediction))
+    };
+    let foremost: Vec<Described<'a>> = order.into_iter().take(law.foretold).collect();
+    let mut foretold: Vec<(Described<'a>, Prediction)> =
+        foremost.into_par_iter().with_max_len(1).filter_map(predict).collect();
+    foretold.sort_by(|a, b| a.0.length.total_cmp(&b.0.length));
+    foretold
+}
+
+/// The law of the shortest of these descriptions, if it leaves clearly less of what was not fitted than the names do.
+pub fn proven<'a>(
+    context: &FitContext<'a>,
+    foretold: &[(Described<'a>, Prediction)],
+    proof: &HeldOut,
 ) -> Option<Learnt<'a>> {
     let settings = context.settings;
-    let shorter = order.iter().take_while(|own| !own.terms.is_empty()).take(settings.law.proven).collect::<Vec<_>>();
-    let leaves = |prediction: &Prediction| {
-        let told = Prediction { rmse_rad: prediction.rmse_rad.clone(), left: None };
-        HeldOut { baseline: proof.augmented.clone(), augmented: told, ..proof.clone() }.leaves()
-    };
-    let predict = |own: &&Described<'a>| heldout::predicted(&with_laws(context, &own.terms), &own.fit, from_s);
-    let predicted: Vec<Option<Prediction>> = shorter.par_iter().with_max_len(1).map(predict).collect();
-    let proven = shorter.into_iter().zip(predicted).filter_map(|(own, prediction)| Some((own, prediction?)));
-    let proven: Vec<(&Described<'a>, Prediction)> = proven.collect();
-    let least = proven.iter().map(|(_, prediction)| leaves(prediction)).fold(f64::INFINITY, f64::min);
-    (least < settings.verdict.borne_out).then_some(())?;
-    // of those that predict alike the shortest
-    let (own, prediction) =
-        proven.into_iter().find(|(_, prediction)| leaves(prediction) <= settings.law.alike * least)?;
-    let near = order.iter().filter(|other| !std::ptr::eq(*other, own) && !other.terms.is_empty());
+    let (own, prediction) = foretold.first().filter(|(own, _)| !own.terms.is_empty())?;
+    (prediction.over(&proof.augmented) < settings.verdict.borne_out).then_some(())?;
+    let near = foretold[1..].iter().map(|(other, _)| other).filter(|other| !other.terms.is_empty());
     let near = near.filter(|other| other.length < own.length + settings.law.alternatives);
     Some(Learnt {
         terms: own.terms.clone(),
         fit: own.fit.clone(),
-        prediction,
+        prediction: prediction.clone(),
         alternatives: near.map(|other| (formula_of(&other.terms), other.length - own.length)).collect(),
     })
 }

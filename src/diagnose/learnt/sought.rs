@@ -17,6 +17,9 @@ use crate::model::effects::Effect as _;
 use crate::model::effects::formula::Formula;
 use crate::model::{Motion, Parameter};
 
+/// Of what the derivatives do not tell apart nothing moves: part of a variable's own curvature.
+const DAMPING: f64 = 1e-8;
+
 /// Terms to be fitted beside some effects.
 #[derive(Clone)]
 pub struct Candidate {
@@ -24,17 +27,20 @@ pub struct Candidate {
     pub hypothesis: Hypothesis,
     /// The terms, their amplitudes as they promise.
     pub terms: Vec<Term>,
-    /// Fall of χ² in linear approximation.
+    /// By how much every variable of the fit moves, and χ² falls, in linear approximation.
+    pub step: Vec<f64>,
+    /// See `step`.
     pub gain: f64,
 }
 
-/// What promises most, beside the names of a fit, without each of them, and in the place of them all; with the fit's residuals and their derivatives.
+/// What promises most, beside the names of a fit, without each of them, and in the place of them all, from the fit's residuals and their derivatives; and out of
+/// how many terms.
 pub fn candidates(
     best: &Refit<'_>,
     (residual, slopes): &(DVector<f64>, DMatrix<f64>),
     count: usize,
     settings: &LawSettings,
-) -> Option<Vec<Candidate>> {
+) -> Option<(Vec<Candidate>, usize)> {
     let (all, columns) = effects_of_terms(best, residual.len())?;
     let names = &best.hypothesis.effects;
     let mut left_out: Vec<Vec<Effect>> = vec![Vec::new()];
@@ -42,6 +48,9 @@ pub fn candidates(
     left_out.extend((names.len() > 1).then(|| names.clone()));
     let lower = best.problem.lower();
     let (apart, alone) = (told_apart(&columns, settings.the_same), recordings(best.problem.records).len() == 1);
+    // in a single release the amplitude falls with time, and a loss that drifts stands for any loss
+    let of_loss = alone && names.iter().any(|effect| effect.entry().acts == Acts::Loss);
+    let drifts = |term: &Term| of_loss && term.drifts && term.state != "angle";
     let promise = |out: &Vec<Effect>| {
         let parameters: Vec<Parameter> = out.iter().flat_map(|effect| effect.parameters()).copied().collect();
         let gone: Vec<usize> = parameters.iter().filter_map(|parameter| best.place(*parameter)).collect();
@@ -53,15 +62,21 @@ pub fn candidates(
             let cosine = |i: &usize| own.dot(&slopes.column(*i)) / (own.norm() * slopes.column(*i).norm()).max(1e-300);
             gone.iter().any(|i| cosine(i).abs() > settings.the_same)
         };
-        // in a single release the amplitude falls with time, and a loss that drifts stands for any loss
-        let of_loss = alone && out.iter().any(|effect| effect.entry().acts == Acts::Loss);
-        let drifts = |term: &Term| of_loss && term.drifts && term.state != "angle";
         let new: Vec<usize> = apart.iter().copied().filter(|k| !is_a_name(*k) && !drifts(&all[*k])).collect();
         let hypothesis = out.iter().fold(best.hypothesis.clone(), |hypothesis, effect| hypothesis.without(*effect));
-        let projection = Projection::off(left, slopes.select_columns(&kept));
-        promising(&projection, &all, (&columns, &new), &hypothesis, count, settings)
+        let own = slopes.select_columns(&kept);
+        let projection = Projection::off(left.clone(), own.clone());
+        let promising = promising(&projection, (&columns, &new), count, settings);
+        let steps = steps(&left, &own, &columns, &promising);
+        let candidate = |(i, (gain, terms)): (usize, Promising)| {
+            let mut step = vec![0.0; best.x.len()];
+            kept.iter().zip(steps.column(i).iter()).for_each(|(place, moved)| step[*place] = *moved);
+            let terms = terms.into_iter().enumerate().map(|(place, (k, a))| begun(&all[k], a, place)).collect();
+            Candidate { hypothesis: hypothesis.clone(), terms, step, gain }
+        };
+        promising.into_iter().enumerate().map(candidate).collect::<Vec<_>>()
     };
-    Some(left_out.iter().flat_map(promise).collect())
+    Some((left_out.iter().flat_map(promise).collect(), apart.len()))
 }
 
 /// The terms that do something else to the angles than any before them: on a single link hinge, strip and tip are one place.
@@ -121,15 +136,16 @@ fn largest(swings: &[Swing<'_>], place: LawPlace, time_s: f64) -> Largest {
     largest
 }
 
+/// By how much some terms lower χ², and which with what amplitudes.
+type Promising = (f64, Vec<(usize, f64)>);
+
 /// The terms and pairs of them that lower what is left most, beside some effects.
 fn promising(
     left: &Projection,
-    all: &[Term],
     (columns, new): (&DMatrix<f64>, &[usize]),
-    hypothesis: &Hypothesis,
     count: usize,
     settings: &LawSettings,
-) -> Vec<Candidate> {
+) -> Vec<Promising> {
     let projected = left.out(columns);
     let is_new = |k: usize| projected.column(k).norm() > settings.nothing_left * columns.column(k).norm();
     let mut alone: Vec<(f64, usize)> = new
@@ -146,7 +162,7 @@ fn promising(
         Some((pull.dot(&value), vec![(*a, -value[0]), (*b, -value[1])]))
     };
     let foremost = &alone[..alone.len().min(settings.paired)];
-    let mut pairs: Vec<(f64, Vec<(usize, f64)>)> = foremost
+    let mut pairs: Vec<Promising> = foremost
         .iter()
         .enumerate()
         .flat_map(|(i, a)| alone[i + 1..].iter().filter_map(move |b| of_pair(a, b)))
@@ -155,13 +171,26 @@ fn promising(
     pairs.sort_by(|a, b| b.0.total_cmp(&a.0));
     let amplitude = |k: usize| -projected.column(k).dot(&left.residual) / projected.column(k).norm_squared();
     let alone = alone.iter().take(count).map(|(gain, k)| (*gain, vec![(*k, amplitude(*k))]));
-    let chosen = alone.chain(pairs.into_iter().take(count));
-    let candidate = |(gain, terms): (f64, Vec<(usize, f64)>)| Candidate {
-        hypothesis: hypothesis.clone(),
-        terms: terms.into_iter().enumerate().map(|(place, (k, a))| begun(&all[k], a, place)).collect(),
-        gain,
-    };
-    chosen.map(candidate).collect()
+    alone.chain(pairs.into_iter().take(count)).collect()
+}
+
+/// By how much the variables with these derivatives move with each set of terms, a column each: the step of a descent that is damped a little.
+fn steps(left: &DVector<f64>, slopes: &DMatrix<f64>, columns: &DMatrix<f64>, promising: &[Promising]) -> DMatrix<f64> {
+    let sizes: Vec<f64> = slopes.column_iter().map(|column| column.norm().max(1e-300)).collect();
+    let mut normal = slopes.tr_mul(slopes);
+    for (i, j) in (0..sizes.len()).flat_map(|i| (0..sizes.len()).map(move |j| (i, j))) {
+        normal[(i, j)] /= sizes[i] * sizes[j];
+    }
+    (0..sizes.len()).for_each(|i| normal[(i, i)] += DAMPING);
+    let mut pull = DMatrix::zeros(sizes.len(), promising.len());
+    for (mut pull, (_, terms)) in pull.column_iter_mut().zip(promising) {
+        let with = terms.iter().fold(left.clone(), |with, (k, a)| with + columns.column(*k) * *a);
+        pull.copy_from(&-slopes.tr_mul(&with));
+        pull.iter_mut().zip(&sizes).for_each(|(pull, size)| *pull /= size);
+    }
+    let mut steps = normal.cholesky().map_or_else(|| pull.clone() * 0.0, |cholesky| cholesky.solve(&pull));
+    steps.row_iter_mut().zip(&sizes).for_each(|(mut row, size)| row /= *size);
+    steps
 }
 
 /// A term with its amplitude, under a name of its own.
@@ -172,4 +201,28 @@ fn begun(term: &Term, amplitude: f64, place: usize) -> Term {
         own.start = amplitude;
     }
     term
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_other_variable_moves_along_with_a_term() {
+        let wave = |rate: f64, phase: f64| move |i: usize| (rate * i as f64 + phase).sin();
+        let waves = [wave(0.1, 0.0), wave(0.1, 1.0), wave(0.37, 0.4)];
+        // derivatives of very different sizes, as those with an angle and with an inertia are
+        let slopes = DMatrix::from_fn(200, 2, |i, k| [1.0, 1e5][k] * waves[k](i));
+        let columns = DMatrix::from_fn(200, 1, |i, _| waves[2](i) + 0.5 * waves[0](i));
+        let left = DVector::from_fn(200, |i, _| -3.0 * columns[(i, 0)] + 0.2 * waves[1](i));
+        let steps = steps(&left, &slopes, &columns, &[(0.0, vec![(0, 3.0)]), (0.0, vec![(0, 1.0)])]);
+        for (step, amplitude) in steps.column_iter().zip([3.0, 1.0]) {
+            let there = &left + columns.column(0) * amplitude + &slopes * step;
+            for slope in slopes.column_iter() {
+                assert!(slope.dot(&there).abs() < 1e-6 * slope.norm() * left.norm(), "{steps}");
+            }
+        }
+        // with the term as large as it is, only what it does not explain is left to the others
+        assert!(steps[(0, 0)].abs() < 1e-6 && (1e5 * steps[(1, 0)] + 0.2).abs() < 1e-6, "{steps}");
+    }
 }

@@ -12,6 +12,7 @@ use super::super::misfit::{is_out_of_step, needs};
 use super::super::refit::{self, Refit, best_of_each_count, least, merged};
 use super::super::settings::SearchSettings;
 use super::beside::with_one_more;
+use crate::fit::recordings;
 use crate::fit::search::PARTS;
 use crate::fit::whitening::RecordNoise;
 use crate::model::Parameter;
@@ -70,6 +71,34 @@ pub fn carried<'a>(context: &FitContext<'a>, fits: Vec<Refit<'_>>, part: f64, no
     at_the_end.extend(followed);
     // those that are worth it go on once the noise is known
     descended(context, noise, at_the_end, steps.few_steps)
+}
+
+/// The best fits of pieces of the recordings, and the base model's, on whole ones: from where the first piece of each begins, and where that loses step, with the
+/// recording as it grows.
+pub fn whole<'a>(context: &FitContext<'a>, of_pieces: &[Refit<'a>], noise: &[RecordNoise]) -> Vec<Refit<'a>> {
+    let (settings, few) = (context.settings, context.settings.descent.few_steps);
+    let Some(least) = least(of_pieces) else { return Vec::new() };
+    let mut chosen =
+        refit::best(of_pieces, settings.search.followed, |_| true, |fit| needs(fit, least, &settings.misfit));
+    chosen.extend(of_pieces.iter().position(|fit| fit.hypothesis.effects.is_empty()));
+    chosen.sort_unstable();
+    chosen.dedup();
+    let on_whole = |place: &usize| {
+        let (fit, problem) = (&of_pieces[*place], &of_pieces[*place].problem);
+        let recordings = recordings(problem.records);
+        let starts = recordings.iter().flat_map(|pieces| {
+            let start = problem.start_of(pieces.start);
+            &fit.x[start..start + 2 * problem.shapes()]
+        });
+        let x = fit.x[..problem.free.len()].iter().chain(starts).copied().collect();
+        let of_recording = |(piece, at_s)| Some((recordings.iter().position(|own| own.contains(&piece))?, at_s));
+        let hypothesis =
+            Hypothesis { dropped: fit.hypothesis.dropped.and_then(of_recording), ..fit.hypothesis.clone() };
+        let whole = context.descend_from(&hypothesis, noise, x, few)?;
+        let grown = is_out_of_step(&whole, &settings.misfit).then(|| continued_alone(context, &whole)).flatten();
+        grown.into_iter().chain([whole]).min_by(|a, b| a.chi2.total_cmp(&b.chi2))
+    };
+    chosen.par_iter().with_max_len(1).filter_map(on_whole).collect()
 }
 
 fn to_follow(fits: Vec<Refit<'_>>) -> Vec<(Hypothesis, Vec<f64>)> {

@@ -243,11 +243,14 @@ impl<'a, 'p> Search<'a, 'p> {
             loosened.begin();
             Some(loosened)
         };
-        // where a model is right to the noise the whole tells more than its pieces
-        let of_pieces = self.in_pieces(pieces).filter(Self::leaves_more_than_noise);
-        let mut search = match of_pieces.or_else(loosened) {
-            Some(other) => other.after(self),
-            None => self,
+        let mut search = match self.in_pieces(pieces) {
+            Some(of_pieces) if of_pieces.leaves_more_than_noise() => of_pieces.after(self),
+            // where a model is right to the noise the whole tells more than its pieces
+            Some(of_pieces) => self.led_by(of_pieces),
+            None => match loosened() {
+                Some(other) => other.after(self),
+                None => self,
+            },
         };
         search.allow(search.context.settings.search.shares.further);
         search.further();
@@ -255,6 +258,27 @@ impl<'a, 'p> Search<'a, 'p> {
         search.allow(1.0);
         search.certify();
         search
+    }
+
+    /// The same with what the pieces of its recordings led to, on the whole, each recording from the start of its first piece.
+    fn led_by(mut self, of_pieces: Self) -> Self {
+        let found: Vec<Refit<'a>> = horizon::whole(&self.context, &of_pieces.fits, &self.base().problem.noise);
+        self.keep(found);
+        self.learn_noise();
+        self.after(of_pieces)
+    }
+
+    /// How many effects of an answer have been held against every other: two where pairs were, one where only single effects were, none where the budget ended before.
+    pub fn compared(&self) -> usize {
+        let done = |round: Round| {
+            self.rounds.iter().any(|end| end.round == round.name()) && !self.undecided.contains(&round.name())
+        };
+        if done(Round::Pairs) || done(Round::OneMore) && done(Round::OneFewer) {
+            self.context.settings.search.main_effects
+        } else {
+            // short stretches are asked for every one
+            usize::from(done(Round::Singles) || self.context.is_in_pieces() && done(Round::Asked))
+        }
     }
 
     /// The base model's fit.

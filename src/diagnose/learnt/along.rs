@@ -1,0 +1,112 @@
+//! Torques along a fit's motion: whether a term gives energy, and which effects of the table it stands for.
+
+use nalgebra::DVector;
+
+use super::super::context::FitContext;
+use super::super::effect::{Effect, Phase, Place};
+use super::super::grammar::Term;
+use super::super::refit::Refit;
+use super::super::settings::LawSettings;
+use crate::experiment::LawPlace;
+use crate::model::effects::Effect as _;
+use crate::model::effects::formula::Formula;
+use crate::model::{ForwardModel, Motion, Parameter, Partials};
+
+/// Whether a term has the state and the shape of an effect's law.
+pub fn is_of_kind(term: &Term, effect: Effect) -> bool {
+    let entry = effect.entry();
+    entry.shapes.contains(&term.shape) && (term.state == "angle") == (entry.phase == Some(Phase::Position))
+}
+
+/// Whether a term acts where an effect does.
+fn is_at_place(term: &Term, effect: Effect) -> bool {
+    let place = match term.law.place {
+        LawPlace::Hinge | LawPlace::Support => Place::Hinge,
+        LawPlace::Joint => Place::Joint,
+        LawPlace::Strip | LawPlace::Tip => Place::Air,
+    };
+    effect.place() == place
+}
+
+/// A fit's motion through every recording, row after row, in a model that has some effects more, of no size.
+pub struct Along(Vec<(ForwardModel, Vec<Motion>)>);
+
+impl Along {
+    /// Of a fit; `None` where the motion cannot be integrated.
+    pub fn of(context: &FitContext<'_>, fit: &Refit<'_>, effects: &[Effect]) -> Option<Self> {
+        let further = || effects.iter().copied().filter(|effect| !fit.hypothesis.has(*effect));
+        let hypothesis = further().fold(fit.hypothesis.clone(), |hypothesis, effect| hypothesis.and(effect, None));
+        let of_no_size: Vec<(Parameter, f64)> = further()
+            .flat_map(|effect| effect.parameters())
+            .filter(|p| p.is_proportional())
+            .map(|p| (*p, 0.0))
+            .collect();
+        let (problem, x) = context.start(&hypothesis, fit, &of_no_size)?;
+        let fit = Refit { hypothesis, problem, x, ..fit.clone() };
+        let of_record = |record: usize| {
+            let (model, swing, true_s) = fit.motion(record)?;
+            let at = |t_s: &f64| {
+                let state = swing.at(*t_s);
+                model.motion(*t_s, &state.theta_rad, &[state.omega_rad_s, state.hidden].concat())
+            };
+            let motions = true_s.iter().map(at).collect();
+            Some((model, motions))
+        };
+        (0..fit.problem.records.len()).map(of_record).collect::<Option<_>>().map(Self)
+    }
+
+    /// Torques on the links, one instant after another.
+    fn torques(&self, torque: impl Fn(&ForwardModel, &Motion, &mut [f64])) -> DVector<f64> {
+        let mut all = Vec::new();
+        for (model, motion) in self.0.iter().flat_map(|(model, motions)| motions.iter().map(move |m| (model, m))) {
+            let mut q = vec![0.0; model.rates()];
+            torque(model, motion, &mut q);
+            all.extend_from_slice(&q[..model.chain().count()]);
+        }
+        DVector::from_vec(all)
+    }
+
+    /// Whether a term with its coefficients gives energy, all in all.
+    pub fn gives_energy(&self, term: &Term) -> bool {
+        let motions = self.0.iter().flat_map(|(_, motions)| motions);
+        let rates = motions.flat_map(|motion| motion.rate[..motion.links()].iter().copied());
+        self.of_term(term).is_some_and(|torques| torques.iter().zip(rates).map(|(q, rate)| q * rate).sum::<f64>() > 0.0)
+    }
+
+    /// The effects that a term stands for, with the share of each: of its kind and at its place the one with whose torques it goes best, and all that do the
+    /// same as that one along this motion, wherever they act.
+    pub fn stands_for(&self, term: &Term, effects: &[Effect], law: &LawSettings) -> Vec<(Effect, f64)> {
+        let Some(own) = self.of_term(term) else { return Vec::new() };
+        let cosine = |effect: Effect| {
+            let other = self.of_effect(effect);
+            let cosine = own.dot(&other) / (own.norm() * other.norm()).max(1e-300);
+            // in the direction in which it can act
+            if effect.parameters()[0].is_not_negative() { cosine } else { cosine.abs() }
+        };
+        let of_kind = effects.iter().filter(|effect| is_of_kind(term, **effect));
+        let cosines: Vec<(Effect, f64)> = of_kind.map(|effect| (*effect, cosine(*effect))).collect();
+        let is_it = |(effect, cosine): &&(Effect, f64)| {
+            *cosine > if is_at_place(term, *effect) { law.the_same_law } else { law.the_same }
+        };
+        let Some(best) = cosines.iter().filter(is_it).max_by(|a, b| a.1.total_cmp(&b.1)) else { return Vec::new() };
+        let is_as_good = |own: &&(Effect, f64)| own.1 > law.the_same * best.1;
+        let alike = cosines.iter().filter(is_as_good).count() as f64;
+        cosines.iter().filter(is_as_good).map(|own| (own.0, 1.0 / alike)).collect()
+    }
+
+    /// Of a unit of an effect's first coefficient.
+    fn of_effect(&self, effect: Effect) -> DVector<f64> {
+        let parameter = effect.parameters()[0];
+        self.torques(|model, motion, q| {
+            let mut partials = Partials::zero(model.chain().count(), model.rates());
+            model.partials(motion, &mut partials);
+            model.sensitivity(parameter, motion, &partials, q);
+        })
+    }
+
+    /// Of a term with its coefficients.
+    fn of_term(&self, term: &Term) -> Option<DVector<f64>> {
+        let formula = Formula::of(&term.law)?;
+        Some(self.torques(|model, motion, q| formula.add_torque(model.chain(), motion, q)))
+    }
+}
