@@ -5,6 +5,7 @@ use std::fmt::Write as _;
 use super::Finding;
 use crate::caution::MOST_LENGTH_SPREAD;
 use crate::statistics::median;
+use crate::track::Thing;
 
 /// Standard deviation of the pivot, over the radius, beyond which it is only a remark.
 const MOST_PIVOT_SD: f64 = 0.15;
@@ -77,18 +78,13 @@ fn rig(text: &mut String, finding: &Finding) {
     }
     pivot(text, finding);
     rate(text, finding);
-    if !finding.still.is_empty() {
-        let places: Vec<String> =
-            finding.still.iter().take(4).map(|t| t.place_px()).map(|[x, y]| format!("({x:.0}, {y:.0})")).collect();
-        let _ = writeln!(text, "# of the same look but standing still, and not taken for marks: {}", places.join(", "));
+    if let Some(places) = places(&finding.still) {
+        let _ = writeln!(text, "# of the same look but standing still, and not taken for marks: {places}");
     }
-    if !finding.apart.is_empty() {
-        let places: Vec<String> =
-            finding.apart.iter().take(4).map(|t| t.place_px()).map(|[x, y]| format!("({x:.0}, {y:.0})")).collect();
+    if let Some(places) = places(&finding.apart) {
         let _ = writeln!(
             text,
-            "# of the same look but swinging by themselves, and not measured: about {}; roi_px picks one of them",
-            places.join(", ")
+            "# of the same look but swinging by themselves, and not measured: about {places}; roi_px picks one of them"
         );
     }
     if finding.camera.taken_out {
@@ -105,6 +101,13 @@ fn rig(text: &mut String, finding: &Finding) {
     );
     text.push_str("# roi_px = [x, y, w, h]       # seek marks only in this part of the picture\n");
     text.push_str("# from_s = 0.0                # leave out what comes before, until_s what comes after\n");
+}
+
+/// Where the first of some things are; `None` of none.
+fn places(things: &[Thing]) -> Option<String> {
+    let places: Vec<String> =
+        things.iter().take(4).map(|thing| thing.place_px()).map(|[x, y]| format!("({x:.0}, {y:.0})")).collect();
+    (!places.is_empty()).then(|| places.join(", "))
 }
 
 fn found_in_words(finding: &Finding) -> String {

@@ -273,11 +273,12 @@ impl<'a, 'p> Search<'a, 'p> {
         let done = |round: Round| {
             self.rounds.iter().any(|end| end.round == round.name()) && !self.undecided.contains(&round.name())
         };
-        if done(Round::Pairs) || done(Round::OneMore) && done(Round::OneFewer) {
+        // short stretches are asked for every set
+        let asked = self.context.is_in_pieces() && done(Round::Asked);
+        if asked || done(Round::Pairs) || done(Round::OneMore) && done(Round::OneFewer) {
             self.context.settings.search.main_effects
         } else {
-            // short stretches are asked for every one
-            usize::from(done(Round::Singles) || self.context.is_in_pieces() && done(Round::Asked))
+            usize::from(done(Round::Singles))
         }
     }
 
