@@ -30,7 +30,7 @@ test:
 	cargo test
 
 accuracy: setup
-	cargo test --release --test accuracy --test foreign --test identify --test fit --test laser --test diagnose_command -- --include-ignored --nocapture
+	cargo test --release --no-fail-fast --test accuracy --test foreign --test identify --test fit --test laser --test diagnose_command -- --include-ignored --nocapture
 
 # Cases that are there are not made again, nor diagnosed again; `rm -r target/concealed/*/results` for a new build.
 BANKS = ode strip video

@@ -226,10 +226,9 @@ fn across(context: &FitContext<'_>, fit: &Refit<'_>, last: usize) -> Option<Pred
     let others = context.on(&context.records[..last]);
     let whole = [Record::joined(&context.records[last..])?];
     let alone = context.on(&whole);
-    let (starts, start) = (2 * fit.problem.shapes(), fit.problem.start_of(last));
     let hypothesis = Hypothesis { dropped: fit.hypothesis.dropped.filter(|d| d.0 < last), ..fit.hypothesis.clone() };
     let mut near = fit.clone();
-    near.x.truncate(start);
+    near.x.truncate(fit.problem.start_of(last));
     let fitted = others.refit(&hypothesis, &near, &[])?;
     // on the last one only the start is free
     let frozen: Vec<Belief> = (fitted.problem.free.iter().zip(&fitted.x))
@@ -240,7 +239,7 @@ fn across(context: &FitContext<'_>, fit: &Refit<'_>, last: usize) -> Option<Pred
     let problem = Problem { records: alone.records, noise, ..fitted.problem.clone() };
     let mut begun = Refit { problem, ..fitted.clone() };
     begun.x.truncate(fitted.problem.free.len());
-    begun.x.extend_from_slice(&fit.x[start..start + starts]);
+    begun.x.extend_from_slice(fit.problem.start(&fit.x, last));
     let hypothesis = Hypothesis { dropped: None, ..hypothesis };
     let seen = alone.refit(&hypothesis, &begun, &[])?;
     let rmse_rad = errors(&seen.problem.predict(0, &seen.x, false).ok()?.values, &whole[0], 0)?;

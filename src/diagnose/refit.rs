@@ -111,8 +111,7 @@ impl<'a> Refit<'a> {
         let problem = &self.problem;
         let (model, camera) = problem.model(record, &self.x[..problem.free.len()]).ok()?;
         let data = &problem.records[record];
-        let (start, shapes) = (problem.start_of(record), problem.shapes());
-        let (angles_rad, rates_rad_s) = self.x[start..start + 2 * shapes].split_at(shapes);
+        let (angles_rad, rates_rad_s) = problem.start(&self.x, record).split_at(problem.shapes());
         let state = State::begun(&model.start(), angles_rad, rates_rad_s);
         let camera = Camera { origin_s: data.t_s[0], ..camera };
         let true_s: Vec<f64> = data.t_s.iter().map(|t| camera.true_time_s(*t, 0)).collect();

@@ -181,7 +181,7 @@ impl Descent {
         let held = |i: usize| self.fixed == Some(i) || (x[i] <= lower[i] && normals.gradient[i] > 0.0);
         let mut stopped: Vec<Option<f64>> = (0..x.len()).map(|i| held(i).then_some(0.0)).collect();
         loop {
-            let step = damped_step(normals, &stopped, damping)?;
+            let step = damped_step(&normals.matrix, &normals.gradient, &stopped, damping)?;
             let crossing: Vec<usize> =
                 (0..x.len()).filter(|i| stopped[*i].is_none() && x[*i] + step[*i] < lower[*i]).collect();
             if crossing.is_empty() {
@@ -193,22 +193,27 @@ impl Descent {
 }
 
 /// Solves (N + λ diag N) step = −gradient for the variables whose step is not given.
-fn damped_step(normals: &Normals, given: &[Option<f64>], damping: f64) -> Option<DVector<f64>> {
+pub fn damped_step(
+    matrix: &DMatrix<f64>,
+    gradient: &DVector<f64>,
+    given: &[Option<f64>],
+    damping: f64,
+) -> Option<DVector<f64>> {
     let count = given.len();
-    let scale: Vec<f64> = (0..count).map(|i| normals.matrix[(i, i)].max(1e-300).sqrt()).collect();
-    let matrix = DMatrix::from_fn(count, count, |i, j| {
+    let scale: Vec<f64> = (0..count).map(|i| matrix[(i, i)].max(1e-300).sqrt()).collect();
+    let damped = DMatrix::from_fn(count, count, |i, j| {
         if given[i].is_some() || given[j].is_some() {
             return f64::from(u8::from(i == j));
         }
         let extra = if i == j { damping } else { 0.0 };
-        normals.matrix[(i, j)] / (scale[i] * scale[j]) + extra
+        matrix[(i, j)] / (scale[i] * scale[j]) + extra
     });
-    let carried = |i: usize| (0..count).map(|j| normals.matrix[(i, j)] * given[j].unwrap_or(0.0)).sum::<f64>();
+    let carried = |i: usize| (0..count).map(|j| matrix[(i, j)] * given[j].unwrap_or(0.0)).sum::<f64>();
     let right = DVector::from_fn(count, |i, _| match given[i] {
         Some(step) => step * scale[i],
-        None => -(normals.gradient[i] + carried(i)) / scale[i],
+        None => -(gradient[i] + carried(i)) / scale[i],
     });
-    let solved = matrix.cholesky()?.solve(&right);
+    let solved = damped.cholesky()?.solve(&right);
     solved.iter().all(|v| v.is_finite()).then(|| DVector::from_fn(count, |i, _| solved[i] / scale[i]))
 }
 

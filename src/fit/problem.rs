@@ -105,6 +105,11 @@ impl<'a> Problem<'a> {
         self.free.len() + record * 2 * self.shapes()
     }
 
+    /// A recording's start among the variables.
+    pub fn start<'x>(&self, x: &'x [f64], record: usize) -> &'x [f64] {
+        &x[self.start_of(record)..][..2 * self.shapes()]
+    }
+
     /// The starts that variables of another problem hold, in the shapes of this one: what that one lacks is at rest.
     pub fn starts_from(&self, other: &Problem<'_>, x: &[f64]) -> Vec<f64> {
         self.starts_in_shapes(&x[other.free.len()..], other.shapes())
@@ -160,12 +165,11 @@ impl<'a> Problem<'a> {
     /// [`Error::Simulation`].
     pub fn predict(&self, record: usize, x: &[f64], slopes: bool) -> Result<Prediction> {
         let (model, camera) = self.model(record, &x[..self.free.len()])?;
-        let start = self.start_of(record);
         let data = &self.records[record];
         let request = Request {
             record: data,
             rows: &(0..data.len()),
-            start: &x[start..start + 2 * self.shapes()],
+            start: self.start(x, record),
             camera: &camera,
             parameters: &self.free,
             until_s: data.t_s[data.len() - 1],

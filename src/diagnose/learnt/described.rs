@@ -30,13 +30,6 @@ pub struct Described<'a> {
     pub length: f64,
 }
 
-impl Described<'_> {
-    /// How many coefficients it has beside those of the base model.
-    pub fn coefficients(&self) -> usize {
-        self.fit.added().len() + self.terms.iter().map(|term| term.law.parameters.len()).sum::<usize>()
-    }
-}
-
 /// Names with and without laws of the grammar, fitted in full simulation, the shortest description first.
 pub fn descriptions<'a>(
     context: &FitContext<'a>,
@@ -195,14 +188,14 @@ fn described<'a>(fitted: Vec<(Vec<Term>, Refit<'a>)>, prior: &Prior) -> Option<V
     let least = fitted.iter().map(|(_, fit)| fit).min_by(|a, b| a.chi2.total_cmp(&b.chi2))?;
     let scatter = Scatter::of(least, least.values());
     let together = (scatter.of_all / scatter.of_values).max(1.0);
-    let of = |(terms, fit): (Vec<Term>, Refit<'a>)| {
-        let mut own = Described { terms, fit, length: 0.0 };
-        own.length = 0.5 * own.fit.chi2 / scatter.of_all
-            + 0.5 * own.coefficients() as f64 * (own.fit.values() as f64 / together).ln()
-            + prior.of_description(&own.terms, &own.fit.hypothesis);
-        own
+    let length = |terms: &[Term], fit: &Refit<'_>| {
+        let count = fit.added().len() + terms.iter().map(|term| term.law.parameters.len()).sum::<usize>();
+        0.5 * fit.chi2 / scatter.of_all
+            + 0.5 * count as f64 * (fit.values() as f64 / together).ln()
+            + prior.of_description(terms, &fit.hypothesis)
     };
-    let mut order: Vec<Described<'a>> = fitted.into_iter().map(of).collect();
+    let mut order: Vec<Described<'a>> =
+        fitted.into_iter().map(|(terms, fit)| Described { length: length(&terms, &fit), terms, fit }).collect();
     order.sort_by(|a, b| a.length.total_cmp(&b.length));
     Some(order)
 }

@@ -12,6 +12,7 @@ use super::super::refit::Refit;
 use super::super::screen::Projection;
 use super::super::settings::LawSettings;
 use crate::experiment::LawPlace;
+use crate::fit::descent::damped_step;
 use crate::fit::recordings;
 use crate::model::effects::Effect as _;
 use crate::model::effects::formula::Formula;
@@ -176,20 +177,14 @@ fn promising(
 
 /// By how much the variables with these derivatives move with each set of terms, a column each: the step of a descent that is damped a little.
 fn steps(left: &DVector<f64>, slopes: &DMatrix<f64>, columns: &DMatrix<f64>, promising: &[Promising]) -> DMatrix<f64> {
-    let sizes: Vec<f64> = slopes.column_iter().map(|column| column.norm().max(1e-300)).collect();
-    let mut normal = slopes.tr_mul(slopes);
-    for (i, j) in (0..sizes.len()).flat_map(|i| (0..sizes.len()).map(move |j| (i, j))) {
-        normal[(i, j)] /= sizes[i] * sizes[j];
-    }
-    (0..sizes.len()).for_each(|i| normal[(i, i)] += DAMPING);
-    let mut pull = DMatrix::zeros(sizes.len(), promising.len());
-    for (mut pull, (_, terms)) in pull.column_iter_mut().zip(promising) {
+    let (normal, none) = (slopes.tr_mul(slopes), vec![None; slopes.ncols()]);
+    let mut steps = DMatrix::zeros(slopes.ncols(), promising.len());
+    for (mut step, (_, terms)) in steps.column_iter_mut().zip(promising) {
         let with = terms.iter().fold(left.clone(), |with, (k, a)| with + columns.column(*k) * *a);
-        pull.copy_from(&-slopes.tr_mul(&with));
-        pull.iter_mut().zip(&sizes).for_each(|(pull, size)| *pull /= size);
+        if let Some(damped) = damped_step(&normal, &slopes.tr_mul(&with), &none, DAMPING) {
+            step.copy_from(&damped);
+        }
     }
-    let mut steps = normal.cholesky().map_or_else(|| pull.clone() * 0.0, |cholesky| cholesky.solve(&pull));
-    steps.row_iter_mut().zip(&sizes).for_each(|(mut row, size)| row /= *size);
     steps
 }
 

@@ -31,10 +31,7 @@ pub fn continued<'a>(context: &FitContext<'a>, fits: &[Refit<'a>], effects: &[Ef
         let records = first_part(context.records, part);
         let early = context.on(&records);
         let there: Vec<Refit<'_>> = if followed.is_empty() {
-            let mut chosen = refit::best(fits, settings.begun, |_| true, Refit::left_share);
-            chosen.extend((0..fits.len()).filter(|place| fits[*place].hypothesis.effects.is_empty()));
-            chosen.sort_unstable();
-            chosen.dedup();
+            let chosen = best_and_base(fits, settings.begun, Refit::left_share);
             let begun = |place: &usize| on_the_beginning(context, &early, &fits[*place]);
             chosen.par_iter().with_max_len(1).filter_map(begun).collect()
         } else {
@@ -78,18 +75,11 @@ pub fn carried<'a>(context: &FitContext<'a>, fits: Vec<Refit<'_>>, part: f64, no
 pub fn whole<'a>(context: &FitContext<'a>, of_pieces: &[Refit<'a>], noise: &[RecordNoise]) -> Vec<Refit<'a>> {
     let (settings, few) = (context.settings, context.settings.descent.few_steps);
     let Some(least) = least(of_pieces) else { return Vec::new() };
-    let mut chosen =
-        refit::best(of_pieces, settings.search.followed, |_| true, |fit| needs(fit, least, &settings.misfit));
-    chosen.extend(of_pieces.iter().position(|fit| fit.hypothesis.effects.is_empty()));
-    chosen.sort_unstable();
-    chosen.dedup();
+    let chosen = best_and_base(of_pieces, settings.search.followed, |fit| needs(fit, least, &settings.misfit));
     let on_whole = |place: &usize| {
         let (fit, problem) = (&of_pieces[*place], &of_pieces[*place].problem);
         let recordings = recordings(problem.records);
-        let starts = recordings.iter().flat_map(|pieces| {
-            let start = problem.start_of(pieces.start);
-            &fit.x[start..start + 2 * problem.shapes()]
-        });
+        let starts = recordings.iter().flat_map(|pieces| problem.start(&fit.x, pieces.start));
         let x = fit.x[..problem.free.len()].iter().chain(starts).copied().collect();
         let of_recording = |(piece, at_s)| Some((recordings.iter().position(|own| own.contains(&piece))?, at_s));
         let hypothesis =
@@ -99,6 +89,15 @@ pub fn whole<'a>(context: &FitContext<'a>, of_pieces: &[Refit<'a>], noise: &[Rec
         grown.into_iter().chain([whole]).min_by(|a, b| a.chi2.total_cmp(&b.chi2))
     };
     chosen.par_iter().with_max_len(1).filter_map(on_whole).collect()
+}
+
+/// The fits that leave least, and the base model's, in their order.
+fn best_and_base<'a>(fits: &[Refit<'a>], count: usize, left: impl Fn(&Refit<'a>) -> f64) -> Vec<usize> {
+    let mut chosen = refit::best(fits, count, |_| true, left);
+    chosen.extend((0..fits.len()).filter(|place| fits[*place].hypothesis.effects.is_empty()));
+    chosen.sort_unstable();
+    chosen.dedup();
+    chosen
 }
 
 fn to_follow(fits: Vec<Refit<'_>>) -> Vec<(Hypothesis, Vec<f64>)> {
