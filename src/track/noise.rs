@@ -5,25 +5,29 @@
 //! have unit scale. Where it has scale κ, the stated standard deviations are multiplied by κ.
 //!
 //! A codec moves a mark by whole quarter pixels and codes what is left only where it is large, so a moving mark
-//! scatters far more than its noise says. At rest the picture is coded once and repeated: the error is smaller and
-//! does not show as scatter. The two states therefore have a factor each, and a mark at rest is never believed to
-//! be better than its own noise or than [`REST_SHARE`] of what the moving marks show.
+//! scatters far more than its noise says; without loss it scatters less. At rest the picture is coded once and repeated:
+//! the error does not show as scatter. The two states therefore have a factor each, and a mark at rest is never believed
+//! to be better than its own scatter or than [`REST_SHARE`] of what the moving marks show, nor better than stated where
+//! nothing moves.
 
 use super::{Flags, Measured};
 use crate::statistics::{median, median_step_s};
 
-/// Orders that are tried; the least result counts, for motion can only add to it.
-const ORDERS: [usize; 4] = [6, 8, 10, 12];
+/// Orders that are tried; the least result counts, for motion can only add to it. The height of a tip that swings at an
+/// eighth of the frame rate moves at a quarter of it, which order 12 still lets through where the codec loses nothing.
+const ORDERS: [usize; 6] = [6, 8, 10, 12, 16, 20];
 /// Windows below which nothing is concluded.
 const LEAST_WINDOWS: usize = 50;
 /// Classes of speed, each judged alone; the least result counts, for fast motion leaks most.
 const SPEED_CLASSES: usize = 3;
 /// px a frame from which a mark counts as moving.
 const MOVING_PX: f64 = 0.5;
-/// What neighbouring errors have in common, which differences do not see, and the choice of the least result.
-const UNSEEN: f64 = 1.30;
-/// Error at rest over error in motion, on rendered recordings.
-const REST_SHARE: f64 = 0.42;
+/// What neighbouring errors have in common, which differences do not see, and the choice of the least result (foreign
+/// renderings: 94 % of the intervals of moving marks hold in the median).
+const UNSEEN: f64 = 1.42;
+/// Error at rest over error in motion. On foreign renderings 0.1 to 0.5 where a picture is predicted from the last, 1 where
+/// each is coded alone.
+const REST_SHARE: f64 = 0.9;
 
 /// Factors (x, y) on the stated standard deviation of a mark.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -42,16 +46,18 @@ pub fn scatters(marks: &[Vec<(Option<Measured>, Flags)>], t_s: &[f64]) -> Vec<Sc
     let moving: Vec<[Option<f64>; 2]> =
         tracks.iter().zip(&speeds).map(|(t, v)| [0, 1].map(|axis| moving_factor(t, v, t_s, axis))).collect();
     let shown: Vec<f64> = moving.iter().flatten().flatten().copied().collect();
-    let usual = shown.iter().sum::<f64>() / shown.len().max(1) as f64;
+    // where nothing moves, nothing tells what a picture that is repeated hides
+    let usual = if shown.is_empty() { 1.0 } else { shown.iter().sum::<f64>() / shown.len() as f64 };
     tracks
         .iter()
         .zip(&speeds)
         .zip(&moving)
         .map(|((track, speed), moving)| {
-            let rest = |axis| resting_factor(track, speed, t_s, axis).unwrap_or(1.0);
+            let rest = |axis| resting_factor(track, speed, t_s, axis).unwrap_or(0.0);
+            let least = if shown.is_empty() { 1.0 } else { 0.0 };
             Scatter {
-                resting: [0, 1].map(|axis| rest(axis).max(REST_SHARE * moving[axis].unwrap_or(usual)).max(1.0)),
-                moving: moving.map(|k| k.unwrap_or(usual).max(1.0)),
+                resting: [0, 1].map(|axis| rest(axis).max(REST_SHARE * moving[axis].unwrap_or(usual)).max(least)),
+                moving: moving.map(|k| k.unwrap_or(usual)),
             }
         })
         .collect()
@@ -181,7 +187,8 @@ mod tests {
                 })
             })
             .collect();
-        let factor = moving_factor(&points, &speeds_px(&points), &t_s, 0).unwrap() / UNSEEN;
-        assert!((factor - 2.0).abs() < 0.35, "{factor}");
+        let factor = moving_factor(&points, &speeds_px(&points), &t_s, 0).unwrap();
+        // errors without memory are stated a little too large, never too small
+        assert!((2.0..2.5).contains(&factor), "{factor}");
     }
 }
