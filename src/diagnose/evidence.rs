@@ -80,6 +80,7 @@ pub fn ln_evidence(
         let i = added.iter().position(|p| *p == parameter).unwrap_or(0);
         (fit.value(parameter).unwrap_or(0.0), covariance[(i, i)].sqrt())
     };
+    let mut not_told = 0;
     for effect in weighed {
         let law = law_of(effect);
         let Some((value, sd)) = law.strength(effect, &of).filter(|_| law.is_possible(fit)) else {
@@ -87,8 +88,10 @@ pub fn ln_evidence(
         };
         let fall = (least_without(effect) - fit.chi2) / scatter.of_all;
         let needed = scatter.of_values > settings.much_left && fall > counts;
-        // a law of no size is none, however much more is left without it
-        if value == 0.0 || !(needed || value.abs() > settings.told_from_zero * sd) {
+        let is_told = value.abs() > settings.told_from_zero * sd;
+        not_told += usize::from(!is_told);
+        // a law of no size is none, however much more is left without it; and two of any size, as long as they grow together, are none
+        if value == 0.0 || !(needed || is_told) || not_told > 1 {
             return f64::NEG_INFINITY;
         }
         ln_volume -= (value.abs() * settings.sizes).ln() + law.ln_kinds(fit, effect, &of, settings);

@@ -18,6 +18,8 @@ pub struct Misfit {
     little: bool,
     /// Its motion has lost step with a recording.
     pub out_of_step: bool,
+    /// A spring of the base model has gone far from what the file and the recordings' modes say: it stands for what is missing, and is no place to start from.
+    pub strayed: bool,
     /// An effect that is not scanned for would explain some of it.
     pub seen: bool,
     /// A dear start leads somewhere where its first steps leave less than this χ².
@@ -41,6 +43,7 @@ impl Misfit {
             unsolved: unexplained,
             little: fit.chi2 < settings.little * values,
             out_of_step,
+            strayed: unexplained && has_strayed(fit, settings.strays),
             leads: if unexplained && !out_of_step { fit.chi2 - least_fall } else { beyond_hope },
             seen: scores.iter().any(|s| s.gain > settings.counts && !s.effect.is_scanned()),
         }
@@ -51,6 +54,15 @@ impl Misfit {
     pub fn beside(self, others: &[Refit<'_>]) -> Self {
         Self { unsolved: self.unexplained && (self.little || least_chi2(others) > self.too_much), ..self }
     }
+}
+
+/// Whether a spring of the file's has become so many times as stiff, or as soft.
+fn has_strayed(fit: &Refit<'_>, times: f64) -> bool {
+    let Ok(stated) = fit.problem.start_values() else { return false };
+    let pairs =
+        fit.problem.free.iter().zip(stated).filter(|(parameter, stated)| parameter.is_spring() && *stated > 0.0);
+    let mut ratios = pairs.filter_map(|(parameter, stated)| Some(fit.value(*parameter)? / stated));
+    ratios.any(|ratio| ratio > times || ratio < 1.0 / times)
 }
 
 /// The largest χ² of so many values that is still noise.

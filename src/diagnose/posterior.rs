@@ -6,7 +6,7 @@ use super::energy::added_torque_n_m;
 use super::evidence::{self, Scatter, normalised};
 use super::latent::{Assumed, Latent};
 use super::laws::law_of;
-use super::misfit::{most_of_noise, needs};
+use super::misfit::{leaves_more_than_noise, most_of_noise, needs};
 use super::refit::{self, Refit};
 use super::settings::Settings;
 use super::unknowns::unknowns;
@@ -77,7 +77,8 @@ pub fn weigh<'a>(fits: Vec<Refit<'a>>, effects: usize, compared: usize, settings
     let best = (0..fits.len()).max_by(|a, b| posterior[*a].total_cmp(&posterior[*b])).unwrap_or(0);
     let latents = unknowns(&fits[best], fits[best].chi2 / values as f64, Assumed::BESIDE);
     let law_error_n_m = law_error_n_m(&fits[best], added_torque_n_m(&fits[best]));
-    let gain = unknown_gain(&latents, law_error_n_m, slow_errors_rad(&fits[best]), settings.noise.coloured);
+    let gain = unknown_gain(&latents, law_error_n_m, slow_errors_rad(&fits[best]), settings.noise.coloured)
+        .max(gain_over_a_failed_fit(&fits[best], scatter, settings));
     posterior.push(posterior[best] + settings.prior.unknown.ln() + gain);
     let rivals = uncertified_within_reach(&fits, best, settings);
     let mut at_best = posterior.clone();
@@ -222,6 +223,13 @@ fn unknown_gain(latents: &[Latent], law_error_n_m: f64, slow_errors_rad: f64, co
     // any size is as likely as any other, at any place
     let looks: usize = latents.iter().map(|l| l.tried.len()).sum();
     latents.iter().map(of).fold(f64::NEG_INFINITY, f64::max) - (looks.max(1) as f64).ln()
+}
+
+/// How much likelier anything that leaves only noise makes the recordings than a fit that leaves far more: what is out of step with a recording shows no small torque
+/// that would mend it.
+fn gain_over_a_failed_fit(fit: &Refit<'_>, scatter: Scatter, settings: &Settings) -> f64 {
+    let gain = 0.5 * (fit.chi2 - fit.values() as f64) / scatter.of_all;
+    if leaves_more_than_noise(fit, &settings.noise) { gain } else { f64::NEG_INFINITY }
 }
 
 impl<'a> Posterior<'a> {

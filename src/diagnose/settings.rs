@@ -87,6 +87,9 @@ pub struct MisfitSettings {
     pub leads: f64,
     /// A fall of χ² by this much counts (statistics: 3 σ of one number).
     pub counts: f64,
+    /// A spring that has become so many times as stiff as the file and the recordings' modes say, or as soft, stands for something else. *Judgement*: a file may
+    /// be wrong ten times over.
+    pub strays: f64,
 }
 
 /// Up to which share of the budget each phase of a search may go (cost).
@@ -327,7 +330,7 @@ impl Default for DescentSettings {
 
 impl Default for MisfitSettings {
     fn default() -> Self {
-        Self { much: 0.05, out_of_step: 0.35, deviations: 4.0, little: 2.0, leads: 0.005, counts: 9.0 }
+        Self { much: 0.05, out_of_step: 0.35, deviations: 4.0, little: 2.0, leads: 0.005, counts: 9.0, strays: 30.0 }
     }
 }
 

@@ -10,7 +10,8 @@ use super::{Coefficients, Law, Sought};
 pub struct Ordinary;
 
 impl Law for Ordinary {
-    /// From where the score points. Where the base model is out of step, or has damped away what a better one keeps, from short stretches as well.
+    /// From where the score points. Where the base model is out of step, has damped away what a better one keeps, or made its spring stand for what is missing, from
+    /// short stretches as well.
     fn beside<'a>(&self, sought: &Sought<'_, 'a>) -> Option<Refit<'a>> {
         let Sought { context, base, effect, score, misfit } = *sought;
         let entry = effect.entry();
@@ -22,7 +23,8 @@ impl Law for Ordinary {
             let lost = misfit.out_of_step && entry.acts == Acts::Pace && near.as_ref().is_none_or(still);
             let slow =
                 misfit.unexplained && entry.acts == Acts::Loss && near.as_ref().is_none_or(|near| !near.converged);
-            if lost || slow {
+            let from_afar = misfit.strayed && near.as_ref().is_none_or(|near| near.chi2 > misfit.too_much);
+            if lost || slow || from_afar {
                 tries.push(context.refit_anew(&hypothesis, &score.start, base));
             }
             if misfit.unexplained && near.as_ref().is_none_or(|near| near.chi2 > misfit.too_much) {

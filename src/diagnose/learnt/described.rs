@@ -9,9 +9,10 @@ use super::super::grammar::Term;
 use super::super::hypothesis::Hypothesis;
 use super::super::posterior::Posterior;
 use super::super::refit::Refit;
+use super::super::stretches::{Asked, terms_asked_for};
 use super::Needed;
 use super::along::{Along, is_of_kind};
-use super::sought::{Candidate, candidates};
+use super::sought::{Candidate, candidates, started};
 use crate::experiment::{Coefficient, Law};
 use crate::model::Parameter;
 
@@ -19,6 +20,9 @@ use crate::model::Parameter;
 const SCALED: [f64; 3] = [1.0, 0.7, 1.4];
 /// A scale that many times the one from which it began has run away.
 const AWAY: f64 = 100.0;
+
+/// Terms, and the first steps of a fit with them.
+type Begun<'a> = (Vec<Term>, Refit<'a>);
 
 /// Terms that were fitted beside some effects, with the length of the description.
 pub struct Described<'a> {
@@ -34,7 +38,7 @@ pub struct Described<'a> {
 pub fn descriptions<'a>(
     context: &FitContext<'a>,
     posterior: &Posterior<'a>,
-    effects: usize,
+    effects: &[Effect],
 ) -> Option<Vec<Described<'a>>> {
     let best = posterior.best();
     let before = context.work.done();
@@ -44,13 +48,18 @@ pub fn descriptions<'a>(
     let allowed = search.shares.law * search.budget as f64 / each;
     let count = ((allowed / law.evaluations) as usize).clamp(law.fewest, law.most);
     let (candidates, terms) = candidates(best, &linearised, count, law)?;
-    let prior = Prior::of(context, best, effects, terms)?;
-    let begun: Vec<(Candidate, Refit<'a>)> = candidates
-        .into_par_iter()
-        .with_max_len(1)
-        .filter_map(|candidate| Some((candidate.clone(), begun_fit(context, best, &candidate, count > law.fewest)?)))
-        .collect();
-    let ended = |(candidate, fit): (Candidate, Refit<'a>)| ended(context, candidate.terms, fit);
+    let prior = Prior::of(context, best, effects.len(), terms.len())?;
+    let has_time = count > law.fewest;
+    let along_best = candidates.into_par_iter().with_max_len(1).filter_map(|candidate| {
+        let fit = begun_fit(context, best, &candidate, has_time)?;
+        Some((candidate.terms, fit))
+    });
+    let mut begun: Vec<Begun<'a>> = along_best.collect();
+    // their fits begin far away, and cost as much as all others
+    if count == law.most {
+        begun.extend(along_the_recording(context, posterior.base(), effects, &terms));
+    }
+    let ended = |(terms, fit): Begun<'a>| ended(context, terms, fit);
     // what the table has been fitted with is a description, too
     let possible = posterior.candidates.iter().filter(|candidate| candidate.ln_posterior.is_finite());
     let of_table = possible.map(|candidate| (Vec::new(), candidate.fit.clone()));
@@ -119,15 +128,33 @@ fn begun_fit<'a>(
     begun.into_iter().chain(along).min_by(|a, b| a.chi2.total_cmp(&b.chi2))
 }
 
+/// Terms, and names beside them, that short stretches ask for, fitted along the recorded motion: where the names of the table lead nowhere, no motion of theirs shows
+/// what is missing.
+fn along_the_recording<'a>(
+    context: &FitContext<'a>,
+    base: &Refit<'a>,
+    effects: &[Effect],
+    terms: &[Term],
+) -> Vec<Begun<'a>> {
+    let asked = terms_asked_for(context, base, effects, terms, context.settings.search.asked);
+    let fitted = |(asked, of_terms): (Asked, Vec<(usize, f64)>)| {
+        let own = of_terms.into_iter().enumerate();
+        let terms: Vec<Term> = own.map(|(place, (k, amplitude))| started(&terms[k], amplitude, place)).collect();
+        let fit = with_laws(context, &terms).refit_along_recording(&asked.hypothesis, base, &asked.start)?;
+        Some((terms, fit))
+    };
+    asked.into_par_iter().with_max_len(1).filter_map(fitted).collect()
+}
+
 /// Of what was begun the best, and the best term and the best pair beside each set of names, but for those without hope.
-fn foremost<'a>(mut begun: Vec<(Candidate, Refit<'a>)>, most: usize, hopeless: f64) -> Vec<(Candidate, Refit<'a>)> {
+fn foremost<'a>(mut begun: Vec<Begun<'a>>, most: usize, hopeless: f64) -> Vec<Begun<'a>> {
     begun.sort_by(|a, b| a.1.chi2.total_cmp(&b.1.chi2));
     let least = begun.first().map_or(0.0, |own| own.1.chi2);
     begun.retain(|own| own.1.chi2 < hopeless * least);
     let mut seen: Vec<(Hypothesis, usize)> = Vec::new();
     let mut rank = 0;
-    begun.retain(|(candidate, _)| {
-        let kind = (candidate.hypothesis.clone(), candidate.terms.len());
+    begun.retain(|(terms, fit)| {
+        let kind = (fit.hypothesis.clone(), terms.len());
         let is_first = !seen.contains(&kind);
         seen.push(kind);
         rank += 1;

@@ -3,7 +3,8 @@
 //! 1. Along the motion of the likeliest fit, which follows the recordings, every term of the [`grammar`](super::grammar) is a torque, and the linearised motion
 //!    says what it adds to the angles. With everything else that is free projected out, its fall of χ² is that of Rao's score test.
 //! 2. The same with a name taken away, or all of them: what it explains is then the term's to explain, which may be the law that the name stands for.
-//! 3. The terms, and pairs of them, that promise most are fitted, as laws of the file would be: first a few steps of all, then the best to the end.
+//! 3. The terms, and pairs of them, that promise most are fitted, as laws of the file would be: first a few steps of all, then the best to the end. So are those that
+//!    [short stretches](super::stretches) of the recordings ask for: where the likeliest fit is wrong, its motion shows nothing.
 //! 4. The description length chooses among them, and among all that the table has been fitted with; with v the variance that the best one leaves, over the noise's,
 //!    of n values of which τ go together,
 //!
@@ -53,7 +54,7 @@ pub fn beside<'a>(
     from_s: Option<f64>,
 ) -> (Needed, Option<Learnt<'a>>) {
     let is_worth = posterior.remains > context.settings.verdict.even && !context.is_strip();
-    let order = if is_worth { descriptions(context, posterior, effects.len()) } else { None };
+    let order = if is_worth { descriptions(context, posterior, effects) } else { None };
     let Some(order) = order else { return (Needed::new(), None) };
     let best = posterior.best();
     let Some(proof) = proof else { return (needed(context, &order, best, effects), None) };

@@ -34,14 +34,14 @@ pub struct Candidate {
     pub gain: f64,
 }
 
-/// What promises most, beside the names of a fit, without each of them, and in the place of them all, from the fit's residuals and their derivatives; and out of
-/// how many terms.
+/// What promises most, beside the names of a fit, without each of them, and in the place of them all, from the fit's residuals and their derivatives; and the terms
+/// out of which it was chosen.
 pub fn candidates(
     best: &Refit<'_>,
     (residual, slopes): &(DVector<f64>, DMatrix<f64>),
     count: usize,
     settings: &LawSettings,
-) -> Option<(Vec<Candidate>, usize)> {
+) -> Option<(Vec<Candidate>, Vec<Term>)> {
     let (all, columns) = effects_of_terms(best, residual.len())?;
     let names = &best.hypothesis.effects;
     let mut left_out: Vec<Vec<Effect>> = vec![Vec::new()];
@@ -72,12 +72,13 @@ pub fn candidates(
         let candidate = |(i, (gain, terms)): (usize, Promising)| {
             let mut step = vec![0.0; best.x.len()];
             kept.iter().zip(steps.column(i).iter()).for_each(|(place, moved)| step[*place] = *moved);
-            let terms = terms.into_iter().enumerate().map(|(place, (k, a))| begun(&all[k], a, place)).collect();
+            let terms = terms.into_iter().enumerate().map(|(place, (k, a))| started(&all[k], a, place)).collect();
             Candidate { hypothesis: hypothesis.clone(), terms, step, gain }
         };
         promising.into_iter().enumerate().map(candidate).collect::<Vec<_>>()
     };
-    Some((left_out.iter().flat_map(promise).collect(), apart.len()))
+    let candidates = left_out.iter().flat_map(promise).collect();
+    Some((candidates, apart.iter().map(|k| all[*k].clone()).collect()))
 }
 
 /// The terms that do something else to the angles than any before them: on a single link hinge, strip and tip are one place.
@@ -189,7 +190,7 @@ fn steps(left: &DVector<f64>, slopes: &DMatrix<f64>, columns: &DMatrix<f64>, pro
 }
 
 /// A term with its amplitude, under a name of its own.
-fn begun(term: &Term, amplitude: f64, place: usize) -> Term {
+pub(super) fn started(term: &Term, amplitude: f64, place: usize) -> Term {
     let mut term = term.clone();
     term.law.name = format!("learnt {}", place + 1);
     if let Some(own) = term.law.parameters.get_mut("a") {

@@ -7,7 +7,7 @@
 //! r + J (β − β₀) + S (s − s₀) = e        over all stretches
 //! ```
 //!
-//! and least squares, the starts projected out, give the coefficients of any set of laws at once. No small error of the model adds up over a recording: so it points
+//! and least squares, the starts projected out, give the coefficients of any set of laws at once, of the table or of the grammar. No small error of the model adds up over a recording: so it points
 //! to sets of laws that a search beside a poor base model does not come by. What the laws do over many swings is not seen: it proposes, and proves nothing.
 //!
 //! | file | holds |
@@ -20,8 +20,10 @@ use nalgebra::DMatrix;
 
 use super::context::FitContext;
 use super::effect::{Acts, Cost, Effect, Place};
+use super::grammar::Term;
 use super::hypothesis::Hypothesis;
 use super::refit::Refit;
+use crate::experiment::Law;
 use crate::fit::shooting::STATE_NEAR;
 use crate::fit::{Problem, Record};
 use crate::model::Parameter;
@@ -38,6 +40,9 @@ const OF_CAMERA: [(Effect, Parameter, f64); 2] =
 /// Linearised so often, each time at what the best set of laws makes of the base model's parameters.
 const PASSES: usize = 2;
 
+/// Steps of Gauss and Newton to the starts of stretches.
+const START_STEPS: usize = 4;
+
 /// A set of laws that the stretches ask for.
 #[derive(Debug, Clone)]
 pub struct Asked {
@@ -47,52 +52,117 @@ pub struct Asked {
     pub start: Vec<(Parameter, f64)>,
 }
 
+/// Most laws of a set.
+const MOST_LAWS: usize = 3;
+/// The same of sets with terms of the grammar, which are many.
+const MOST_WITH_TERMS: usize = 2;
+
 /// The sets of laws that leave least, those of most laws first: `each` of the largest number that is worth its coefficients, and the best of every smaller one.
 ///
 /// Empty where the frames do not resolve a swing.
 pub fn asked_for(context: &FitContext<'_>, base: &Refit<'_>, effects: &[Effect], each: usize) -> Vec<Asked> {
-    sets(context, base, effects, each).unwrap_or_default()
-}
-
-fn sets(context: &FitContext<'_>, base: &Refit<'_>, effects: &[Effect], each: usize) -> Option<Vec<Asked>> {
-    let (model, _) = base.problem.model(0, &base.x[..base.problem.free.len()]).ok()?;
-    let stretches = cut(context.records, SWINGS * std::f64::consts::TAU / model.pace_rad_s())?;
-    let short = context.on(&stretches);
     let laws: Vec<Effect> = effects.iter().copied().filter(|effect| is_told(*effect, effects)).collect();
-    let of_camera = OF_CAMERA.iter().filter(|own| effects.contains(&own.0));
-    let all = of_camera.clone().map(|own| own.0).chain(laws.iter().copied()).collect();
-    let hypothesis = Hypothesis { effects: all, dropped: None };
-    let problem = short.problem(&hypothesis, &short.noise_of(base)).ok()?;
+    let amplitudes: Vec<Parameter> = laws.iter().map(|law| law.parameters()[0]).collect();
     let known = &context.base;
-    let allowed = known.iter().copied().chain(of_camera.map(|own| own.1));
-    let columns: Vec<Parameter> = allowed.chain(laws.iter().map(|law| law.parameters()[0])).collect();
-    let reach_s = STATE_NEAR / model.pace_rad_s();
-    let mut values: Vec<(Parameter, f64)> = known.iter().map(|p| (*p, base.value(*p).unwrap_or(0.0))).collect();
-    let beside = columns.len() - laws.len();
-    let mut found = Vec::new();
-    for _ in 0..PASSES {
-        let squares = linearised(&problem, &values, &columns, reach_s)?;
-        found = squares.best_sets(beside, each);
-        let Some(best) = found.first() else { break };
-        values.iter_mut().zip(&best.values).for_each(|(own, value)| own.1 = *value);
-    }
+    let sets = sets(context, base, known, (effects, &laws), &amplitudes, ((MOST_LAWS, each), false));
     // corners are dear, and nothing is lost with the second best of those that have them
     let has_corners = |set: &Set| set.laws.iter().any(|law| laws[*law].has_corners());
     let mut with_corners: Vec<usize> = Vec::new();
-    found.retain(|set| {
+    let is_kept = |set: &Set| {
         let count = set.laws.len();
         let is_second = has_corners(set) && with_corners.contains(&count);
         with_corners.extend(has_corners(set).then_some(count));
         !is_second
-    });
-    let asked = |set: Set| {
-        let effects: Vec<Effect> = set.laws.iter().map(|law| laws[*law]).collect();
-        let of_set = effects.iter().map(|effect| effect.parameters()[0]);
-        let of_laws = of_set.zip(set.values[beside..].iter().copied());
-        let start = known.iter().copied().zip(set.values.iter().copied()).chain(of_laws).collect();
-        Asked { hypothesis: Hypothesis { effects, dropped: None }, start }
     };
-    Some(found.into_iter().map(asked).collect())
+    let (kept, beside): (Vec<Set>, usize) = sets.map_or((Vec::new(), 0), |(sets, beside)| (sets, beside));
+    kept.into_iter().filter(is_kept).map(|set| asked(&set, known, &laws, beside)).collect()
+}
+
+/// Terms of the grammar, alone, in pairs and beside one of the table's laws, that leave least: the set's laws of the table, and which terms with what amplitudes.
+pub fn terms_asked_for(
+    context: &FitContext<'_>,
+    base: &Refit<'_>,
+    effects: &[Effect],
+    terms: &[Term],
+    each: usize,
+) -> Vec<(Asked, Vec<(usize, f64)>)> {
+    let is_cheap = |effect: &Effect| is_told(*effect, effects) && !effect.has_corners();
+    let laws: Vec<Effect> = effects.iter().copied().filter(is_cheap).collect();
+    let named = |(k, term): (usize, &Term)| Law { name: format!("term {k}"), ..term.law.clone() };
+    let of_terms: Vec<Law> = terms.iter().enumerate().map(named).collect();
+    // a term's amplitude comes first; its other coefficients stay where they are
+    let amplitude = |law: &Law| law.coefficients().next().map(|(parameter, _)| parameter);
+    let Some(amplitudes) = of_terms.iter().map(amplitude).collect::<Option<Vec<Parameter>>>() else {
+        return Vec::new();
+    };
+    let known = &context.base;
+    let with_terms = FitContext { laws: of_terms, base: [known.as_slice(), &amplitudes].concat(), ..context.clone() };
+    let all: Vec<Parameter> = laws.iter().map(|law| law.parameters()[0]).chain(amplitudes).collect();
+    let found = |most: usize| {
+        let sets = sets(&with_terms, base, known, (effects, &laws), &all, ((most, each), true));
+        sets.map_or((Vec::new(), 0), |(sets, beside)| (sets, beside))
+    };
+    let (pairs, beside) = found(MOST_WITH_TERMS);
+    let mut kinds = Vec::new();
+    let of_set = |set: Set| {
+        let of_terms = |(law, value): (&usize, &f64)| Some((law.checked_sub(laws.len())?, *value));
+        let own: Vec<(usize, f64)> = set.laws.iter().zip(&set.values[beside..]).filter_map(of_terms).collect();
+        let asked = asked(&set, known, &laws, beside);
+        // one form is asked for once, however many starts its other coefficients have
+        let form =
+            |(k, _): &(usize, f64)| (terms[*k].law.place, terms[*k].state, terms[*k].shape, terms[*k].modulation);
+        let kind = (asked.hypothesis.effects.clone(), own.iter().map(form).collect::<Vec<_>>());
+        let is_new = !own.is_empty() && !kinds.contains(&kind);
+        kinds.push(kind);
+        is_new.then_some((asked, own))
+    };
+    found(1).0.into_iter().chain(pairs).filter_map(of_set).collect()
+}
+
+/// What a set asks for of the table's laws, the first of its laws being those.
+fn asked(set: &Set, known: &[Parameter], laws: &[Effect], beside: usize) -> Asked {
+    let of_table: Vec<(Effect, f64)> = set
+        .laws
+        .iter()
+        .zip(&set.values[beside..])
+        .filter_map(|(law, value)| Some((*laws.get(*law)?, *value)))
+        .collect();
+    let of_laws = of_table.iter().map(|(effect, value)| (effect.parameters()[0], *value));
+    let start = known.iter().copied().zip(set.values.iter().copied()).chain(of_laws).collect();
+    let effects = of_table.iter().map(|(effect, _)| *effect).collect();
+    Asked { hypothesis: Hypothesis { effects, dropped: None }, start }
+}
+
+/// The sets of at most so many laws that leave least, each law in proportion to one of the `amplitudes`, and how many values of a set stand before those of its laws:
+/// those of `known`, the base model's, and of the camera; `follows`: from starts that are fitted to their stretches.
+fn sets(
+    context: &FitContext<'_>,
+    base: &Refit<'_>,
+    known: &[Parameter],
+    (effects, laws): (&[Effect], &[Effect]),
+    amplitudes: &[Parameter],
+    (most_each, follows): ((usize, usize), bool),
+) -> Option<(Vec<Set>, usize)> {
+    let (model, _) = base.problem.model(0, &base.x[..base.problem.free.len()]).ok()?;
+    let stretches = cut(context.records, SWINGS * std::f64::consts::TAU / model.pace_rad_s())?;
+    let short = context.on(&stretches);
+    let of_camera = OF_CAMERA.iter().filter(|own| effects.contains(&own.0));
+    let all = of_camera.clone().map(|own| own.0).chain(laws.iter().copied()).collect();
+    let hypothesis = Hypothesis { effects: all, dropped: None };
+    let problem = short.problem(&hypothesis, &short.noise_of(base)).ok()?;
+    let allowed = known.iter().copied().chain(of_camera.map(|own| own.1));
+    let columns: Vec<Parameter> = allowed.chain(amplitudes.iter().copied()).collect();
+    let reach_s = STATE_NEAR / model.pace_rad_s();
+    let mut values: Vec<(Parameter, f64)> = known.iter().map(|p| (*p, base.value(*p).unwrap_or(0.0))).collect();
+    let beside = columns.len() - amplitudes.len();
+    let mut found = Vec::new();
+    for _ in 0..PASSES {
+        let squares = linearised(&problem, &values, &columns, (reach_s, follows))?;
+        found = squares.best_sets(beside, most_each);
+        let Some(best) = found.first() else { break };
+        values.iter_mut().zip(&best.values).for_each(|(own, value)| own.1 = *value);
+    }
+    Some((found, beside))
 }
 
 /// Whether an effect is a law that acts at every instant by a torque in proportion to its coefficient, and that no error of the camera among some effects does as
@@ -115,7 +185,7 @@ fn linearised(
     problem: &Problem<'_>,
     values: &[(Parameter, f64)],
     columns: &[Parameter],
-    reach_s: f64,
+    (reach_s, follows): (f64, bool),
 ) -> Option<LeastSquares> {
     let mut x = problem.start_values().ok()?;
     for (value, parameter) in x.iter_mut().zip(&problem.free) {
@@ -124,6 +194,9 @@ fn linearised(
         *value = given.unwrap_or(if is_law { 0.0 } else { *value });
     }
     x.extend(problem.records.iter().flat_map(|stretch| stretch.start_near(0, reach_s)));
+    if follows {
+        follow(problem, &mut x)?;
+    }
     let places: Vec<usize> =
         columns.iter().map(|own| problem.free.iter().position(|free| free == own)).collect::<Option<_>>()?;
     let free = problem.free.len();
@@ -149,6 +222,30 @@ fn linearised(
         belief: known(p),
     };
     Some(LeastSquares::of(&rows, columns.iter().zip(&places).map(column).collect(), independent))
+}
+
+/// Moves the starts to where the motion with these values follows its stretches best: what neighbouring rows show of a fast mode's rate is too rough to be linear in.
+fn follow(problem: &Problem<'_>, x: &mut [f64]) -> Option<()> {
+    let free = problem.free.len();
+    let starts = (x.len() - free) / problem.records.len().max(1);
+    let mut least = f64::INFINITY;
+    let mut best = x.to_vec();
+    for _ in 0..START_STEPS {
+        let blocks: Vec<_> = problem.blocks(x)?.into_iter().filter(|block| block.robust).collect();
+        let left: f64 = blocks.iter().map(|block| block.residual.norm_squared()).sum();
+        if blocks.len() != problem.records.len() || left.is_nan() || left > least {
+            break;
+        }
+        least = left;
+        best.copy_from_slice(x);
+        for (block, own) in blocks.iter().zip(x[free..].chunks_mut(starts)) {
+            let slopes = block.slopes.columns(free, starts).into_owned();
+            let step = slopes.svd(true, true).solve(&block.residual, 1e-12).ok()?;
+            own.iter_mut().zip(step.iter()).for_each(|(start, step)| *start -= step);
+        }
+    }
+    x.copy_from_slice(&best);
+    Some(())
 }
 
 #[cfg(test)]

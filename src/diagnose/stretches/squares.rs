@@ -2,9 +2,6 @@
 
 use nalgebra::{DMatrix, DVector};
 
-/// Most laws of one set.
-const MOST_LAWS: usize = 3;
-
 /// A parameter among the least squares.
 pub struct Column {
     /// The value around which the motion is linear.
@@ -110,13 +107,14 @@ impl LeastSquares {
         Some((of.iter().map(change).collect(), chi2))
     }
 
-    /// The sets of laws that leave least; the first `known` columns are the base model's, every other one is a law.
-    pub fn best_sets(&self, known: usize, each: usize) -> Vec<Set> {
+    /// The sets of at most so many laws that leave least, `each` of the largest number that is worth it and one of every smaller one; the first `known` columns are
+    /// the base model's, every other one is a law.
+    pub fn best_sets(&self, known: usize, (most, each): (usize, usize)) -> Vec<Set> {
         let base: Vec<usize> = (0..known).collect();
         let Some((_, mut before)) = self.solved(&base) else { return Vec::new() };
         let mut found: Vec<Vec<Set>> = Vec::new();
         let mut sets: Vec<Vec<usize>> = vec![Vec::new()];
-        for _ in 0..MOST_LAWS {
+        for _ in 0..most {
             let with_one_more = |set: &Vec<usize>| {
                 let (set, next) = (set.clone(), set.last().map_or(0, |last| last + 1));
                 (next..self.columns.len() - known).map(move |law| [set.as_slice(), &[law]].concat())
@@ -160,7 +158,7 @@ mod tests {
         let block = DMatrix::from_fn(rows, 5, |k, column| if column == 0 { torque(k) } else { wave(k, column as f64) });
         let column = |from: f64| Column { from, is_not_negative: true, belief: None };
         let squares = LeastSquares::of(&[block], vec![column(1.0), column(0.0), column(0.0), column(0.0)], rows);
-        let sets = squares.best_sets(1, 1);
+        let sets = squares.best_sets(1, (3, 1));
         let best = &sets[0];
         assert_eq!(best.laws, [0, 2]);
         assert!((best.values[1] - 2.0).abs() < 0.1 && (best.values[2] - 1.0).abs() < 0.1, "{:?}", best.values);
