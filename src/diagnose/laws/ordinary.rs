@@ -23,11 +23,11 @@ impl Law for Ordinary {
             let lost = misfit.out_of_step && entry.acts == Acts::Pace && near.as_ref().is_none_or(still);
             let slow =
                 misfit.unexplained && entry.acts == Acts::Loss && near.as_ref().is_none_or(|near| !near.converged);
-            let from_afar = misfit.strayed && near.as_ref().is_none_or(|near| near.chi2 > misfit.too_much);
-            if lost || slow || from_afar {
+            let leaves_too_much = near.as_ref().is_none_or(|near| near.chi2 > misfit.too_much);
+            if lost || slow || misfit.strayed && leaves_too_much {
                 tries.push(context.refit_anew(&hypothesis, &score.start, base));
             }
-            if misfit.unexplained && near.as_ref().is_none_or(|near| near.chi2 > misfit.too_much) {
+            if misfit.unexplained && leaves_too_much {
                 let others = score.further.iter();
                 tries.extend(others.map(|start| context.refit_below(misfit.leads, &hypothesis, base, start)));
             }

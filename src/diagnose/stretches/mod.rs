@@ -39,9 +39,12 @@ const OF_CAMERA: [(Effect, Parameter, f64); 2] =
     [(Effect::CameraTilt, Parameter::CameraTilt, 0.01), (Effect::AngleGain, Parameter::AngleGain, 0.02)];
 /// Linearised so often, each time at what the best set of laws makes of the base model's parameters.
 const PASSES: usize = 2;
-
 /// Steps of Gauss and Newton to the starts of stretches.
 const START_STEPS: usize = 4;
+/// Most laws of a set.
+const MOST_LAWS: usize = 3;
+/// The same of sets with terms of the grammar, which are many.
+const MOST_WITH_TERMS: usize = 2;
 
 /// A set of laws that the stretches ask for.
 #[derive(Debug, Clone)]
@@ -51,11 +54,6 @@ pub struct Asked {
     /// Their coefficients, and the base model's.
     pub start: Vec<(Parameter, f64)>,
 }
-
-/// Most laws of a set.
-const MOST_LAWS: usize = 3;
-/// The same of sets with terms of the grammar, which are many.
-const MOST_WITH_TERMS: usize = 2;
 
 /// The sets of laws that leave least, those of most laws first: `each` of the largest number that is worth its coefficients, and the best of every smaller one.
 ///
@@ -74,8 +72,8 @@ pub fn asked_for(context: &FitContext<'_>, base: &Refit<'_>, effects: &[Effect],
         with_corners.extend(has_corners(set).then_some(count));
         !is_second
     };
-    let (kept, beside): (Vec<Set>, usize) = sets.map_or((Vec::new(), 0), |(sets, beside)| (sets, beside));
-    kept.into_iter().filter(is_kept).map(|set| asked(&set, known, &laws, beside)).collect()
+    let (sets, beside) = sets.unwrap_or_default();
+    sets.into_iter().filter(is_kept).map(|set| asked(&set, known, &laws, beside)).collect()
 }
 
 /// Terms of the grammar, alone, in pairs and beside one of the table's laws, that leave least: the set's laws of the table, and which terms with what amplitudes.
@@ -98,10 +96,8 @@ pub fn terms_asked_for(
     let known = &context.base;
     let with_terms = FitContext { laws: of_terms, base: [known.as_slice(), &amplitudes].concat(), ..context.clone() };
     let all: Vec<Parameter> = laws.iter().map(|law| law.parameters()[0]).chain(amplitudes).collect();
-    let found = |most: usize| {
-        let sets = sets(&with_terms, base, known, (effects, &laws), &all, ((most, each), true));
-        sets.map_or((Vec::new(), 0), |(sets, beside)| (sets, beside))
-    };
+    let found =
+        |most: usize| sets(&with_terms, base, known, (effects, &laws), &all, ((most, each), true)).unwrap_or_default();
     let (pairs, beside) = found(MOST_WITH_TERMS);
     let mut kinds = Vec::new();
     let of_set = |set: Set| {
@@ -227,7 +223,7 @@ fn linearised(
 /// Moves the starts to where the motion with these values follows its stretches best: what neighbouring rows show of a fast mode's rate is too rough to be linear in.
 fn follow(problem: &Problem<'_>, x: &mut [f64]) -> Option<()> {
     let free = problem.free.len();
-    let starts = (x.len() - free) / problem.records.len().max(1);
+    let starts = 2 * problem.shapes();
     let mut least = f64::INFINITY;
     let mut best = x.to_vec();
     for _ in 0..START_STEPS {
