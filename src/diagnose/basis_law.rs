@@ -88,14 +88,23 @@ impl<'s> Swing<'s> {
         self.instants.iter().map(|at| &at.motion)
     }
 
+    /// A torque on the links, at one instant after another: `torque` adds it to the links'.
+    pub fn torques(&self, torque: impl Fn(&Motion, &mut [f64])) -> Vec<f64> {
+        let mut all = Vec::with_capacity(self.instants.len() * self.around.links);
+        let mut q = vec![0.0; self.around.rates];
+        for at in &self.instants {
+            q.fill(0.0);
+            torque(&at.motion, &mut q);
+            all.extend_from_slice(&q[..self.around.links]);
+        }
+        all
+    }
+
     /// What a torque adds to the values seen, whitened: `torque` adds it to the links'.
     pub fn response(&self, torque: impl Fn(&Motion, &mut [f64])) -> DMatrix<f64> {
-        let held = self.instants.iter().map(|at| {
-            let mut q = vec![0.0; self.around.rates];
-            torque(&at.motion, &mut q);
-            q[..self.around.links].iter().map(|q| [*q]).collect::<Vec<_>>()
-        });
-        self.seen(&held.collect::<Vec<_>>())
+        let torques = self.torques(torque);
+        let of_links = |q: &[f64]| q.iter().map(|q| [*q]).collect::<Vec<_>>();
+        self.seen(&torques.chunks(self.around.links).map(of_links).collect::<Vec<_>>())
     }
 
     /// What torques on the links that are held from row to row add to the values seen, whitened, one column a course.

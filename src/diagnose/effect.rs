@@ -158,7 +158,7 @@ pub struct Entry {
     /// The part of its own torque by which its law may be wrong before something unknown is suspected beside it. That of a hysteresis is larger: how it goes
     /// over from spring to slip has as many forms as there are authors.
     pub law_error: f64,
-    /// Shapes of the grammar's terms that are this law, of the angle where it goes with the position, of the rate elsewhere.
+    /// Shapes of the grammar's terms that are this law, or within its error where no law is exact; of the angle where it goes with the position, of the rate elsewhere.
     pub shapes: &'static [&'static str],
     /// Whether it can stop a swing, at an instant that no derivative foretells.
     pub can_stop: bool,
@@ -313,7 +313,7 @@ static TABLE: [Entry; 18] = {
             ..velocity(entry(&[P::AirLinear], Air, Loss, "air drag in proportion to speed"))
         },
         Entry {
-            shapes: &["square with its sign"],
+            shapes: &["square with its sign", "cube"],
             ..velocity(entry(&[P::AirQuadratic], Air, Loss, "air drag in proportion to speed squared"))
         },
         position(entry(&[P::AddedMass], Air, Pace, "air that swings along")),

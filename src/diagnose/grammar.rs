@@ -30,6 +30,11 @@ pub struct Term {
 }
 
 impl Term {
+    /// What it is, whatever its coefficients are: place, state, shape and modulation.
+    pub fn form(&self) -> (LawPlace, &'static str, &'static str, &'static str) {
+        (self.law.place, self.state, self.shape, self.modulation)
+    }
+
     /// Its formula with the numbers of its coefficients.
     pub fn with_numbers(&self) -> String {
         let number = |word: &str| self.law.parameters.get(word).map(|own| format!("{:.3e}", own.start));

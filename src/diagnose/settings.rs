@@ -103,7 +103,7 @@ pub struct BudgetShares {
     pub certified: f64,
     /// From the beginning on, more effects and fewer. What is left is for further starts of what that found.
     pub further: f64,
-    /// A law that no table holds is learnt beside all of that, with this much.
+    /// A law that no table holds is learnt beside all of that, with this much and what was not needed for it.
     pub law: f64,
 }
 
@@ -282,19 +282,22 @@ pub struct VerdictSettings {
 pub struct LawSettings {
     /// A term of which the projection leaves less than this part does what is free already (judgement: a thousandth).
     pub nothing_left: f64,
-    /// A term whose effect on the angles has this cosine with that of another, or of a name, is the same under another name (judgement).
+    /// A term whose torque has this cosine with another's, or of whose effect on the angles what nothing else does has it with a name's, is the same under another name
+    /// (judgement).
     pub the_same: f64,
     /// A term of the grammar with the shape of a law of the table, whose torque along the motion has this cosine with that law's, is that law (judgement: it is then
     /// more than half of the term, by squares; friction that is gone at a fifth of the largest speed has 0.5).
     pub the_same_law: f64,
     /// The foremost terms, each of which is paired with every one that promises less (cost).
     pub paired: usize,
-    /// Terms, and pairs, begun beside each set of names, and as many of all that was begun fitted to the end: at least (cost)…
-    pub fewest: usize,
-    /// … and at most (cost)…
+    /// Terms, and pairs, begun beside each set of names at most (cost)…
     pub most: usize,
-    /// … for each of which the budget must allow so many motions with derivatives (cost).
-    pub evaluations: f64,
+    /// … up to this part of what the budget allows; the rest is for those that are fitted to the end (cost).
+    pub begun: f64,
+    /// Short stretches of the recordings are asked, too, where the budget allows so many motions with derivatives (cost).
+    pub asked: f64,
+    /// The foremost fits are begun along the motion that names follow, too, where it allows so many (cost).
+    pub along: f64,
     /// Odds of a term that gives energy: what hangs and is let go takes none from anywhere, and such a term corrects others (judgement: one in ten).
     pub active: f64,
     /// The shortest descriptions of which it is asked what they predict (cost).
@@ -338,7 +341,7 @@ impl Default for SearchSettings {
     fn default() -> Self {
         Self {
             budget: 90_000_000,
-            shares: BudgetShares { usual: 0.45, restarts: 0.6, certified: 0.7, further: 0.9, law: 0.25 },
+            shares: BudgetShares { usual: 0.45, restarts: 0.6, certified: 0.7, further: 0.9, law: 1.2 },
             evaluations: 3000.0,
             early_swings: 12.0,
             part_worth: 0.6,
@@ -454,9 +457,10 @@ impl Default for LawSettings {
             the_same: 0.999,
             the_same_law: 0.71,
             paired: 12,
-            fewest: 2,
-            most: 6,
-            evaluations: 80.0,
+            most: 16,
+            begun: 0.4,
+            asked: 1000.0,
+            along: 400.0,
             active: 0.1,
             foretold: 12,
             alternatives: 5.0,

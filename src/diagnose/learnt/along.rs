@@ -18,16 +18,6 @@ pub fn is_of_kind(term: &Term, effect: Effect) -> bool {
     entry.shapes.contains(&term.shape) && (term.state == "angle") == (entry.phase == Some(Phase::Position))
 }
 
-/// Whether a term acts where an effect does.
-fn is_at_place(term: &Term, effect: Effect) -> bool {
-    let place = match term.law.place {
-        LawPlace::Hinge | LawPlace::Support => Place::Hinge,
-        LawPlace::Joint => Place::Joint,
-        LawPlace::Strip | LawPlace::Tip => Place::Air,
-    };
-    effect.place() == place
-}
-
 /// A fit's motion through every recording, row after row, in a model that has some effects more, of no size.
 pub struct Along(Vec<(ForwardModel, Vec<Motion>)>);
 
@@ -74,8 +64,14 @@ impl Along {
     }
 
     /// The effects that a term stands for, with the share of each: of its kind and at its place the one with whose torques it goes best, and all that do the
-    /// same as that one along this motion, wherever they act.
-    pub fn stands_for(&self, term: &Term, effects: &[Effect], law: &LawSettings) -> Vec<(Effect, f64)> {
+    /// same as that one along this motion, wherever they act. Of a description that leaves only noise a term `is_exact`: it is an effect's law, or another one. Of one
+    /// that leaves more no term is, and a neighbouring power is within its error.
+    pub fn stands_for(
+        &self,
+        (term, is_exact): (&Term, bool),
+        effects: &[Effect],
+        law: &LawSettings,
+    ) -> Vec<(Effect, f64)> {
         let Some(own) = self.of_term(term) else { return Vec::new() };
         let cosine = |effect: Effect| {
             let other = self.of_effect(effect);
@@ -86,12 +82,23 @@ impl Along {
         let of_kind = effects.iter().filter(|effect| is_of_kind(term, **effect));
         let cosines: Vec<(Effect, f64)> = of_kind.map(|effect| (*effect, cosine(*effect))).collect();
         let is_it = |(effect, cosine): &&(Effect, f64)| {
-            *cosine > if is_at_place(term, *effect) { law.the_same_law } else { law.the_same }
+            *cosine > if !is_exact && self.is_at_place(term, *effect) { law.the_same_law } else { law.the_same }
         };
         let Some(best) = cosines.iter().filter(is_it).max_by(|a, b| a.1.total_cmp(&b.1)) else { return Vec::new() };
         let is_as_good = |own: &&(Effect, f64)| own.1 > law.the_same * best.1;
         let alike = cosines.iter().filter(is_as_good).count() as f64;
         cosines.iter().filter(is_as_good).map(|own| (own.0, 1.0 / alike)).collect()
+    }
+
+    /// Whether a term acts where an effect does. Along a single link hinge, strip and tip are one place.
+    fn is_at_place(&self, term: &Term, effect: Effect) -> bool {
+        let is_single = self.0.iter().all(|(model, _)| model.chain().count() == 1);
+        let place = match term.law.place {
+            LawPlace::Hinge | LawPlace::Support => Place::Hinge,
+            LawPlace::Joint => Place::Joint,
+            LawPlace::Strip | LawPlace::Tip => Place::Air,
+        };
+        effect.place() == place || (is_single && matches!(effect.place(), Place::Hinge | Place::Air))
     }
 
     /// Of a unit of an effect's first coefficient.

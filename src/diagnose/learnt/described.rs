@@ -7,6 +7,7 @@ use super::super::effect::Effect;
 use super::super::evidence::{Scatter, normalised};
 use super::super::grammar::Term;
 use super::super::hypothesis::Hypothesis;
+use super::super::misfit::most_of_noise;
 use super::super::posterior::Posterior;
 use super::super::refit::Refit;
 use super::super::stretches::{Asked, terms_asked_for};
@@ -20,6 +21,11 @@ use crate::model::Parameter;
 const SCALED: [f64; 3] = [1.0, 0.7, 1.4];
 /// A scale that many times the one from which it began has run away.
 const AWAY: f64 = 100.0;
+
+/// So many fits are begun before it is asked whether the budget allows more, on every machine the same ones at once.
+const BEGUN_AT_ONCE: usize = 8;
+/// The same of fits to the end.
+const ENDED_AT_ONCE: usize = 2;
 
 /// Terms, and the first steps of a fit with them.
 type Begun<'a> = (Vec<Term>, Refit<'a>);
@@ -43,28 +49,28 @@ pub fn descriptions<'a>(
     let best = posterior.best();
     let before = context.work.done();
     let linearised = best.linearised()?;
-    let each = (context.work.done() - before).max(1) as f64;
+    let (from, each) = (context.work.done(), (context.work.done() - before).max(1) as f64);
     let (search, law) = (&context.settings.search, &context.settings.law);
-    let allowed = search.shares.law * search.budget as f64 / each;
-    let count = ((allowed / law.evaluations) as usize).clamp(law.fewest, law.most);
-    let (candidates, terms) = candidates(best, &linearised, count, law)?;
+    // what the search left of its own, and in any case half of the law's
+    let left = (1.0 + search.shares.law) * search.budget as f64 - from as f64;
+    let allowed = left.max(0.5 * search.shares.law * search.budget as f64);
+    let until = |part: f64| from + (part * allowed) as u64;
+    let (candidates, terms) = candidates(best, &linearised, law)?;
     let prior = Prior::of(context, best, effects.len(), terms.len())?;
-    let has_time = count > law.fewest;
-    let along_best = candidates.into_par_iter().with_max_len(1).filter_map(|candidate| {
-        let fit = begun_fit(context, best, &candidate, has_time)?;
-        Some((candidate.terms, fit))
-    });
-    let mut begun: Vec<Begun<'a>> = along_best.collect();
     // their fits begin far away, and cost as much as all others
-    if count == law.most {
-        begun.extend(along_the_recording(context, posterior.base(), effects, &terms));
-    }
-    let ended = |(terms, fit): Begun<'a>| ended(context, terms, fit);
+    let asked = (allowed > law.asked * each).then(|| along_the_recording(context, posterior.base(), effects, &terms));
+    let along_best = |candidate: Candidate| {
+        let fit = begun_fit(context, best, &candidate, allowed > law.along * each)?;
+        Some((candidate.terms, fit))
+    };
+    let mut begun: Vec<Begun<'a>> = within(context, until(law.begun), (BEGUN_AT_ONCE, candidates), along_best);
+    begun.extend(asked.unwrap_or_default());
+    let with_laws = within(context, until(1.0), (ENDED_AT_ONCE, foremost(begun, search.hopeless)), |(terms, fit)| {
+        ended(context, terms, fit)
+    });
     // what the table has been fitted with is a description, too
     let possible = posterior.candidates.iter().filter(|candidate| candidate.ln_posterior.is_finite());
     let of_table = possible.map(|candidate| (Vec::new(), candidate.fit.clone()));
-    let with_laws =
-        foremost(begun, count, search.hopeless).into_par_iter().with_max_len(1).filter_map(ended).collect::<Vec<_>>();
     let fitted: Vec<(Vec<Term>, Refit<'a>)> = with_laws.into_iter().chain(of_table).collect();
     let mut order = described(fitted, &prior)?;
     // a term that is nearly right makes names superfluous that were needed without it
@@ -110,7 +116,7 @@ pub fn with_laws<'a>(context: &FitContext<'a>, terms: &[Term]) -> FitContext<'a>
 }
 
 /// The first steps of a candidate, where it promises anything, from where the linear approximation leads. What the names do together is not linear in each: where
-/// that leaves more than was promised in their place, it begins along the motion that they follow, if there is time for that.
+/// that leaves more than was promised in their place, the foremost candidate begins along the motion that they follow, if there is time for that.
 fn begun_fit<'a>(
     context: &FitContext<'a>,
     best: &Refit<'a>,
@@ -123,8 +129,8 @@ fn begun_fit<'a>(
     let begun = with.begin(hypothesis, &led, &[]);
     let promised = context.settings.search.keeps_up * (best.chi2 - candidate.gain).max(best.values() as f64);
     let is_as_promised = begun.as_ref().is_some_and(|begun| begun.chi2 < promised);
-    let has_time = has_time && !is_as_promised && *hypothesis != best.hypothesis;
-    let along = has_time.then(|| with.refit_along(hypothesis, best, &[])).flatten();
+    let is_worth = has_time && candidate.is_foremost && !is_as_promised && *hypothesis != best.hypothesis;
+    let along = is_worth.then(|| with.refit_along(hypothesis, best, &[])).flatten();
     begun.into_iter().chain(along).min_by(|a, b| a.chi2.total_cmp(&b.chi2))
 }
 
@@ -146,21 +152,38 @@ fn along_the_recording<'a>(
     asked.into_par_iter().with_max_len(1).filter_map(fitted).collect()
 }
 
-/// Of what was begun the best, and the best term and the best pair beside each set of names, but for those without hope.
-fn foremost<'a>(mut begun: Vec<Begun<'a>>, most: usize, hopeless: f64) -> Vec<Begun<'a>> {
+/// What was begun, without what has no hope: the best term and the best pair beside each set of names, then the rest, the better ones first.
+fn foremost<'a>(mut begun: Vec<Begun<'a>>, hopeless: f64) -> Vec<Begun<'a>> {
     begun.sort_by(|a, b| a.1.chi2.total_cmp(&b.1.chi2));
     let least = begun.first().map_or(0.0, |own| own.1.chi2);
     begun.retain(|own| own.1.chi2 < hopeless * least);
     let mut seen: Vec<(Hypothesis, usize)> = Vec::new();
-    let mut rank = 0;
-    begun.retain(|(terms, fit)| {
+    let (first, rest): (Vec<Begun<'a>>, Vec<Begun<'a>>) = begun.into_iter().partition(|(terms, fit)| {
         let kind = (fit.hypothesis.clone(), terms.len());
         let is_first = !seen.contains(&kind);
         seen.push(kind);
-        rank += 1;
-        is_first || rank <= most
+        is_first
     });
-    begun
+    first.into_iter().chain(rest).collect()
+}
+
+/// What becomes of some items, so many at once: the first of them in any case, the others for as long as the work done allows it.
+fn within<T: Send, R: Send>(
+    context: &FitContext<'_>,
+    until: u64,
+    (at_once, items): (usize, Vec<T>),
+    of: impl Fn(T) -> Option<R> + Sync,
+) -> Vec<R> {
+    let mut made = Vec::new();
+    let mut items = items.into_iter();
+    loop {
+        let batch: Vec<T> = items.by_ref().take(at_once).collect();
+        let is_last = batch.len() < at_once;
+        made.extend(batch.into_par_iter().with_max_len(1).filter_map(&of).collect::<Vec<R>>());
+        if is_last || context.work.done() > until {
+            return made;
+        }
+    }
 }
 
 /// A candidate to the end, its coefficients those of the fit; `None` where one has run away, and its term is another one of the grammar.
@@ -233,10 +256,13 @@ pub fn needed(context: &FitContext<'_>, order: &[Described<'_>], best: &Refit<'_
     let is_termed = |effect: &Effect| order.iter().flat_map(|own| &own.terms).any(|term| is_of_kind(term, *effect));
     let termed: Vec<Effect> = effects.iter().copied().filter(is_termed).collect();
     let along = Along::of(context, best, &termed);
-    let stands_for =
-        |term: &Term| along.as_ref().map_or(Vec::new(), |along| along.stands_for(term, &termed, &context.settings.law));
-    let shares: Vec<Vec<(Effect, f64)>> =
-        order.iter().map(|own| own.terms.iter().flat_map(stands_for).collect()).collect();
+    let (law, misfit) = (&context.settings.law, &context.settings.misfit);
+    let of_description = |own: &Described<'_>| -> Vec<(Effect, f64)> {
+        let is_exact = own.fit.chi2 < most_of_noise(own.fit.values(), misfit);
+        let Some(along) = along.as_ref() else { return Vec::new() };
+        own.terms.iter().flat_map(|term| along.stands_for((term, is_exact), &termed, law)).collect()
+    };
+    let shares: Vec<Vec<(Effect, f64)>> = order.iter().map(of_description).collect();
     let of_effect = |effect: &Effect| {
         let share = |(own, shares): (&Described<'_>, &Vec<(Effect, f64)>)| {
             let of_terms = shares.iter().filter(|share| share.0 == *effect).map(|share| share.1).fold(0.0, f64::max);

@@ -1,6 +1,8 @@
 //! What is sought: the terms, and pairs of them, that would lower most of what is left beside the names of a fit, without each of them, and in their place.
 
-use nalgebra::{DMatrix, DVector};
+use std::collections::BTreeMap;
+
+use nalgebra::{DMatrix, DVector, DVectorView};
 use rayon::prelude::*;
 
 use super::super::basis_law::{Swing, swings};
@@ -32,6 +34,8 @@ pub struct Candidate {
     pub step: Vec<f64>,
     /// See `step`.
     pub gain: f64,
+    /// Whether no other of as many terms promises more beside these effects.
+    pub is_foremost: bool,
 }
 
 /// What promises most, beside the names of a fit, without each of them, and in the place of them all, from the fit's residuals and their derivatives; and the terms
@@ -39,16 +43,15 @@ pub struct Candidate {
 pub fn candidates(
     best: &Refit<'_>,
     (residual, slopes): &(DVector<f64>, DMatrix<f64>),
-    count: usize,
     settings: &LawSettings,
 ) -> Option<(Vec<Candidate>, Vec<Term>)> {
-    let (all, columns) = effects_of_terms(best, residual.len())?;
+    let (all, columns, torques) = effects_of_terms(best, residual.len())?;
     let names = &best.hypothesis.effects;
     let mut left_out: Vec<Vec<Effect>> = vec![Vec::new()];
     left_out.extend(names.iter().map(|effect| vec![*effect]));
     left_out.extend((names.len() > 1).then(|| names.clone()));
     let lower = best.problem.lower();
-    let (apart, alone) = (told_apart(&columns, settings.the_same), recordings(best.problem.records).len() == 1);
+    let (apart, alone) = (told_apart(&torques, settings.the_same), recordings(best.problem.records).len() == 1);
     // in a single release the amplitude falls with time, and a loss that drifts stands for any loss
     let of_loss = alone && names.iter().any(|effect| effect.entry().acts == Acts::Loss);
     let drifts = |term: &Term| of_loss && term.drifts && term.state != "angle";
@@ -58,44 +61,70 @@ pub fn candidates(
         let kept: Vec<usize> = (0..best.x.len()).filter(|i| !gone.contains(i) && best.x[*i] > lower[*i]).collect();
         // what the names explain is then the term's to explain
         let left = gone.iter().fold(residual.clone(), |r, i| r - slopes.column(*i) * best.x[*i]);
-        let is_a_name = |k: usize| {
-            let own = columns.column(k);
-            let cosine = |i: &usize| own.dot(&slopes.column(*i)) / (own.norm() * slopes.column(*i).norm()).max(1e-300);
-            gone.iter().any(|i| cosine(i).abs() > settings.the_same)
-        };
-        let new: Vec<usize> = apart.iter().copied().filter(|k| !is_a_name(*k) && !drifts(&all[*k])).collect();
         let hypothesis = out.iter().fold(best.hypothesis.clone(), |hypothesis, effect| hypothesis.without(*effect));
         let own = slopes.select_columns(&kept);
         let projection = Projection::off(left.clone(), own.clone());
-        let promising = promising(&projection, (&columns, &new), count, settings);
+        let projected = projection.out(&columns);
+        // all losses make the swing smaller, and all springs make it faster: only what else they do tells them apart
+        let of_names = projection.out(&slopes.select_columns(&gone));
+        let is_a_name =
+            |k: usize| of_names.column_iter().any(|name| cosine(&projected.column(k), &name).abs() > settings.the_same);
+        let new: Vec<usize> = apart.iter().copied().filter(|k| !is_a_name(*k) && !drifts(&all[*k])).collect();
+        let does_something =
+            |k: &usize| projected.column(*k).norm() > settings.nothing_left * columns.column(*k).norm();
+        let new: Vec<usize> = new.into_iter().filter(does_something).collect();
+        let promising = promising(
+            &projection.residual,
+            &projected,
+            &foremost_of_forms(&projection.residual, &projected, &all, new),
+            (settings.most, settings.paired),
+        );
         let steps = steps(&left, &own, &columns, &promising);
         let candidate = |(i, (gain, terms)): (usize, Promising)| {
             let mut step = vec![0.0; best.x.len()];
             kept.iter().zip(steps.column(i).iter()).for_each(|(place, moved)| step[*place] = *moved);
             let terms = terms.into_iter().enumerate().map(|(place, (k, a))| started(&all[k], a, place)).collect();
-            Candidate { hypothesis: hypothesis.clone(), terms, step, gain }
+            Candidate { hypothesis: hypothesis.clone(), terms, step, gain, is_foremost: false }
         };
         promising.into_iter().enumerate().map(candidate).collect::<Vec<_>>()
     };
-    let candidates = left_out.iter().flat_map(promise).collect();
+    // what promises most beside each set of names comes first
+    let mut all_ranked: Vec<(usize, Candidate)> = left_out.iter().flat_map(|out| ranked(promise(out))).collect();
+    all_ranked.sort_by_key(|own| own.0);
+    let candidates = all_ranked.into_iter().map(|own| own.1).collect();
     Some((candidates, apart.iter().map(|k| all[*k].clone()).collect()))
 }
 
-/// The terms that do something else to the angles than any before them: on a single link hinge, strip and tip are one place.
-fn told_apart(columns: &DMatrix<f64>, the_same: f64) -> Vec<usize> {
-    let sizes: Vec<f64> = columns.column_iter().map(|column| column.norm().max(1e-300)).collect();
+/// Candidates with their places, the foremost first, among those of as many terms.
+fn ranked(candidates: Vec<Candidate>) -> Vec<(usize, Candidate)> {
+    let mut of_each: BTreeMap<usize, usize> = BTreeMap::new();
+    let place = |candidate: Candidate| {
+        let next = of_each.entry(candidate.terms.len()).or_default();
+        *next += 1;
+        (*next, Candidate { is_foremost: *next == 1, ..candidate })
+    };
+    candidates.into_iter().map(place).collect()
+}
+
+/// The terms that exert another torque than any before them: on a single link hinge, strip and tip are one place.
+fn told_apart(torques: &DMatrix<f64>, the_same: f64) -> Vec<usize> {
     let mut kept: Vec<usize> = Vec::new();
-    for k in 0..columns.ncols() {
-        let cosine = |other: &usize| columns.column(k).dot(&columns.column(*other)) / (sizes[k] * sizes[*other]);
-        if !kept.iter().any(|other| cosine(other).abs() > the_same) {
+    for k in 0..torques.ncols() {
+        let is_the_same = |other: &usize| cosine(&torques.column(k), &torques.column(*other)).abs() > the_same;
+        if !kept.iter().any(is_the_same) {
             kept.push(k);
         }
     }
     kept
 }
 
-/// Every term of the grammar, and what a unit of its amplitude adds to the residuals, of which there are so many, a column each.
-fn effects_of_terms(fit: &Refit<'_>, rows: usize) -> Option<(Vec<Term>, DMatrix<f64>)> {
+/// Of the angle between two columns; 0 where one of them is nothing.
+fn cosine(a: &DVectorView<'_, f64>, b: &DVectorView<'_, f64>) -> f64 {
+    a.dot(b) / (a.norm() * b.norm()).max(f64::MIN_POSITIVE)
+}
+
+/// Every term of the grammar, what a unit of its amplitude adds to the residuals, of which there are so many, a column each, and the torques on the links.
+fn effects_of_terms(fit: &Refit<'_>, rows: usize) -> Option<(Vec<Term>, DMatrix<f64>, DMatrix<f64>)> {
     let around = Linearisation::of_all(fit)?;
     let swings = swings(fit, &around)?;
     let places = [LawPlace::Hinge, LawPlace::Joint, LawPlace::Strip, LawPlace::Tip];
@@ -106,16 +135,18 @@ fn effects_of_terms(fit: &Refit<'_>, rows: usize) -> Option<(Vec<Term>, DMatrix<
         let mut unit = term.law.clone();
         unit.parameters.get_mut("a")?.start = 1.0;
         let formula = Formula::of(&unit)?;
-        let of_swing = |swing: &Swing<'_>| {
-            swing.response(|motion: &Motion, q: &mut [f64]| formula.add_torque(&swing.around.chain, motion, q))
-        };
-        Some(swings.iter().flat_map(|swing| of_swing(swing).as_slice().to_vec()).collect::<Vec<f64>>())
+        let torque =
+            |swing: &Swing<'_>, motion: &Motion, q: &mut [f64]| formula.add_torque(&swing.around.chain, motion, q);
+        let seen = |swing: &Swing<'_>| swing.response(|motion, q| torque(swing, motion, q)).as_slice().to_vec();
+        let exerted = |swing: &Swing<'_>| swing.torques(|motion, q| torque(swing, motion, q));
+        Some((swings.iter().flat_map(seen).collect(), swings.iter().flat_map(exerted).collect()))
     };
-    let columns: Vec<Vec<f64>> = all.par_iter().map(column).collect::<Option<_>>()?;
-    let seen = columns.first()?.len();
+    let columns: Vec<(Vec<f64>, Vec<f64>)> = all.par_iter().map(column).collect::<Option<_>>()?;
+    let (seen, instants) = columns.first().map(|(seen, torques)| (seen.len(), torques.len()))?;
     // beliefs stand after what is seen, and no torque changes them
-    let matrix = DMatrix::from_fn(rows, all.len(), |i, k| if i < seen { columns[k][i] } else { 0.0 });
-    Some((all, matrix))
+    let matrix = DMatrix::from_fn(rows, all.len(), |i, k| if i < seen { columns[k].0[i] } else { 0.0 });
+    let torques = DMatrix::from_fn(instants, all.len(), |i, k| columns[k].1[i]);
+    Some((all, matrix, torques))
 }
 
 /// The largest state at a place.
@@ -141,39 +172,54 @@ fn largest(swings: &[Swing<'_>], place: LawPlace, time_s: f64) -> Largest {
 /// By how much some terms lower χ², and which with what amplitudes.
 type Promising = (f64, Vec<(usize, f64)>);
 
-/// The terms and pairs of them that lower what is left most, beside some effects.
+/// By how much a term alone would lower χ², with the amplitude of which it does.
+fn alone(residual: &DVector<f64>, projected: &DMatrix<f64>, k: usize) -> (f64, f64) {
+    let (own, pull) = (projected.column(k), projected.column(k).dot(residual));
+    (pull * pull / own.norm_squared(), -pull / own.norm_squared())
+}
+
+/// Some terms, each form once, with the other coefficients at which it promises most; the foremost first.
+fn foremost_of_forms(
+    residual: &DVector<f64>,
+    projected: &DMatrix<f64>,
+    all: &[Term],
+    mut terms: Vec<usize>,
+) -> Vec<usize> {
+    let gain = |k: &usize| alone(residual, projected, *k).0;
+    terms.sort_by(|a, b| gain(b).total_cmp(&gain(a)));
+    let mut forms = Vec::new();
+    terms.retain(|k| {
+        let is_first = !forms.contains(&all[*k].form());
+        forms.push(all[*k].form());
+        is_first
+    });
+    terms
+}
+
+/// The foremost of some terms, and of pairs of them, that lower what is left most, with their amplitudes: so many of each; paired are so many.
 fn promising(
-    left: &Projection,
-    (columns, new): (&DMatrix<f64>, &[usize]),
-    count: usize,
-    settings: &LawSettings,
+    residual: &DVector<f64>,
+    projected: &DMatrix<f64>,
+    terms: &[usize],
+    (count, paired): (usize, usize),
 ) -> Vec<Promising> {
-    let projected = left.out(columns);
-    let is_new = |k: usize| projected.column(k).norm() > settings.nothing_left * columns.column(k).norm();
-    let mut alone: Vec<(f64, usize)> = new
-        .iter()
-        .copied()
-        .filter(|k| is_new(*k))
-        .map(|k| (projected.column(k).dot(&left.residual).powi(2) / projected.column(k).norm_squared(), k))
-        .collect();
-    alone.sort_by(|a, b| b.0.total_cmp(&a.0));
-    let of_pair = |(_, a): &(f64, usize), (_, b): &(f64, usize)| {
-        let pair = projected.select_columns(&[*a, *b]);
-        let pull = pair.tr_mul(&left.residual);
+    let of_pair = |a: usize, b: usize| {
+        let pair = projected.select_columns(&[a, b]);
+        let pull = pair.tr_mul(residual);
         let value = pair.tr_mul(&pair).try_inverse()? * &pull;
-        Some((pull.dot(&value), vec![(*a, -value[0]), (*b, -value[1])]))
+        Some((pull.dot(&value), vec![(a, -value[0]), (b, -value[1])]))
     };
-    let foremost = &alone[..alone.len().min(settings.paired)];
-    let mut pairs: Vec<Promising> = foremost
-        .iter()
-        .enumerate()
-        .flat_map(|(i, a)| alone[i + 1..].iter().filter_map(move |b| of_pair(a, b)))
-        .filter(|(gain, _)| gain.is_finite())
-        .collect();
+    let foremost = &terms[..terms.len().min(paired)];
+    let with_later =
+        |(i, a): (usize, &usize)| terms[i + 1..].iter().filter_map(move |b| of_pair(*a, *b)).collect::<Vec<_>>();
+    let mut pairs: Vec<Promising> =
+        foremost.iter().enumerate().flat_map(with_later).filter(|(gain, _)| gain.is_finite()).collect();
     pairs.sort_by(|a, b| b.0.total_cmp(&a.0));
-    let amplitude = |k: usize| -projected.column(k).dot(&left.residual) / projected.column(k).norm_squared();
-    let alone = alone.iter().take(count).map(|(gain, k)| (*gain, vec![(*k, amplitude(*k))]));
-    alone.chain(pairs.into_iter().take(count)).collect()
+    let of_one = |k: &usize| {
+        let (gain, amplitude) = alone(residual, projected, *k);
+        (gain, vec![(*k, amplitude)])
+    };
+    terms.iter().take(count).map(of_one).chain(pairs.into_iter().take(count)).collect()
 }
 
 /// By how much the variables with these derivatives move with each set of terms, a column each: the step of a descent that is damped a little.

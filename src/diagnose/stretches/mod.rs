@@ -105,9 +105,8 @@ pub fn terms_asked_for(
         let own: Vec<(usize, f64)> = set.laws.iter().zip(&set.values[beside..]).filter_map(of_terms).collect();
         let asked = asked(&set, known, &laws, beside);
         // one form is asked for once, however many starts its other coefficients have
-        let form =
-            |(k, _): &(usize, f64)| (terms[*k].law.place, terms[*k].state, terms[*k].shape, terms[*k].modulation);
-        let kind = (asked.hypothesis.effects.clone(), own.iter().map(form).collect::<Vec<_>>());
+        let forms = own.iter().map(|(k, _)| terms[*k].form()).collect::<Vec<_>>();
+        let kind = (asked.hypothesis.effects.clone(), forms);
         let is_new = !own.is_empty() && !kinds.contains(&kind);
         kinds.push(kind);
         is_new.then_some((asked, own))
