@@ -103,7 +103,7 @@ pub struct BudgetShares {
     pub certified: f64,
     /// From the beginning on, more effects and fewer. What is left is for further starts of what that found.
     pub further: f64,
-    /// A law that no table holds is learnt beside all of that, with this much and what was not needed for it.
+    /// A law that no table holds is learnt beside all of that, with this much.
     pub law: f64,
 }
 
@@ -341,7 +341,7 @@ impl Default for SearchSettings {
     fn default() -> Self {
         Self {
             budget: 90_000_000,
-            shares: BudgetShares { usual: 0.45, restarts: 0.6, certified: 0.7, further: 0.9, law: 1.2 },
+            shares: BudgetShares { usual: 0.45, restarts: 0.6, certified: 0.7, further: 0.9, law: 0.7 },
             evaluations: 3000.0,
             early_swings: 12.0,
             part_worth: 0.6,
@@ -458,7 +458,7 @@ impl Default for LawSettings {
             the_same_law: 0.71,
             paired: 12,
             most: 16,
-            begun: 0.4,
+            begun: 0.3,
             asked: 1000.0,
             along: 400.0,
             active: 0.1,

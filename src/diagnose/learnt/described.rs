@@ -51,9 +51,7 @@ pub fn descriptions<'a>(
     let linearised = best.linearised()?;
     let (from, each) = (context.work.done(), (context.work.done() - before).max(1) as f64);
     let (search, law) = (&context.settings.search, &context.settings.law);
-    // what the search left of its own, and in any case half of the law's
-    let left = (1.0 + search.shares.law) * search.budget as f64 - from as f64;
-    let allowed = left.max(0.5 * search.shares.law * search.budget as f64);
+    let allowed = search.shares.law * search.budget as f64;
     let until = |part: f64| from + (part * allowed) as u64;
     let (candidates, terms) = candidates(best, &linearised, law)?;
     let prior = Prior::of(context, best, effects.len(), terms.len())?;
