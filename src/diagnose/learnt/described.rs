@@ -10,6 +10,7 @@ use super::super::hypothesis::Hypothesis;
 use super::super::misfit::most_of_noise;
 use super::super::posterior::Posterior;
 use super::super::refit::Refit;
+use super::super::settings::LawSettings;
 use super::super::stretches::{Asked, terms_asked_for};
 use super::Needed;
 use super::along::{Along, is_of_kind};
@@ -54,7 +55,7 @@ pub fn descriptions<'a>(
     let allowed = search.shares.law * search.budget as f64;
     let until = |part: f64| from + (part * allowed) as u64;
     let (candidates, terms) = candidates(best, &linearised, law)?;
-    let prior = Prior::of(context, best, effects.len(), terms.len())?;
+    let prior = Prior::of(context, best, effects, terms.len())?;
     // their fits begin far away, and cost as much as all others
     let asked = (allowed > law.asked * each).then(|| along_the_recording(context, posterior.base(), effects, &terms));
     let along_best = |candidate: Candidate| {
@@ -208,25 +209,39 @@ fn ended<'a>(context: &FitContext<'a>, mut terms: Vec<Term>, begun: Refit<'a>) -
 struct Prior {
     /// To say which effect of the table is meant.
     of_effect: f64,
-    /// To say which term.
+    /// That something outside the table is at work, and to say which term.
     of_term: f64,
     /// More of a term that gives energy.
     of_active: f64,
     /// The motion along which it does.
     along: Along,
+    /// The effects that may be at work.
+    effects: Vec<Effect>,
+    law: LawSettings,
 }
 
 impl Prior {
-    fn of(context: &FitContext<'_>, best: &Refit<'_>, effects: usize, terms: usize) -> Option<Self> {
-        let [of_effect, of_term] = [effects, terms].map(|kinds| (kinds.max(1) as f64).ln());
-        let (of_active, along) = (-context.settings.law.active.ln(), Along::of(context, best, &[])?);
-        Some(Self { of_effect, of_term, of_active, along })
+    fn of(context: &FitContext<'_>, best: &Refit<'_>, effects: &[Effect], terms: usize) -> Option<Self> {
+        let [of_effect, which] = [effects.len(), terms].map(|kinds| (kinds.max(1) as f64).ln());
+        let law = &context.settings.law;
+        let along = Along::of(context, best, effects)?;
+        Some(Self {
+            of_effect,
+            of_term: which - context.settings.prior.unknown.ln(),
+            of_active: -law.active.ln(),
+            along,
+            effects: effects.to_vec(),
+            law: law.clone(),
+        })
     }
 
     fn of_description(&self, terms: &[Term], hypothesis: &Hypothesis) -> f64 {
+        // under whatever name, it is the table's
+        let is_of_table = |term: &Term| !self.along.stands_for((term, true), &self.effects, &self.law).is_empty();
+        let of_term = |term: &Term| if is_of_table(term) { self.of_effect } else { self.of_term };
         let is_active = |term: &&Term| term.state != "angle" && self.along.gives_energy(term);
         hypothesis.effects.len() as f64 * self.of_effect
-            + terms.len() as f64 * self.of_term
+            + terms.iter().map(of_term).sum::<f64>()
             + terms.iter().filter(is_active).count() as f64 * self.of_active
     }
 }

@@ -10,8 +10,9 @@
 //!
 //! ```text
 //! L = χ²/(2vτ) + ½ k ln(n/τ) + Σ ln N − ln p     k: coefficients; N: out of how many effects, or terms, each was chosen
-//!                                                p: odds of terms that give energy
+//!                                                p: odds of a term, that something outside the table is at work; and of one that gives energy
 //! ```
+//!    A term that exerts the torque of an effect of the table is that effect.
 //! 5. The shortest are fitted to a part, and predict the rest. With what they predict in the length,
 //!
 //! ```text
