@@ -458,7 +458,7 @@ impl Default for LawSettings {
             the_same_law: 0.71,
             paired: 12,
             most: 16,
-            begun: 0.3,
+            begun: 0.6,
             asked: 1000.0,
             along: 400.0,
             active: 0.1,
