@@ -1,6 +1,6 @@
 //! Torques along a fit's motion: whether a term gives energy, and which effects of the table it stands for.
 
-use nalgebra::DVector;
+use nalgebra::{DVector, DVectorView};
 
 use super::super::context::FitContext;
 use super::super::effect::{Effect, Phase, Place};
@@ -18,12 +18,29 @@ pub fn is_of_kind(term: &Term, effect: Effect) -> bool {
     entry.shapes.contains(&term.shape) && (term.state == "angle") == (entry.phase == Some(Phase::Position))
 }
 
-/// A fit's motion through every recording, row after row, in a model that has some effects more, of no size.
-pub struct Along(Vec<(ForwardModel, Vec<Motion>)>);
+/// Of the angle between two columns; 0 where one of them is nothing.
+pub fn cosine(a: &DVectorView<'_, f64>, b: &DVectorView<'_, f64>) -> f64 {
+    a.dot(b) / (a.norm() * b.norm()).max(f64::MIN_POSITIVE)
+}
+
+/// A fit's motion through every recording, row after row.
+pub struct Along {
+    /// In a model that has some effects more, of no size.
+    motions: Vec<(ForwardModel, Vec<Motion>)>,
+    /// Those effects that a term may stand for, each with the torques of a unit of its first coefficient.
+    effects: Vec<(Effect, DVector<f64>)>,
+}
 
 impl Along {
-    /// Of a fit; `None` where the motion cannot be integrated.
-    pub fn of(context: &FitContext<'_>, fit: &Refit<'_>, effects: &[Effect]) -> Option<Self> {
+    /// Of a fit, with those of some effects for which any of some terms may stand; `None` where the motion cannot be integrated.
+    pub fn of<'t>(
+        context: &FitContext<'_>,
+        fit: &Refit<'_>,
+        effects: &[Effect],
+        terms: impl Iterator<Item = &'t Term> + Clone,
+    ) -> Option<Self> {
+        let is_termed = |effect: &Effect| terms.clone().any(|term| is_of_kind(term, *effect));
+        let effects: Vec<Effect> = effects.iter().copied().filter(is_termed).collect();
         let further = || effects.iter().copied().filter(|effect| !fit.hypothesis.has(*effect));
         let hypothesis = further().fold(fit.hypothesis.clone(), |hypothesis, effect| hypothesis.and(effect, None));
         let of_no_size: Vec<(Parameter, f64)> = further()
@@ -42,13 +59,17 @@ impl Along {
             let motions = true_s.iter().map(at).collect();
             Some((model, motions))
         };
-        (0..fit.problem.records.len()).map(of_record).collect::<Option<_>>().map(Self)
+        let motions = (0..fit.problem.records.len()).map(of_record).collect::<Option<_>>()?;
+        let mut along = Self { motions, effects: Vec::new() };
+        along.effects = effects.into_iter().map(|effect| (effect, along.of_effect(effect))).collect();
+        Some(along)
     }
 
     /// Torques on the links, one instant after another.
     fn torques(&self, torque: impl Fn(&ForwardModel, &Motion, &mut [f64])) -> DVector<f64> {
         let mut all = Vec::new();
-        for (model, motion) in self.0.iter().flat_map(|(model, motions)| motions.iter().map(move |m| (model, m))) {
+        for (model, motion) in self.motions.iter().flat_map(|(model, motions)| motions.iter().map(move |m| (model, m)))
+        {
             let mut q = vec![0.0; model.rates()];
             torque(model, motion, &mut q);
             all.extend_from_slice(&q[..model.chain().count()]);
@@ -58,7 +79,7 @@ impl Along {
 
     /// Whether a term with its coefficients gives energy, all in all.
     pub fn gives_energy(&self, term: &Term) -> bool {
-        let motions = self.0.iter().flat_map(|(_, motions)| motions);
+        let motions = self.motions.iter().flat_map(|(_, motions)| motions);
         let rates = motions.flat_map(|motion| motion.rate[..motion.links()].iter().copied());
         self.of_term(term).is_some_and(|torques| torques.iter().zip(rates).map(|(q, rate)| q * rate).sum::<f64>() > 0.0)
     }
@@ -66,21 +87,15 @@ impl Along {
     /// The effects that a term stands for, with the share of each: of its kind and at its place the one with whose torques it goes best, and all that do the
     /// same as that one along this motion, wherever they act. Of a description that leaves only noise a term `is_exact`: it is an effect's law, or another one. Of one
     /// that leaves more no term is, and a neighbouring power is within its error.
-    pub fn stands_for(
-        &self,
-        (term, is_exact): (&Term, bool),
-        effects: &[Effect],
-        law: &LawSettings,
-    ) -> Vec<(Effect, f64)> {
+    pub fn stands_for(&self, (term, is_exact): (&Term, bool), law: &LawSettings) -> Vec<(Effect, f64)> {
         let Some(own) = self.of_term(term) else { return Vec::new() };
-        let cosine = |effect: Effect| {
-            let other = self.of_effect(effect);
-            let cosine = own.dot(&other) / (own.norm() * other.norm()).max(1e-300);
+        let goes_with = |(effect, other): &(Effect, DVector<f64>)| {
+            let cosine = cosine(&own.as_view(), &other.as_view());
             // in the direction in which it can act
-            if effect.parameters()[0].is_not_negative() { cosine } else { cosine.abs() }
+            (*effect, if effect.parameters()[0].is_not_negative() { cosine } else { cosine.abs() })
         };
-        let of_kind = effects.iter().filter(|effect| is_of_kind(term, **effect));
-        let cosines: Vec<(Effect, f64)> = of_kind.map(|effect| (*effect, cosine(*effect))).collect();
+        let of_kind = self.effects.iter().filter(|(effect, _)| is_of_kind(term, *effect));
+        let cosines: Vec<(Effect, f64)> = of_kind.map(goes_with).collect();
         let is_it = |(effect, cosine): &&(Effect, f64)| {
             *cosine > if !is_exact && self.is_at_place(term, *effect) { law.the_same_law } else { law.the_same }
         };
@@ -92,7 +107,7 @@ impl Along {
 
     /// Whether a term acts where an effect does. Along a single link hinge, strip and tip are one place.
     fn is_at_place(&self, term: &Term, effect: Effect) -> bool {
-        let is_single = self.0.iter().all(|(model, _)| model.chain().count() == 1);
+        let is_single = self.motions.iter().all(|(model, _)| model.chain().count() == 1);
         let place = match term.law.place {
             LawPlace::Hinge | LawPlace::Support => Place::Hinge,
             LawPlace::Joint => Place::Joint,

@@ -13,7 +13,7 @@ use super::super::refit::Refit;
 use super::super::settings::LawSettings;
 use super::super::stretches::{Asked, terms_asked_for};
 use super::Needed;
-use super::along::{Along, is_of_kind};
+use super::along::Along;
 use super::sought::{Candidate, candidates, started};
 use crate::experiment::{Coefficient, Law};
 use crate::model::Parameter;
@@ -55,7 +55,7 @@ pub fn descriptions<'a>(
     let allowed = search.shares.law * search.budget as f64;
     let until = |part: f64| from + (part * allowed) as u64;
     let (candidates, terms) = candidates(best, &linearised, law)?;
-    let prior = Prior::of(context, best, effects, terms.len())?;
+    let prior = Prior::of(context, best, effects, &terms)?;
     // their fits begin far away, and cost as much as all others
     let asked = (allowed > law.asked * each).then(|| along_the_recording(context, posterior.base(), effects, &terms));
     let along_best = |candidate: Candidate| {
@@ -128,7 +128,7 @@ fn begun_fit<'a>(
     let begun = with.begin(hypothesis, &led, &[]);
     let promised = context.settings.search.keeps_up * (best.chi2 - candidate.gain).max(best.values() as f64);
     let is_as_promised = begun.as_ref().is_some_and(|begun| begun.chi2 < promised);
-    let is_worth = has_time && candidate.is_foremost && !is_as_promised && *hypothesis != best.hypothesis;
+    let is_worth = has_time && candidate.rank == 0 && !is_as_promised && *hypothesis != best.hypothesis;
     let along = is_worth.then(|| with.refit_along(hypothesis, best, &[])).flatten();
     begun.into_iter().chain(along).min_by(|a, b| a.chi2.total_cmp(&b.chi2))
 }
@@ -215,29 +215,25 @@ struct Prior {
     of_active: f64,
     /// The motion along which it does.
     along: Along,
-    /// The effects that may be at work.
-    effects: Vec<Effect>,
     law: LawSettings,
 }
 
 impl Prior {
-    fn of(context: &FitContext<'_>, best: &Refit<'_>, effects: &[Effect], terms: usize) -> Option<Self> {
-        let [of_effect, which] = [effects.len(), terms].map(|kinds| (kinds.max(1) as f64).ln());
+    fn of(context: &FitContext<'_>, best: &Refit<'_>, effects: &[Effect], terms: &[Term]) -> Option<Self> {
+        let [of_effect, which] = [effects.len(), terms.len()].map(|kinds| (kinds.max(1) as f64).ln());
         let law = &context.settings.law;
-        let along = Along::of(context, best, effects)?;
         Some(Self {
             of_effect,
             of_term: which - context.settings.prior.unknown.ln(),
             of_active: -law.active.ln(),
-            along,
-            effects: effects.to_vec(),
+            along: Along::of(context, best, effects, terms.iter())?,
             law: law.clone(),
         })
     }
 
     fn of_description(&self, terms: &[Term], hypothesis: &Hypothesis) -> f64 {
         // under whatever name, it is the table's
-        let is_of_table = |term: &Term| !self.along.stands_for((term, true), &self.effects, &self.law).is_empty();
+        let is_of_table = |term: &Term| !self.along.stands_for((term, true), &self.law).is_empty();
         let of_term = |term: &Term| if is_of_table(term) { self.of_effect } else { self.of_term };
         let is_active = |term: &&Term| term.state != "angle" && self.along.gives_energy(term);
         hypothesis.effects.len() as f64 * self.of_effect
@@ -266,14 +262,12 @@ fn described<'a>(fitted: Vec<(Vec<Term>, Refit<'a>)>, prior: &Prior) -> Option<V
 /// The probability of each effect among all descriptions: of those that name it, and of those with a term that does what it does along the motion of a fit.
 pub fn needed(context: &FitContext<'_>, order: &[Described<'_>], best: &Refit<'_>, effects: &[Effect]) -> Needed {
     let weights = normalised(&order.iter().map(|own| -own.length).collect::<Vec<f64>>());
-    let is_termed = |effect: &Effect| order.iter().flat_map(|own| &own.terms).any(|term| is_of_kind(term, *effect));
-    let termed: Vec<Effect> = effects.iter().copied().filter(is_termed).collect();
-    let along = Along::of(context, best, &termed);
+    let along = Along::of(context, best, effects, order.iter().flat_map(|own| &own.terms));
     let (law, misfit) = (&context.settings.law, &context.settings.misfit);
     let of_description = |own: &Described<'_>| -> Vec<(Effect, f64)> {
         let is_exact = own.fit.chi2 < most_of_noise(own.fit.values(), misfit);
         let Some(along) = along.as_ref() else { return Vec::new() };
-        own.terms.iter().flat_map(|term| along.stands_for((term, is_exact), &termed, law)).collect()
+        own.terms.iter().flat_map(|term| along.stands_for((term, is_exact), law)).collect()
     };
     let shares: Vec<Vec<(Effect, f64)>> = order.iter().map(of_description).collect();
     let of_effect = |effect: &Effect| {

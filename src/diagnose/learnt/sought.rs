@@ -1,8 +1,6 @@
 //! What is sought: the terms, and pairs of them, that would lower most of what is left beside the names of a fit, without each of them, and in their place.
 
-use std::collections::BTreeMap;
-
-use nalgebra::{DMatrix, DVector, DVectorView};
+use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
 use super::super::basis_law::{Swing, swings};
@@ -13,6 +11,7 @@ use super::super::linearisation::Linearisation;
 use super::super::refit::Refit;
 use super::super::screen::Projection;
 use super::super::settings::LawSettings;
+use super::along::cosine;
 use crate::experiment::LawPlace;
 use crate::fit::descent::damped_step;
 use crate::fit::recordings;
@@ -34,8 +33,8 @@ pub struct Candidate {
     pub step: Vec<f64>,
     /// See `step`.
     pub gain: f64,
-    /// Whether no other of as many terms promises more beside these effects.
-    pub is_foremost: bool,
+    /// So many others of as many terms promise more beside these effects.
+    pub rank: usize,
 }
 
 /// What promises most, beside the names of a fit, without each of them, and in the place of them all, from the fit's residuals and their derivatives; and the terms
@@ -69,41 +68,25 @@ pub fn candidates(
         let of_names = projection.out(&slopes.select_columns(&gone));
         let is_a_name =
             |k: usize| of_names.column_iter().any(|name| cosine(&projected.column(k), &name).abs() > settings.the_same);
-        let new: Vec<usize> = apart.iter().copied().filter(|k| !is_a_name(*k) && !drifts(&all[*k])).collect();
-        let does_something =
-            |k: &usize| projected.column(*k).norm() > settings.nothing_left * columns.column(*k).norm();
-        let new: Vec<usize> = new.into_iter().filter(does_something).collect();
-        let promising = promising(
-            &projection.residual,
-            &projected,
-            &foremost_of_forms(&projection.residual, &projected, &all, new),
-            (settings.most, settings.paired),
-        );
+        let does_something = |k: usize| projected.column(k).norm() > settings.nothing_left * columns.column(k).norm();
+        let is_new = |k: &usize| does_something(*k) && !is_a_name(*k) && !drifts(&all[*k]);
+        let single =
+            apart.iter().copied().filter(is_new).map(|k| of_one(&projection.residual, &projected, k)).collect();
+        let foremost = foremost_of_forms(single, &all);
+        let promising = promising(&projection.residual, &projected, foremost, (settings.most, settings.paired));
         let steps = steps(&left, &own, &columns, &promising);
-        let candidate = |(i, (gain, terms)): (usize, Promising)| {
+        let candidate = |(i, Promising { gain, terms, rank }): (usize, Promising)| {
             let mut step = vec![0.0; best.x.len()];
             kept.iter().zip(steps.column(i).iter()).for_each(|(place, moved)| step[*place] = *moved);
             let terms = terms.into_iter().enumerate().map(|(place, (k, a))| started(&all[k], a, place)).collect();
-            Candidate { hypothesis: hypothesis.clone(), terms, step, gain, is_foremost: false }
+            Candidate { hypothesis: hypothesis.clone(), terms, step, gain, rank }
         };
         promising.into_iter().enumerate().map(candidate).collect::<Vec<_>>()
     };
     // what promises most beside each set of names comes first
-    let mut all_ranked: Vec<(usize, Candidate)> = left_out.iter().flat_map(|out| ranked(promise(out))).collect();
-    all_ranked.sort_by_key(|own| own.0);
-    let candidates = all_ranked.into_iter().map(|own| own.1).collect();
+    let mut candidates: Vec<Candidate> = left_out.iter().flat_map(promise).collect();
+    candidates.sort_by_key(|candidate| candidate.rank);
     Some((candidates, apart.iter().map(|k| all[*k].clone()).collect()))
-}
-
-/// Candidates with their places, the foremost first, among those of as many terms.
-fn ranked(candidates: Vec<Candidate>) -> Vec<(usize, Candidate)> {
-    let mut of_each: BTreeMap<usize, usize> = BTreeMap::new();
-    let place = |candidate: Candidate| {
-        let next = of_each.entry(candidate.terms.len()).or_default();
-        *next += 1;
-        (*next, Candidate { is_foremost: *next == 1, ..candidate })
-    };
-    candidates.into_iter().map(place).collect()
 }
 
 /// The terms that exert another torque than any before them: on a single link hinge, strip and tip are one place.
@@ -116,11 +99,6 @@ fn told_apart(torques: &DMatrix<f64>, the_same: f64) -> Vec<usize> {
         }
     }
     kept
-}
-
-/// Of the angle between two columns; 0 where one of them is nothing.
-fn cosine(a: &DVectorView<'_, f64>, b: &DVectorView<'_, f64>) -> f64 {
-    a.dot(b) / (a.norm() * b.norm()).max(f64::MIN_POSITIVE)
 }
 
 /// Every term of the grammar, what a unit of its amplitude adds to the residuals, of which there are so many, a column each, and the torques on the links.
@@ -169,65 +147,74 @@ fn largest(swings: &[Swing<'_>], place: LawPlace, time_s: f64) -> Largest {
     largest
 }
 
-/// By how much some terms lower χ², and which with what amplitudes.
-type Promising = (f64, Vec<(usize, f64)>);
-
-/// By how much a term alone would lower χ², with the amplitude of which it does.
-fn alone(residual: &DVector<f64>, projected: &DMatrix<f64>, k: usize) -> (f64, f64) {
-    let (own, pull) = (projected.column(k), projected.column(k).dot(residual));
-    (pull * pull / own.norm_squared(), -pull / own.norm_squared())
+/// Terms that lower χ².
+struct Promising {
+    gain: f64,
+    /// Their places, with the amplitudes of which they do.
+    terms: Vec<(usize, f64)>,
+    /// So many others of as many terms lower it more.
+    rank: usize,
 }
 
-/// Some terms, each form once, with the other coefficients at which it promises most; the foremost first.
-fn foremost_of_forms(
-    residual: &DVector<f64>,
-    projected: &DMatrix<f64>,
-    all: &[Term],
-    mut terms: Vec<usize>,
-) -> Vec<usize> {
-    let gain = |k: &usize| alone(residual, projected, *k).0;
-    terms.sort_by(|a, b| gain(b).total_cmp(&gain(a)));
+impl Promising {
+    const fn of(gain: f64, terms: Vec<(usize, f64)>) -> Self {
+        Self { gain, terms, rank: 0 }
+    }
+}
+
+/// A term alone.
+fn of_one(residual: &DVector<f64>, projected: &DMatrix<f64>, k: usize) -> Promising {
+    let (own, pull) = (projected.column(k), projected.column(k).dot(residual));
+    Promising::of(pull * pull / own.norm_squared(), vec![(k, -pull / own.norm_squared())])
+}
+
+/// The same, those that lower it most first.
+fn ranked(mut all: Vec<Promising>) -> Vec<Promising> {
+    all.sort_by(|a, b| b.gain.total_cmp(&a.gain));
+    all.iter_mut().enumerate().for_each(|(rank, own)| own.rank = rank);
+    all
+}
+
+/// Of single terms each form once, with the other coefficients at which it promises most; the foremost first.
+fn foremost_of_forms(alone: Vec<Promising>, all: &[Term]) -> Vec<Promising> {
     let mut forms = Vec::new();
-    terms.retain(|k| {
-        let is_first = !forms.contains(&all[*k].form());
-        forms.push(all[*k].form());
+    let mut foremost = ranked(alone);
+    foremost.retain(|own| {
+        let form = all[own.terms[0].0].form();
+        let is_first = !forms.contains(&form);
+        forms.push(form);
         is_first
     });
-    terms
+    ranked(foremost)
 }
 
-/// The foremost of some terms, and of pairs of them, that lower what is left most, with their amplitudes: so many of each; paired are so many.
+/// The foremost of single terms, and of pairs of them: so many of each; paired are so many.
 fn promising(
     residual: &DVector<f64>,
     projected: &DMatrix<f64>,
-    terms: &[usize],
+    alone: Vec<Promising>,
     (count, paired): (usize, usize),
 ) -> Vec<Promising> {
     let of_pair = |a: usize, b: usize| {
         let pair = projected.select_columns(&[a, b]);
         let pull = pair.tr_mul(residual);
         let value = pair.tr_mul(&pair).try_inverse()? * &pull;
-        Some((pull.dot(&value), vec![(a, -value[0]), (b, -value[1])]))
+        let gain = pull.dot(&value);
+        gain.is_finite().then(|| Promising::of(gain, vec![(a, -value[0]), (b, -value[1])]))
     };
-    let foremost = &terms[..terms.len().min(paired)];
-    let with_later =
-        |(i, a): (usize, &usize)| terms[i + 1..].iter().filter_map(move |b| of_pair(*a, *b)).collect::<Vec<_>>();
-    let mut pairs: Vec<Promising> =
-        foremost.iter().enumerate().flat_map(with_later).filter(|(gain, _)| gain.is_finite()).collect();
-    pairs.sort_by(|a, b| b.0.total_cmp(&a.0));
-    let of_one = |k: &usize| {
-        let (gain, amplitude) = alone(residual, projected, *k);
-        (gain, vec![(*k, amplitude)])
-    };
-    terms.iter().take(count).map(of_one).chain(pairs.into_iter().take(count)).collect()
+    let places: Vec<usize> = alone.iter().map(|own| own.terms[0].0).collect();
+    let (places, of_pair) = (&places, &of_pair);
+    let with_later = |i: usize| places[i + 1..].iter().filter_map(move |b| of_pair(places[i], *b));
+    let pairs = ranked((0..places.len().min(paired)).flat_map(with_later).collect());
+    alone.into_iter().take(count).chain(pairs.into_iter().take(count)).collect()
 }
 
 /// By how much the variables with these derivatives move with each set of terms, a column each: the step of a descent that is damped a little.
 fn steps(left: &DVector<f64>, slopes: &DMatrix<f64>, columns: &DMatrix<f64>, promising: &[Promising]) -> DMatrix<f64> {
     let (normal, none) = (slopes.tr_mul(slopes), vec![None; slopes.ncols()]);
     let mut steps = DMatrix::zeros(slopes.ncols(), promising.len());
-    for (mut step, (_, terms)) in steps.column_iter_mut().zip(promising) {
-        let with = terms.iter().fold(left.clone(), |with, (k, a)| with + columns.column(*k) * *a);
+    for (mut step, own) in steps.column_iter_mut().zip(promising) {
+        let with = own.terms.iter().fold(left.clone(), |with, (k, a)| with + columns.column(*k) * *a);
         if let Some(damped) = damped_step(&normal, &slopes.tr_mul(&with), &none, DAMPING) {
             step.copy_from(&damped);
         }
@@ -250,6 +237,14 @@ mod tests {
     use super::*;
 
     #[test]
+    fn a_cube_is_told_from_a_square_and_the_same_torque_stands_once() {
+        let rate = |i: usize| (-(i as f64) / 600.0).exp() * (0.2 * i as f64).sin();
+        let square = |i: usize| rate(i) * rate(i).abs();
+        let torques = DMatrix::from_fn(900, 3, |i, k| [square(i), 2.0 * square(i), rate(i).powi(3)][k]);
+        assert_eq!(told_apart(&torques, LawSettings::default().the_same), [0, 2]);
+    }
+
+    #[test]
     fn every_other_variable_moves_along_with_a_term() {
         let wave = |rate: f64, phase: f64| move |i: usize| (rate * i as f64 + phase).sin();
         let waves = [wave(0.1, 0.0), wave(0.1, 1.0), wave(0.37, 0.4)];
@@ -257,7 +252,8 @@ mod tests {
         let slopes = DMatrix::from_fn(200, 2, |i, k| [1.0, 1e5][k] * waves[k](i));
         let columns = DMatrix::from_fn(200, 1, |i, _| waves[2](i) + 0.5 * waves[0](i));
         let left = DVector::from_fn(200, |i, _| -3.0 * columns[(i, 0)] + 0.2 * waves[1](i));
-        let steps = steps(&left, &slopes, &columns, &[(0.0, vec![(0, 3.0)]), (0.0, vec![(0, 1.0)])]);
+        let promising = [3.0, 1.0].map(|amplitude| Promising::of(0.0, vec![(0, amplitude)]));
+        let steps = steps(&left, &slopes, &columns, &promising);
         for (step, amplitude) in steps.column_iter().zip([3.0, 1.0]) {
             let there = &left + columns.column(0) * amplitude + &slopes * step;
             for slope in slopes.column_iter() {
