@@ -167,7 +167,8 @@ impl<'a> FitContext<'a> {
 
     /// Further steps of a fit.
     pub fn go_on(&self, fit: &Refit<'a>, steps: usize) -> Option<Refit<'a>> {
-        let again = self.descend(&fit.hypothesis, fit.problem.clone(), fit.x.clone(), steps)?;
+        let descent = Descent { damping: fit.damping, ..self.descent(steps) };
+        let again = self.descend_by(descent, &fit.hypothesis, fit.problem.clone(), fit.x.clone())?;
         Some(Refit { certificate: fit.certificate, ..again })
     }
 

@@ -126,7 +126,7 @@ mod tests {
         normal[(0, 0)] = 1e16;
         let hypothesis = Hypothesis { effects: vec![Effect::HingeCoulomb], dropped: None };
         let certificate = Certificate { starts_agreeing: 1, nested_ok: true };
-        Refit { hypothesis, problem, x, chi2: 240.0, normal, steps: 1, converged: true, certificate }
+        Refit { hypothesis, problem, x, chi2: 240.0, normal, steps: 1, damping: 0.0, converged: true, certificate }
     }
 
     #[test]

@@ -29,9 +29,12 @@ pub struct Term {
     pub drifts: bool,
 }
 
+/// Place, state, shape and modulation of a term.
+pub type Form = (LawPlace, &'static str, &'static str, &'static str);
+
 impl Term {
     /// What it is, whatever its coefficients are: place, state, shape and modulation.
-    pub fn form(&self) -> (LawPlace, &'static str, &'static str, &'static str) {
+    pub fn form(&self) -> Form {
         (self.law.place, self.state, self.shape, self.modulation)
     }
 

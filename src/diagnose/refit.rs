@@ -26,6 +26,8 @@ pub struct Refit<'a> {
     pub normal: DMatrix<f64>,
     /// Steps of the descent.
     pub steps: usize,
+    /// With this damping it goes on.
+    pub damping: f64,
     /// Whether the descent ended in a minimum.
     pub converged: bool,
     /// How far it may be trusted to be the best of its hypothesis.
@@ -44,7 +46,7 @@ pub struct Certificate {
 impl<'a> Refit<'a> {
     /// From the end of a descent.
     pub fn of(hypothesis: Hypothesis, problem: Problem<'a>, outcome: Outcome) -> Self {
-        let Outcome { x, cost, normal, ending, steps, .. } = outcome;
+        let Outcome { x, cost, normal, ending, steps, damping, .. } = outcome;
         Self {
             hypothesis,
             problem,
@@ -52,6 +54,7 @@ impl<'a> Refit<'a> {
             chi2: cost,
             normal,
             steps,
+            damping,
             converged: ending == Ending::Converged,
             certificate: Certificate { starts_agreeing: 1, nested_ok: true },
         }
@@ -262,7 +265,8 @@ mod tests {
         let hypothesis = Hypothesis { effects: vec![Effect::HingeCoulomb], dropped: None };
         let certificate = Certificate { starts_agreeing, nested_ok: true };
         let x = vec![0.1; problem.variables()];
-        Refit { hypothesis, problem, x, chi2, normal: DMatrix::identity(4, 4), steps: 1, converged: true, certificate }
+        let normal = DMatrix::identity(4, 4);
+        Refit { hypothesis, problem, x, chi2, normal, steps: 1, damping: 0.0, converged: true, certificate }
     }
 
     #[test]

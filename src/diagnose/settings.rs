@@ -302,6 +302,8 @@ pub struct LawSettings {
     pub active: f64,
     /// The shortest descriptions of which it is asked what they predict (cost).
     pub foretold: usize,
+    /// Of none that is longer than the shortest by more nats (statistics: odds are e⁻²⁵).
+    pub far: f64,
     /// Other formulas are told whose description is longer by less than so many nats (statistics: beyond it odds are e⁻⁵).
     pub alternatives: f64,
 }
@@ -463,6 +465,7 @@ impl Default for LawSettings {
             along: 400.0,
             active: 0.1,
             foretold: 12,
+            far: 25.0,
             alternatives: 5.0,
         }
     }

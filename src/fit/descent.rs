@@ -17,6 +17,9 @@ pub struct Block {
     pub robust: bool,
 }
 
+/// After a failed step the damping grows so many times, after the next one so many times faster, from a first damping that may be eight decades too small.
+const GROWTH: f64 = 4.0;
+
 /// Settings.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Descent {
@@ -76,6 +79,8 @@ pub struct Outcome {
     pub steps: usize,
     /// How.
     pub ending: Ending,
+    /// Damping of the next step.
+    pub damping: f64,
 }
 
 impl Outcome {
@@ -107,7 +112,7 @@ impl Descent {
         if normals.cost > self.worst_start {
             return None;
         }
-        let (mut damping, mut growth) = (self.damping, 2.0);
+        let (mut damping, mut growth) = (self.damping, GROWTH);
         let mut ending = Ending::LostPatience;
         let mut steps = 0;
         while steps < self.most_steps {
@@ -132,12 +137,12 @@ impl Descent {
                 Some((trial, trial_blocks)) if trial.cost < normals.cost => {
                     let gain = (normals.cost - trial.cost) / promised;
                     damping = (damping * (1.0 - (2.0 * gain - 1.0).powi(3)).max(0.1)).max(1e-12);
-                    growth = 2.0;
+                    growth = GROWTH;
                     (x, blocks, normals) = (moved, trial_blocks, trial);
                 }
                 _ => {
                     damping *= growth;
-                    growth *= 2.0;
+                    growth *= GROWTH;
                     if damping > 1e12 {
                         ending = Ending::Stuck;
                         break;
@@ -145,7 +150,7 @@ impl Descent {
                 }
             }
         }
-        Some(Outcome { x, cost: normals.cost, blocks, normal: normals.matrix, steps, ending })
+        Some(Outcome { x, cost: normals.cost, blocks, normal: normals.matrix, steps, ending, damping })
     }
 
     fn normals(&self, blocks: &[Block], count: usize) -> Normals {
@@ -254,6 +259,24 @@ mod tests {
         assert_eq!(ended(0.0), (2, Ending::LostPatience));
         let (steps, ending) = ended(f64::INFINITY);
         assert!(steps > 2 && ending == Ending::Converged);
+    }
+
+    #[test]
+    fn a_descent_goes_on_with_its_damping() {
+        // where a full step overshoots, one that forgets how much it had damped tries it again and again
+        let few = Descent { most_steps: 4, damping: 1e-8, enough: 1e-12, ..Descent::default() };
+        let begun = few.run(vec![-1.2, 1.0], &[f64::NEG_INFINITY; 2], valley).unwrap();
+        let in_turns = |keeps: bool| {
+            let mut own = begun.clone();
+            let mut turns = 0;
+            while own.ending != Ending::Converged && turns < 50 {
+                let damping = if keeps { own.damping } else { few.damping };
+                own = Descent { damping, ..few }.run(own.x, &[f64::NEG_INFINITY; 2], valley).unwrap();
+                turns += 1;
+            }
+            turns
+        };
+        assert!(in_turns(true) < in_turns(false), "{} {}", in_turns(true), in_turns(false));
     }
 
     #[test]

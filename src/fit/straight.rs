@@ -100,8 +100,8 @@ mod tests {
         let mut blocks = vec![Block { columns: vec![0, 1, 2], residual, slopes: slopes(), robust: true }];
         valley.straighten(&mut blocks, &straight);
         let normal = blocks[0].slopes.tr_mul(&blocks[0].slopes);
-        let outcome =
-            Outcome { x: straight, cost: 0.0, blocks: Vec::new(), normal, steps: 0, ending: Ending::Converged };
+        let ending = Ending::Converged;
+        let outcome = Outcome { x: straight, cost: 0.0, blocks: Vec::new(), normal, steps: 0, ending, damping: 0.0 };
         let back = valley.bend(outcome);
         assert!(back.x.iter().zip(&x).all(|(a, b)| (a / b - 1.0).abs() < 1e-12), "{:?}", back.x);
         let direct = slopes().tr_mul(&slopes());

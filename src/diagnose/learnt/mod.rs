@@ -3,8 +3,8 @@
 //! 1. Along the motion of the likeliest fit, which follows the recordings, every term of the [`grammar`](super::grammar) is a torque, and the linearised motion
 //!    says what it adds to the angles. With everything else that is free projected out, its fall of χ² is that of Rao's score test.
 //! 2. The same with a name taken away, or all of them: what it explains is then the term's to explain, which may be the law that the name stands for.
-//! 3. The terms, and pairs of them, that promise most are fitted, as laws of the file would be: first a few steps of all, then the best to the end. So are those that
-//!    [short stretches](super::stretches) of the recordings ask for: where the likeliest fit is wrong, its motion shows nothing.
+//! 3. The terms, and pairs of them, that promise most are fitted, as laws of the file would be: first a few steps of all, then a few more of the better half, and so
+//!    on. So are those that [short stretches](super::stretches) of the recordings ask for: where the likeliest fit is wrong, its motion shows nothing.
 //! 4. The description length chooses among them, and among all that the table has been fitted with; with v the variance that the best one leaves, over the noise's,
 //!    of n values of which τ go together,
 //!
@@ -25,12 +25,14 @@
 //! | file | holds |
 //! |---|---|
 //! | `sought` | 1 and 2: what promises most |
-//! | `described` | 3 and 4: what is fitted, and how long its description is |
+//! | `fitted` | 3: what is fitted, within a budget |
+//! | `described` | 4: how long each description is |
 //! | `along` | which effects a term stands for, and whether it gives energy |
 //! | `proven` | 5: what they predict, and the law that stands |
 
 mod along;
 mod described;
+mod fitted;
 mod proven;
 mod sought;
 

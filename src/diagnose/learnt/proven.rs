@@ -6,7 +6,8 @@ use super::super::context::FitContext;
 use super::super::grammar::Term;
 use super::super::heldout::{self, HeldOut, Prediction};
 use super::super::refit::Refit;
-use super::described::{Described, with_laws};
+use super::described::Described;
+use super::fitted::with_laws;
 use crate::model::Parameter;
 
 /// A law that was learnt.
@@ -63,7 +64,9 @@ pub fn foretold<'a>(
         // a law that sets in later was not learnt from what was fitted
         prediction.told.iter().all(|deviations| *deviations > told).then_some((own, prediction))
     };
-    let foremost: Vec<Described<'a>> = order.into_iter().take(law.foretold).collect();
+    let near = order.first().map_or(0.0, |shortest| shortest.length + law.far);
+    let foremost: Vec<Described<'a>> =
+        order.into_iter().take_while(|own| own.length <= near).take(law.foretold).collect();
     let mut foretold: Vec<(Described<'a>, Prediction)> =
         foremost.into_par_iter().with_max_len(1).filter_map(predict).collect();
     foretold.sort_by(|a, b| a.0.length.total_cmp(&b.0.length));

@@ -1,0 +1,182 @@
+//! What is fitted in full simulation: laws of the grammar beside names, first a few steps of all, then the best to the end, within a budget of work.
+
+use rayon::prelude::*;
+
+use super::super::context::FitContext;
+use super::super::effect::Effect;
+use super::super::grammar::Term;
+use super::super::hypothesis::Hypothesis;
+use super::super::posterior::Posterior;
+use super::super::refit::Refit;
+use super::super::stretches::{Asked, terms_asked_for};
+use super::sought::{Candidate, started};
+use crate::experiment::{Coefficient, Law};
+
+/// A scale that many times the one from which it began has run away.
+const AWAY: f64 = 100.0;
+/// So many fits are begun before it is asked whether the budget allows more, on every machine the same ones at once.
+const BEGUN_AT_ONCE: usize = 8;
+/// The same of fits that go on.
+const GONE_ON_AT_ONCE: usize = 2;
+
+/// Terms, and a fit with them, wherever it has come to.
+pub type Begun<'a> = (Vec<Term>, Refit<'a>);
+
+/// The candidates that came to an end, and those that short stretches ask for, of the base model's fit; `each` motion with its
+/// derivatives costs so much.
+pub fn fitted<'a>(
+    context: &FitContext<'a>,
+    posterior: &Posterior<'a>,
+    (candidates, each): (Vec<Candidate>, f64),
+    asked_for: impl FnOnce(&Refit<'a>) -> Vec<Begun<'a>>,
+) -> Vec<Begun<'a>> {
+    let (best, law) = (posterior.best(), &context.settings.law);
+    let allowed = context.settings.search.shares.law * context.settings.search.budget as f64;
+    let until = context.work.done() + allowed as u64;
+    // what leaves more than the base model leads nowhere
+    let base = context.judged_by(&best.problem.noise, posterior.base(), 0);
+    let bound = base.map_or(f64::INFINITY, |base| base.chi2);
+    let along_best = |candidate: Candidate| {
+        let fit = begun_fit(context, best, &candidate, (bound, allowed > law.along * each))?;
+        Some((candidate.terms, fit))
+    };
+    // their fits begin far away, and cost as much as all others
+    let mut begun = if allowed > law.asked * each { asked_for(posterior.base()) } else { Vec::new() };
+    let mut candidates = candidates.into_iter().peekable();
+    let mut made = Vec::new();
+    loop {
+        let done = context.work.done();
+        let to_begin = done + (law.begun * until.saturating_sub(done) as f64) as u64;
+        begun.extend(within(context, to_begin, (BEGUN_AT_ONCE, &mut candidates), along_best));
+        made.extend(halved(context, std::mem::take(&mut begun), until));
+        // what the budget leaves when the best have come to their end is for more of them
+        if candidates.peek().is_none() || context.work.done() >= until {
+            return made;
+        }
+    }
+}
+
+/// The context of fits with some laws more.
+pub fn with_laws<'a>(context: &FitContext<'a>, terms: &[Term]) -> FitContext<'a> {
+    let laws: Vec<Law> = terms.iter().map(|term| term.law.clone()).collect();
+    let coefficients = laws.iter().flat_map(|law| law.coefficients().map(|(parameter, _)| parameter));
+    let base = context.base.iter().copied().chain(coefficients).collect();
+    FitContext { laws, base, ..context.clone() }
+}
+
+/// The first steps of a candidate, where it promises anything, from where the linear approximation leads. What the names do together is not linear in each: where
+/// that leaves more than was promised in their place, the foremost candidate begins along the motion that they follow, if there is time for that.
+fn begun_fit<'a>(
+    context: &FitContext<'a>,
+    best: &Refit<'a>,
+    candidate: &Candidate,
+    (bound, has_time): (f64, bool),
+) -> Option<Refit<'a>> {
+    (candidate.gain > context.settings.misfit.counts).then_some(())?;
+    let (with, hypothesis) = (with_laws(context, &candidate.terms), &candidate.hypothesis);
+    let led = Refit { x: best.x.iter().zip(&candidate.step).map(|(x, step)| x + step).collect(), ..best.clone() };
+    let begun = if with.cost_at(hypothesis, &led, &[]) < bound { with.begin(hypothesis, &led, &[]) } else { None };
+    let promised = context.settings.search.keeps_up * (best.chi2 - candidate.gain).max(best.values() as f64);
+    let is_as_promised = begun.as_ref().is_some_and(|begun| begun.chi2 < promised);
+    let is_worth = has_time && candidate.rank == 0 && !is_as_promised && *hypothesis != best.hypothesis;
+    let along = is_worth.then(|| with.refit_along(hypothesis, best, &[])).flatten();
+    begun.into_iter().chain(along).min_by(|a, b| a.chi2.total_cmp(&b.chi2))
+}
+
+/// Terms, and names beside them, that short stretches ask for, fitted along the recorded motion: where the names of the table lead nowhere, no motion of theirs shows
+/// what is missing.
+pub fn along_the_recording<'a>(
+    context: &FitContext<'a>,
+    base: &Refit<'a>,
+    effects: &[Effect],
+    terms: &[Term],
+) -> Vec<Begun<'a>> {
+    let asked = terms_asked_for(context, base, effects, terms, context.settings.search.asked);
+    let fitted = |(asked, of_terms): (Asked, Vec<(usize, f64)>)| {
+        let own = of_terms.into_iter().enumerate();
+        let terms: Vec<Term> = own.map(|(place, (k, amplitude))| started(&terms[k], amplitude, place)).collect();
+        let fit = with_laws(context, &terms).refit_along_recording(&asked.hypothesis, base, &asked.start)?;
+        Some((terms, fit))
+    };
+    asked.into_par_iter().with_max_len(1).filter_map(fitted).collect()
+}
+
+/// What was begun, without what has no hope: the best term and the best pair beside each set of names, then the rest, the better ones first.
+fn foremost<'a>(mut begun: Vec<Begun<'a>>, hopeless: f64) -> Vec<Begun<'a>> {
+    begun.sort_by(|a, b| a.1.chi2.total_cmp(&b.1.chi2));
+    let least = begun.first().map_or(0.0, |own| own.1.chi2);
+    begun.retain(|own| own.1.chi2 < hopeless * least);
+    let mut seen: Vec<(Hypothesis, usize)> = Vec::new();
+    let (first, rest): (Vec<Begun<'a>>, Vec<Begun<'a>>) = begun.into_iter().partition(|(terms, fit)| {
+        let kind = (fit.hypothesis.clone(), terms.len());
+        let is_first = !seen.contains(&kind);
+        seen.push(kind);
+        is_first
+    });
+    first.into_iter().chain(rest).collect()
+}
+
+/// Fits to the end within a budget of work, by successive halving (Jamieson and Talwalkar, Proceedings of Machine Learning Research 51 (2016) 240): the better half goes
+/// some steps on, of these the better half twice as many, and so on, each time for half of what is left of the budget.
+fn halved<'a>(context: &FitContext<'a>, mut going_on: Vec<Begun<'a>>, until: u64) -> Vec<Begun<'a>> {
+    let mut made = Vec::new();
+    let mut steps = context.settings.descent.first_steps;
+    while !going_on.is_empty() {
+        let mut better = foremost(going_on, context.settings.search.hopeless);
+        better.truncate(better.len().div_ceil(2));
+        let done = context.work.done();
+        let half = done + until.saturating_sub(done) / 2;
+        let further = within(context, half, (GONE_ON_AT_ONCE, better.into_iter()), |(terms, fit)| {
+            gone_on(context, terms, fit, steps)
+        });
+        let is_last = steps >= context.settings.descent.most_steps || context.work.done() > until;
+        let (ended, others): (Vec<Begun<'a>>, Vec<Begun<'a>>) =
+            further.into_iter().partition(|own| own.1.converged || is_last);
+        made.extend(ended);
+        going_on = others;
+        steps *= 2;
+    }
+    made
+}
+
+/// What becomes of some items, so many at once: the first of them in any case, the others for as long as the work done allows it.
+fn within<T: Send, R: Send>(
+    context: &FitContext<'_>,
+    until: u64,
+    (at_once, mut items): (usize, impl Iterator<Item = T>),
+    of: impl Fn(T) -> Option<R> + Sync,
+) -> Vec<R> {
+    let mut made = Vec::new();
+    loop {
+        let batch: Vec<T> = items.by_ref().take(at_once).collect();
+        let is_last = batch.len() < at_once;
+        made.extend(batch.into_par_iter().with_max_len(1).filter_map(&of).collect::<Vec<R>>());
+        if is_last || context.work.done() > until {
+            return made;
+        }
+    }
+}
+
+/// A candidate so many steps further, its coefficients those of the fit; `None` where one has run away, and its term is another one of the grammar.
+pub fn gone_on<'a>(
+    context: &FitContext<'a>,
+    mut terms: Vec<Term>,
+    begun: Refit<'a>,
+    steps: usize,
+) -> Option<Begun<'a>> {
+    let with = with_laws(context, &terms);
+    let fit = if begun.converged { begun } else { with.go_on(&begun, steps).unwrap_or(begun) };
+    for term in &mut terms {
+        let fitted: Vec<Option<f64>> = term.law.coefficients().map(|(parameter, _)| fit.value(parameter)).collect();
+        // the amplitude comes first; the others were begun within the range of the state
+        let begun = term.law.parameters.values().skip(1).map(|own| own.start.abs()).fold(0.0, f64::max);
+        for (own, value) in term.law.parameters.values_mut().zip(fitted) {
+            own.start = value.unwrap_or(own.start);
+        }
+        let has_run_away = |own: &Coefficient| own.start.abs() > AWAY * begun;
+        if term.law.parameters.values().skip(1).any(has_run_away) {
+            return None;
+        }
+    }
+    Some((terms, fit))
+}
