@@ -38,6 +38,13 @@ impl Term {
         (self.law.place, self.state, self.shape, self.modulation)
     }
 
+    /// The same under the name of the place at which it stands in a law.
+    #[must_use]
+    pub fn named(&self, place: usize) -> Self {
+        let law = Law { name: format!("learnt {}", place + 1), ..self.law.clone() };
+        Self { law, ..self.clone() }
+    }
+
     /// Its formula with the numbers of its coefficients.
     pub fn with_numbers(&self) -> String {
         let number = |word: &str| self.law.parameters.get(word).map(|own| format!("{:.3e}", own.start));

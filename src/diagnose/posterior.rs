@@ -225,11 +225,12 @@ fn unknown_gain(latents: &[Latent], law_error_n_m: f64, slow_errors_rad: f64, co
     latents.iter().map(of).fold(f64::NEG_INFINITY, f64::max) - (looks.max(1) as f64).ln()
 }
 
-/// How much likelier anything that leaves only noise makes the recordings than a fit that leaves far more: what is out of step with a recording shows no small torque
-/// that would mend it.
+/// How much likelier anything that leaves only noise makes the recordings than a fit that failed: one that leaves far more, being out of step with a recording, shows no
+/// small torque that would mend it, and one that has not come to its end shows only what is left of its way.
 fn gain_over_a_failed_fit(fit: &Refit<'_>, scatter: Scatter, settings: &Settings) -> f64 {
+    let stopped = !fit.converged && fit.chi2 > most_of_noise(fit.values(), &settings.misfit);
     let gain = 0.5 * (fit.chi2 - fit.values() as f64) / scatter.of_all;
-    if leaves_more_than_noise(fit, &settings.noise) { gain } else { f64::NEG_INFINITY }
+    if stopped || leaves_more_than_noise(fit, &settings.noise) { gain } else { f64::NEG_INFINITY }
 }
 
 impl<'a> Posterior<'a> {

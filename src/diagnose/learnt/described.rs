@@ -57,7 +57,7 @@ pub fn descriptions<'a>(
     let possible = posterior.candidates.iter().filter(|candidate| candidate.ln_posterior.is_finite());
     let of_table = possible.map(|candidate| (Vec::new(), candidate.fit.clone()));
     let mut order = described(with_laws.into_iter().chain(of_table).collect(), &prior)?;
-    // a term that is nearly right makes names superfluous that were needed without it
+    // a term that is nearly right makes superfluous what was needed without it
     let mut tried = Vec::new();
     loop {
         let near = order[0].length + context.settings.law.alternatives;
@@ -67,8 +67,13 @@ pub fn descriptions<'a>(
             break;
         }
         tried.extend(shortest.iter().map(|own| own.kind()));
-        let fewer: Vec<Begun<'a>> = shortest.par_iter().flat_map(|own| without_a_name(context, own)).collect();
-        order = described(order.into_iter().map(|own| (own.terms, own.fit)).chain(fewer).collect(), &prior)?;
+        let simpler = |own: &&Described<'a>| {
+            let mut simpler = without_a_name(context, own);
+            simpler.extend(without_a_term(context, own));
+            simpler
+        };
+        let simpler: Vec<Begun<'a>> = shortest.par_iter().flat_map(simpler).collect();
+        order = described(order.into_iter().map(|own| (own.terms, own.fit)).chain(simpler).collect(), &prior)?;
     }
     Some(order)
 }
@@ -81,19 +86,39 @@ fn without_a_name<'a>(context: &FitContext<'a>, own: &Described<'a>) -> Vec<Begu
     let scales: Vec<Parameter> =
         own.terms.iter().flat_map(|term| term.law.coefficients().skip(1)).map(|(parameter, _)| parameter).collect();
     let fewer = |name: &Effect| {
-        let terms = own.terms.clone();
         let hypothesis = own.fit.hypothesis.without(*name);
         let from = |factor: f64| {
             let start: Vec<_> = scales.iter().filter_map(|p| Some((*p, factor * own.fit.value(*p)?))).collect();
             with.begin(&hypothesis, &own.fit, &start)
         };
         let begun = SCALED.map(from).into_iter().flatten().min_by(|a, b| a.chi2.total_cmp(&b.chi2))?;
-        let (search, descent) = (&context.settings.search, &context.settings.descent);
-        let few = (begun.chi2 < search.hopeless * own.fit.chi2)
-            .then(|| gone_on(context, terms, begun, descent.few_steps))??;
-        (few.1.chi2 < search.keeps_up * own.fit.chi2).then(|| gone_on(context, few.0, few.1, descent.most_steps))?
+        kept_up(context, own, (own.terms.clone(), begun))
     };
     own.fit.hypothesis.effects.par_iter().with_max_len(1).filter_map(fewer).collect()
+}
+
+/// A description with several terms without each of them, from where it stands.
+fn without_a_term<'a>(context: &FitContext<'a>, own: &Described<'a>) -> Vec<Begun<'a>> {
+    let fewer = |out: usize| {
+        let others = own.terms.iter().enumerate().filter(|(place, _)| *place != out).map(|(_, term)| term);
+        let terms: Vec<Term> = others.enumerate().map(|(place, term)| term.named(place)).collect();
+        let start: Vec<_> =
+            terms.iter().flat_map(|term| term.law.coefficients()).map(|(p, own)| (p, own.start)).collect();
+        let begun = with_laws(context, &terms).begin(&own.fit.hypothesis, &own.fit, &start)?;
+        kept_up(context, own, (terms, begun))
+    };
+    let several = if own.terms.len() > 1 { own.terms.len() } else { 0 };
+    (0..several).into_par_iter().with_max_len(1).filter_map(fewer).collect()
+}
+
+/// The end of a simpler fit, unless it soon leaves far more than the description does.
+fn kept_up<'a>(context: &FitContext<'a>, own: &Described<'a>, (terms, begun): Begun<'a>) -> Option<Begun<'a>> {
+    let (search, descent) = (&context.settings.search, &context.settings.descent);
+    let keeps_up = |fit: &Refit<'a>, times: f64| fit.chi2 < times * own.fit.chi2;
+    keeps_up(&begun, search.hopeless).then_some(())?;
+    let (terms, few) = gone_on(context, terms, begun, descent.few_steps)?;
+    keeps_up(&few, search.keeps_up).then_some(())?;
+    gone_on(context, terms, few, descent.most_steps)
 }
 
 /// What names and terms cost before anything was seen (nats).

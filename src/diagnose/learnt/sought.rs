@@ -224,8 +224,7 @@ fn steps(left: &DVector<f64>, slopes: &DMatrix<f64>, columns: &DMatrix<f64>, pro
 
 /// A term with its amplitude, under a name of its own.
 pub(super) fn started(term: &Term, amplitude: f64, place: usize) -> Term {
-    let mut term = term.clone();
-    term.law.name = format!("learnt {}", place + 1);
+    let mut term = term.named(place);
     if let Some(own) = term.law.parameters.get_mut("a") {
         own.start = amplitude;
     }
