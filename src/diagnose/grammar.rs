@@ -105,7 +105,7 @@ const OF_RATE: [Shape; 1] = [Shape {
     words: "sign that fades with speed",
     formula: "sign(u) * exp(-abs(u) / b)",
     power: 0,
-    starts: &[&[0.05], &[0.2]],
+    starts: &[&[0.05], &[0.2], &[1.0], &[4.0]],
 }];
 
 /// How an amplitude changes.

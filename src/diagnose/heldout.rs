@@ -11,6 +11,7 @@ use super::refit::Refit;
 use super::search::horizon::continued_alone;
 use crate::experiment::Law;
 use crate::fit::{Belief, Problem, Record, Residuals, recordings, residuals_of};
+use crate::model::Parameter;
 
 /// A frozen coefficient may move by this part of itself.
 const FROZEN: f64 = 1e-9;
@@ -35,7 +36,8 @@ pub struct Prediction {
     pub rmse_rad: Vec<f64>,
     /// What is left of the whole recording, where a part of it was fitted.
     pub left: Option<Residuals>,
-    /// By how many standard deviations what was fitted told the amplitude of each law of the file from zero.
+    /// By how many standard deviations what was fitted told the amplitude of each law of the file from zero, its other coefficients being what they are: of a
+    /// narrow law only amplitude times width is known.
     pub told: Vec<f64>,
 }
 
@@ -51,9 +53,9 @@ impl Prediction {
     fn from(fitted: &Refit<'_>, laws: &[Law]) -> Self {
         let variance = (fitted.chi2 / fitted.values().max(1) as f64).max(1.0);
         let deviations = |law: &Law| {
-            let (amplitude, _) = law.coefficients().next()?;
-            let sd = (variance * fitted.covariance(&[amplitude]).get((0, 0))?).sqrt();
-            Some(fitted.value(amplitude)?.abs() / sd)
+            let coefficients: Vec<Parameter> = law.coefficients().map(|(parameter, _)| parameter).collect();
+            let precision = fitted.covariance(&coefficients).try_inverse()?;
+            Some(fitted.value(*coefficients.first()?)?.abs() * (precision.get((0, 0))? / variance).sqrt())
         };
         Self { rmse_rad: Vec::new(), left: None, told: laws.iter().map(|law| deviations(law).unwrap_or(0.0)).collect() }
     }

@@ -264,7 +264,9 @@ pub fn motion_at(model: &ForwardModel, swing: &Trajectory, t_s: f64) -> Option<M
     let (step, tau) = swing.step_at(t_s)?;
     let mut motion = model.motion(t_s, &step.theta_rad(tau), &step.rate(tau));
     motion.acceleration = step.acceleration(tau);
-    motion.hinge = step.hinge;
+    if model.is_dry() {
+        motion.hinge = step.hinge;
+    }
     Some(motion)
 }
 

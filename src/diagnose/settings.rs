@@ -294,6 +294,8 @@ pub struct LawSettings {
     pub most: usize,
     /// … up to this part of what the budget allows; the rest is for those that are fitted to the end (cost).
     pub begun: f64,
+    /// Terms begun in the place of a name whose torque they nearly exert (cost).
+    pub in_place: usize,
     /// Short stretches of the recordings are asked, too, where the budget allows so many motions with derivatives (cost).
     pub asked: f64,
     /// The foremost fits are begun along the motion that names follow, too, where it allows so many (cost).
@@ -461,6 +463,7 @@ impl Default for LawSettings {
             paired: 12,
             most: 16,
             begun: 0.6,
+            in_place: 4,
             asked: 1000.0,
             along: 400.0,
             active: 0.1,

@@ -149,6 +149,11 @@ impl<'a> Balance<'a> {
         along[0]
     }
 
+    /// What dry friction of the hinge can hold (N·m), where the hinge is dry.
+    pub fn friction_n_m(&self) -> Option<f64> {
+        self.model.friction_n_m(&self.motion)
+    }
+
     /// Quantities at whose zeros a law has a corner; of the rates alone.
     pub fn corners(&mut self, rate: &[f64]) -> Vec<f64> {
         match self.shapes {

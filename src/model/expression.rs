@@ -8,12 +8,14 @@
 //! ```
 //!
 //! Functions: `abs sign step max min exp sin cos sqrt tanh`. `sign` and `step` rise within ±10⁻³ of the unit of what they are of, as tanh does: an integrator
-//! cannot step over a jump. Derivatives are taken forward, with all variables at once.
+//! cannot step over a jump, unless it is told on which side it is ([`Expression::with_sign_given`]). Derivatives are taken forward, with all variables at once.
 
 /// Most variables of one formula: the state and the coefficients.
 pub const MOST_VARIABLES: usize = 12;
 /// Half the width over which a sign goes from −1 to 1, in the unit of what it is of.
 const SIGN_WIDTH: f64 = 1e-3;
+/// The variables, and a sign that is given.
+const SLOPES: usize = MOST_VARIABLES + 1;
 
 /// A formula, ready to be evaluated.
 #[derive(Debug, Clone, PartialEq)]
@@ -69,12 +71,12 @@ pub struct Dual {
     /// The value.
     pub value: f64,
     /// With each variable.
-    pub slopes: [f64; MOST_VARIABLES],
+    pub slopes: [f64; SLOPES],
 }
 
 impl Dual {
     fn constant(value: f64) -> Self {
-        Self { value, slopes: [0.0; MOST_VARIABLES] }
+        Self { value, slopes: [0.0; SLOPES] }
     }
 
     /// A function of this one with a value and a slope.
@@ -109,6 +111,17 @@ impl Expression {
     /// Whether a variable occurs.
     pub fn uses(&self, variable: usize) -> bool {
         self.nodes.contains(&Node::Variable(variable))
+    }
+
+    /// The same with a further variable, the last one, in the place of a variable's sign: whoever knows on which side of a jump he is need not smooth it. `None`
+    /// where that sign does not occur.
+    pub fn with_sign_given(&self, of: usize) -> Option<Self> {
+        let is_its_sign = |pair: &[Node]| pair == [Node::Variable(of), Node::Call(Function::Sign)];
+        let mut nodes = self.nodes.clone();
+        while let Some(place) = nodes.windows(2).position(is_its_sign) {
+            nodes.splice(place..place + 2, [Node::Variable(self.variables)]);
+        }
+        (nodes != self.nodes).then_some(Self { nodes, variables: self.variables + 1 })
     }
 
     /// The value and its derivatives with every variable.
@@ -382,6 +395,17 @@ mod tests {
                 assert!(error < 1e-5 * (1.0 + difference.abs()), "{variable}: {} {difference}", exact.slopes[variable]);
             }
         }
+    }
+
+    #[test]
+    fn a_sign_that_is_given_is_not_smoothed_and_no_other_is_touched() {
+        let formula =
+            Expression::parse("-a * sign(rate) * exp(-abs(rate)) + sign(angle)", &["angle", "rate", "a"]).unwrap();
+        let given = formula.with_sign_given(1).unwrap();
+        assert_eq!(given.at(&[1.0, 1e-9, 2.0, -1.0]).value, 2.0 * (-1e-9f64).exp() + 1.0);
+        assert_eq!(given.at(&[1.0, 0.0, 2.0, 0.0]).value, 1.0);
+        assert_eq!(given.at(&[1.0, 0.0, 2.0, 1.0]).slopes[2], -1.0);
+        assert_eq!(formula.with_sign_given(2), None);
     }
 
     #[test]

@@ -25,8 +25,6 @@ pub struct ForwardModel {
     hidden: usize,
     /// Of a strip of many links.
     shapes: Option<Shapes>,
-    /// τ, where the hinge is dry.
-    friction_n_m: Option<f64>,
     work: Work,
 }
 
@@ -50,8 +48,7 @@ impl ForwardModel {
         };
         let effects = effects_of(model, mark_length_m);
         let hidden = effects.iter().map(|e| e.hidden(&chain)).sum();
-        let friction_n_m = model.effects.hinge_coulomb;
-        Ok(Self { chain, gravity_m_s2, effects, hidden, shapes, friction_n_m, work: Work::default() })
+        Ok(Self { chain, gravity_m_s2, effects, hidden, shapes, work: Work::default() })
     }
 
     /// The same with forces on the lower ends of the links.
@@ -104,9 +101,14 @@ impl ForwardModel {
         self.gravity_m_s2
     }
 
-    /// τ of the hinge, where it is dry.
-    pub fn friction_n_m(&self) -> Option<f64> {
-        self.friction_n_m
+    /// What dry friction of the hinge can hold at an instant (N·m), all laws together, where the hinge is dry.
+    pub fn friction_n_m(&self, motion: &Motion) -> Option<f64> {
+        self.effects.iter().filter_map(|e| e.friction_n_m(motion)).reduce(|a, b| a + b)
+    }
+
+    /// Whether the hinge has dry friction.
+    pub fn is_dry(&self) -> bool {
+        self.friction_n_m(&Motion::zero(self.chain.count(), self.hidden)).is_some()
     }
 
     /// Every coefficient with its value.
@@ -124,9 +126,6 @@ impl ForwardModel {
     pub fn set(&mut self, parameter: Parameter, value: f64) {
         self.effects.iter_mut().for_each(|e| e.set(parameter, value));
         self.chain.set(parameter, value);
-        if parameter == Parameter::HingeCoulomb {
-            self.friction_n_m = self.friction_n_m.map(|_| value);
-        }
     }
 
     /// √(g Σhᵢ / Σaᵢᵢ): the pace of the swing, for tolerances on rates.
@@ -183,9 +182,7 @@ impl ForwardModel {
 
     /// ∂Q.
     pub fn partials(&self, motion: &Motion, partials: &mut Partials) {
-        partials.clear();
-        self.chain.add_partials(self.gravity_m_s2, motion, partials);
-        self.effects.iter().for_each(|e| e.add_partials(&self.chain, motion, partials));
+        self.free_partials(motion, partials);
         if motion.hinge == Hinge::Sticks {
             partials.clear_row(0);
             partials.acceleration[(0, 0)] = -self.chain.inertia_kg_m2()[(0, 0)];
@@ -250,6 +247,13 @@ impl ForwardModel {
         q.fill(0.0);
         self.chain.add_torque(self.gravity_m_s2, motion, q);
         self.effects.iter().for_each(|e| e.add_torque(&self.chain, motion, q));
+    }
+
+    /// ∂Q without what holds the hinge.
+    pub(super) fn free_partials(&self, motion: &Motion, partials: &mut Partials) {
+        partials.clear();
+        self.chain.add_partials(self.gravity_m_s2, motion, partials);
+        self.effects.iter().for_each(|e| e.add_partials(&self.chain, motion, partials));
     }
 
     fn support(&self) -> Option<&SupportMotion> {

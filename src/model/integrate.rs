@@ -74,6 +74,8 @@ struct Run<'a> {
     balance: Balance<'a>,
     breaks_s: Vec<f64>,
     place: Place,
+    /// Whether the hinge has dry friction.
+    is_dry: bool,
     hinge: Hinge,
     /// Sides of the laws' corners; empty where there are none, or too many to stop at.
     sides: Vec<f64>,
@@ -127,6 +129,7 @@ impl<'a> Run<'a> {
             balance,
             breaks_s: model.breaks_s(),
             place,
+            is_dry: model.is_dry(),
             hinge: Hinge::SlidesForward,
             sides: Vec::new(),
             first: vec![0.0; rates],
@@ -280,19 +283,26 @@ impl<'a> Run<'a> {
         Ok(self.balance.hold_n_m())
     }
 
+    /// Whether friction can bear that where the balance was looked at last.
+    fn holds(&self, hold_n_m: f64) -> bool {
+        self.balance.friction_n_m().is_some_and(|friction_n_m| hold_n_m.abs() <= friction_n_m)
+    }
+
     fn hinge_at_start(&mut self) -> Result<Hinge> {
-        let Some(friction_n_m) = self.model.friction_n_m() else { return Ok(Hinge::SlidesForward) };
+        if !self.is_dry {
+            return Ok(Hinge::SlidesForward);
+        }
         if self.place.rate[0] != 0.0 {
             return Ok(Hinge::sliding(self.place.rate[0]));
         }
         let hold_n_m = self.hold_n_m()?;
-        Ok(if hold_n_m.abs() <= friction_n_m { Hinge::Sticks } else { Hinge::sliding(hold_n_m) })
+        Ok(if self.holds(hold_n_m) { Hinge::Sticks } else { Hinge::sliding(hold_n_m) })
     }
 
     /// Where in the step the hinge first reverses or is let go, or a law comes to a corner.
     fn turn_in(&mut self, step: &Step) -> Option<(f64, Turn)> {
         let turn = if self.hinge == Hinge::Sticks { Turn::Lets } else { Turn::Reverses };
-        let is_dry = self.model.friction_n_m().is_some();
+        let is_dry = self.is_dry;
         if !is_dry && self.sides.is_empty() {
             return None;
         }
@@ -326,7 +336,7 @@ impl<'a> Run<'a> {
         let (rate, acceleration) = (step.rate(tau), step.acceleration(tau));
         let t_s = step.from_s + tau * step.length_s;
         self.balance.go_to(t_s, &step.theta_rad(tau), (&rate, &acceleration), Hinge::Sticks, &[]);
-        self.model.friction_n_m().unwrap_or(0.0) - self.balance.hold_n_m().abs()
+        self.balance.friction_n_m().unwrap_or(0.0) - self.balance.hold_n_m().abs()
     }
 
     /// Of every corner a quantity that is positive up to there.
@@ -400,10 +410,9 @@ impl<'a> Run<'a> {
                 self.place.rate[0] = 0.0;
                 let slid = self.accelerations(back)?;
                 let hold_n_m = self.hold_n_m()?;
-                let holds = self.model.friction_n_m().is_some_and(|friction_n_m| hold_n_m.abs() <= friction_n_m);
                 self.hinge = if slid[0] * back.sign() > 0.0 {
                     back
-                } else if holds {
+                } else if self.holds(hold_n_m) {
                     Hinge::Sticks
                 } else {
                     Hinge::sliding(hold_n_m)

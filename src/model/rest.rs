@@ -2,7 +2,7 @@
 
 use nalgebra::{DMatrix, DVector};
 
-use super::{ForwardModel, Partials};
+use super::{ForwardModel, Hinge, Motion, Partials};
 use crate::error::{Error, Result};
 use crate::experiment::Experiment;
 
@@ -12,18 +12,17 @@ const STEPS: usize = 50;
 const AT_REST_RAD: f64 = 1e-14;
 
 impl ForwardModel {
-    /// The model of an experiment as far as it acts at rest: without dry friction and a moving pivot.
+    /// The model of an experiment as far as it acts at rest: without a moving pivot.
     ///
     /// # Errors
     /// As [`ForwardModel::of`].
     pub fn still(experiment: &Experiment) -> Result<Self> {
         let mut still = experiment.clone();
-        still.model.effects.hinge_coulomb = None;
         still.model.effects.support_motion = None;
         Self::of(&still)
     }
 
-    /// Angles θ₀ of a stable rest, Q(θ₀) = 0, by Newton's method from an angle near by. `further` adds torques that are not the chain's own to Q(θ), and
+    /// Angles θ₀ of a stable rest where dry friction bears nothing, Q(θ₀) = 0, by Newton's method from an angle near by. `further` adds torques that are not the chain's own to Q(θ), and
     /// takes their derivatives from −∂Q/∂θ.
     ///
     /// # Errors
@@ -43,7 +42,7 @@ impl ForwardModel {
         let mut theta = from_rad;
         let mut torque_n_m = vec![0.0; self.rates()];
         for _ in 0..STEPS {
-            self.torque(&self.motion(0.0, theta.as_slice(), &vec![0.0; n]), &mut torque_n_m);
+            self.torque_while_held(&self.motion(0.0, theta.as_slice(), &vec![0.0; n]), &mut torque_n_m);
             let mut torque = DVector::from_column_slice(&torque_n_m[..n]);
             let mut stiffness = -self.partials_at_rest(theta.as_slice()).theta.rows(0, n);
             further(&theta, &mut torque, &mut stiffness);
@@ -60,7 +59,8 @@ impl ForwardModel {
     pub fn partials_at_rest(&self, theta_rad: &[f64]) -> Partials {
         let n = self.chain().count();
         let mut partials = Partials::zero(n, self.rates());
-        self.partials(&self.motion(0.0, theta_rad, &vec![0.0; n]), &mut partials);
+        let still = Motion { hinge: Hinge::Sticks, ..self.motion(0.0, theta_rad, &vec![0.0; n]) };
+        self.free_partials(&still, &mut partials);
         partials
     }
 }

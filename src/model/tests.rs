@@ -4,7 +4,9 @@ use nalgebra::DMatrix;
 
 use super::integrate::Directions;
 use super::*;
-use crate::experiment::{Effects, Experiment, Hysteresis, Inertia, Law, Model, Rig, SupportMotion};
+use crate::experiment::{
+    Coefficient, Effects, Experiment, Hysteresis, Inertia, Law, LawPlace, Model, Rig, SupportMotion,
+};
 
 fn experiment(k: f64, c: f64, effects: Effects) -> Experiment {
     let model = Model { k_eq_n_m_per_rad: k, c_eq_n_m_s_per_rad: c, effects, ..Model::default() };
@@ -289,6 +291,37 @@ fn a_dry_hinge_loses_four_bands_a_cycle_and_then_holds() {
     }
     assert_eq!(swing.at(20.0).omega_rad_s[0], 0.0);
     assert!((swing.at(20.0).theta_rad[0] / band_rad - 0.5).abs() < 1e-3);
+}
+
+#[test]
+fn a_formula_with_the_sign_of_the_rate_at_the_hinge_is_dry_friction() {
+    let torque_n_m = 6e-5;
+    let effect = experiment(0.0, 0.0, Effects { hinge_coulomb: Some(torque_n_m), ..Effects::default() });
+    let formula = |text: &str| {
+        let parameters = [("a", torque_n_m, "N m"), ("b", 1e9, "rad/s")]
+            .map(|(name, start, unit)| (name.to_owned(), Coefficient { start, min: None, unit: unit.to_owned() }));
+        let law = Law {
+            name: "own".to_owned(),
+            place: LawPlace::Hinge,
+            formula: text.to_owned(),
+            parameters: parameters.into(),
+        };
+        let mut experiment = experiment(0.0, 0.0, Effects::default());
+        experiment.model.law = vec![law];
+        experiment
+    };
+    let at_end = |experiment: &Experiment| {
+        let model = ForwardModel::of(experiment).unwrap();
+        let swing = Trajectory::swing(&model, &State::at_rest(&[0.0, 1.2]), 0.0, 2.0).unwrap();
+        assert!(swing.steps().iter().any(|step| step.hinge == Hinge::Sticks));
+        swing.at(2.0).theta_rad
+    };
+    let [stated, fading] = [effect, formula("-a * sign(rate) * exp(-abs(rate) / b)")].map(|own| at_end(&own));
+    assert!(stated.iter().zip(&fading).all(|(a, b)| (a - b).abs() < 1e-7), "{stated:?} {fading:?}");
+    // at rest nothing moves, and it bears nothing
+    let model = ForwardModel::still(&formula("-a * sign(rate)")).unwrap();
+    let rest_rad = model.rest_rad(nalgebra::DVector::from_element(2, 0.01), |_, _, _| {}).unwrap();
+    assert!(rest_rad.amax() < 1e-12, "{rest_rad}");
 }
 
 #[test]

@@ -117,7 +117,7 @@ impl Along {
     }
 
     /// Of a unit of an effect's first coefficient.
-    fn of_effect(&self, effect: Effect) -> DVector<f64> {
+    pub fn of_effect(&self, effect: Effect) -> DVector<f64> {
         let parameter = effect.parameters()[0];
         self.torques(|model, motion, q| {
             let mut partials = Partials::zero(model.chain().count(), model.rates());
@@ -127,7 +127,7 @@ impl Along {
     }
 
     /// Of a term with its coefficients.
-    fn of_term(&self, term: &Term) -> Option<DVector<f64>> {
+    pub fn of_term(&self, term: &Term) -> Option<DVector<f64>> {
         let formula = Formula::of(&term.law)?;
         Some(self.torques(|model, motion, q| formula.add_torque(model.chain(), motion, q)))
     }

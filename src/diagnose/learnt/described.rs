@@ -14,7 +14,8 @@ use super::super::settings::LawSettings;
 use super::Needed;
 use super::along::Along;
 use super::fitted::{Begun, along_the_recording, fitted, gone_on, with_laws};
-use super::sought::candidates;
+use super::in_place::in_place_of_names;
+use super::sought::{Candidate, candidates};
 use crate::model::Parameter;
 
 /// Scales of a term's state to begin with, over those that it had beside a name.
@@ -49,10 +50,12 @@ pub fn descriptions<'a>(
     let before = context.work.done();
     let linearised = best.linearised()?;
     let each = (context.work.done() - before).max(1) as f64;
-    let (candidates, terms) = candidates(best, &linearised, &context.settings.law)?;
+    let (promising, terms, every_start) = candidates(best, &linearised, &context.settings.law)?;
+    let in_place = in_place_of_names(context, best, &every_start)?;
+    let candidates: Vec<Candidate> = in_place.iter().cloned().chain(promising).collect();
     let prior = Prior::of(context, best, effects, &terms)?;
-    let with_laws =
-        fitted(context, posterior, (candidates, each), |base| along_the_recording(context, base, effects, &terms));
+    let along = |base: &Refit<'a>| along_the_recording(context, base, (effects, &terms), &in_place);
+    let with_laws = fitted(context, posterior, (candidates, each), along);
     // what the table has been fitted with is a description, too
     let possible = posterior.candidates.iter().filter(|candidate| candidate.ln_posterior.is_finite());
     let of_table = possible.map(|candidate| (Vec::new(), candidate.fit.clone()));

@@ -3,6 +3,8 @@
 //! 1. Along the motion of the likeliest fit, which follows the recordings, every term of the [`grammar`](super::grammar) is a torque, and the linearised motion
 //!    says what it adds to the angles. With everything else that is free projected out, its fall of χ² is that of Rao's score test.
 //! 2. The same with a name taken away, or all of them: what it explains is then the term's to explain, which may be the law that the name stands for.
+//!    A term that exerts nearly the torque of a name begins in its place, whatever it promises: friction that fades with speed follows the motion of dry friction,
+//!    and is far from it in no step that is linear.
 //! 3. The terms, and pairs of them, that promise most are fitted, as laws of the file would be: first a few steps of all, then a few more of the better half, and so
 //!    on. So are those that [short stretches](super::stretches) of the recordings ask for: where the likeliest fit is wrong, its motion shows nothing.
 //! 4. The description length chooses among them, and among all that the table has been fitted with; with v the variance that the best one leaves, over the noise's,
@@ -25,6 +27,7 @@
 //! | file | holds |
 //! |---|---|
 //! | `sought` | 1 and 2: what promises most |
+//! | `in_place` | 2: what exerts nearly the torque of a name |
 //! | `fitted` | 3: what is fitted, within a budget |
 //! | `described` | 4: how long each description is |
 //! | `along` | which effects a term stands for, and whether it gives energy |
@@ -33,6 +36,7 @@
 mod along;
 mod described;
 mod fitted;
+mod in_place;
 mod proven;
 mod sought;
 

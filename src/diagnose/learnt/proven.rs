@@ -53,7 +53,7 @@ fn formula_of(terms: &[Term]) -> String {
 /// comes later by what was learnt before is Dawid's prequential description, Journal of the Royal Statistical Society A 147 (1984) 278.)
 pub fn foretold<'a>(
     context: &FitContext<'a>,
-    order: Vec<Described<'a>>,
+    mut order: Vec<Described<'a>>,
     from_s: Option<f64>,
 ) -> Vec<(Described<'a>, Prediction)> {
     let (law, told) = (&context.settings.law, context.settings.prior.told_from_zero);
@@ -64,11 +64,16 @@ pub fn foretold<'a>(
         // a law that sets in later was not learnt from what was fitted
         prediction.told.iter().all(|deviations| *deviations > told).then_some((own, prediction))
     };
-    let near = order.first().map_or(0.0, |shortest| shortest.length + law.far);
-    let foremost: Vec<Described<'a>> =
-        order.into_iter().take_while(|own| own.length <= near).take(law.foretold).collect();
-    let mut foretold: Vec<(Described<'a>, Prediction)> =
-        foremost.into_par_iter().with_max_len(1).filter_map(predict).collect();
+    let mut foretold: Vec<(Described<'a>, Prediction)> = Vec::new();
+    let mut asked = 0;
+    // where none of the foremost predicts anything, the next ones are asked
+    while foretold.is_empty() && asked < law.foretold && !order.is_empty() {
+        let near = order[0].length + law.far;
+        let count = order.iter().take_while(|own| own.length <= near).count().clamp(1, law.foretold - asked);
+        let foremost: Vec<Described<'a>> = order.drain(..count).collect();
+        asked += count;
+        foretold = foremost.into_par_iter().with_max_len(1).filter_map(predict).collect();
+    }
     foretold.sort_by(|a, b| a.0.length.total_cmp(&b.0.length));
     foretold
 }

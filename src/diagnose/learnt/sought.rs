@@ -37,13 +37,13 @@ pub struct Candidate {
     pub rank: usize,
 }
 
-/// What promises most, beside the names of a fit, without each of them, and in the place of them all, from the fit's residuals and their derivatives; and the terms
-/// out of which it was chosen.
+/// What promises most, beside the names of a fit, without each of them, and in the place of them all, from the fit's residuals and their derivatives; the terms
+/// out of which it was chosen; and every term with every start.
 pub fn candidates(
     best: &Refit<'_>,
     (residual, slopes): &(DVector<f64>, DMatrix<f64>),
     settings: &LawSettings,
-) -> Option<(Vec<Candidate>, Vec<Term>)> {
+) -> Option<(Vec<Candidate>, Vec<Term>, Vec<Term>)> {
     let (all, columns, torques) = effects_of_terms(best, residual.len())?;
     let names = &best.hypothesis.effects;
     let mut left_out: Vec<Vec<Effect>> = vec![Vec::new()];
@@ -86,7 +86,7 @@ pub fn candidates(
     // what promises most beside each set of names comes first
     let mut candidates: Vec<Candidate> = left_out.iter().flat_map(promise).collect();
     candidates.sort_by_key(|candidate| candidate.rank);
-    Some((candidates, apart.iter().map(|k| all[*k].clone()).collect()))
+    Some((candidates, apart.iter().map(|k| all[*k].clone()).collect(), all))
 }
 
 /// The terms that exert another torque than any before them: on a single link hinge, strip and tip are one place.

@@ -11,9 +11,13 @@ pub struct Formula {
     place: LawPlace,
     expression: Expression,
     coefficients: Vec<Parameter>,
-    /// The state where it is looked at, then the values of the coefficients.
+    /// The state where it is looked at, then the values of the coefficients; last, where it is dry friction of the hinge, the sign of the rate.
     values: Vec<f64>,
+    is_dry: bool,
 }
+
+/// The rate among the variables of a law at the hinge.
+const RATE: usize = 1;
 
 /// What a formula gives at one place, and how it acts there.
 enum Acts<'s> {
@@ -31,14 +35,33 @@ impl Formula {
     /// From a file's law; `None` where its formula is not sound.
     pub fn of(law: &Law) -> Option<Self> {
         let state = vec![0.0; law.place.variables().len()];
-        let values = state.into_iter().chain(law.parameters.values().map(|own| own.start)).collect();
+        let stated = law.expression().ok()?;
+        let dry = if law.place == LawPlace::Hinge { stated.with_sign_given(RATE) } else { None };
+        let is_dry = dry.is_some();
+        let values = state.into_iter().chain(law.parameters.values().map(|own| own.start)).chain(is_dry.then_some(0.0));
         let coefficients = law.coefficients().map(|(parameter, _)| parameter).collect();
-        Some(Self { place: law.place, expression: law.expression().ok()?, coefficients, values })
+        Some(Self {
+            place: law.place,
+            values: values.collect(),
+            expression: dry.unwrap_or(stated),
+            coefficients,
+            is_dry,
+        })
     }
 
     fn at(&self, state: &[f64]) -> Dual {
         let mut values = self.values.clone();
         values[..state.len()].copy_from_slice(state);
+        self.expression.at(&values)
+    }
+
+    /// At the hinge, which moves at a rate with this sign.
+    fn at_hinge(&self, motion: &Motion, rate: f64, sign: f64) -> Dual {
+        let mut values = self.values.clone();
+        values[..RATE + 2].copy_from_slice(&[motion.theta_rad[0], rate, motion.t_s]);
+        if let Some(of_rate) = values.last_mut().filter(|_| self.is_dry) {
+            *of_rate = sign;
+        }
         self.expression.at(&values)
     }
 
@@ -52,7 +75,7 @@ impl Formula {
     fn visit(&self, chain: &Chain, motion: &Motion, mut each: impl FnMut(&Acts<'_>, Dual)) {
         let (theta, rate, t_s) = (&motion.theta_rad, &motion.rate, motion.t_s);
         match self.place {
-            LawPlace::Hinge => each(&Acts::Hinge, self.at(&[theta[0], rate[0], t_s])),
+            LawPlace::Hinge => each(&Acts::Hinge, self.at_hinge(motion, rate[0], motion.hinge.sign())),
             LawPlace::Joint => (1..chain.count()).for_each(|i| {
                 each(&Acts::Joint(i), self.at(&[theta[i] - theta[i - 1], rate[i] - rate[i - 1], t_s]));
             }),
@@ -107,6 +130,11 @@ impl Effect for Formula {
                 }),
             }
         });
+    }
+
+    fn friction_n_m(&self, motion: &Motion) -> Option<f64> {
+        let of_sign = |sign: f64| self.at_hinge(motion, 0.0, sign).value;
+        self.is_dry.then(|| 0.5 * (of_sign(-1.0) - of_sign(1.0)))
     }
 
     fn sideways_m_s2(&self, motion: &Motion) -> f64 {

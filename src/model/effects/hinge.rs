@@ -34,6 +34,10 @@ impl Law for Coulomb {
     }
 
     fn add_partials(&self, _: &Chain, _: &Motion, _: f64, _: &mut Partials) {}
+
+    fn friction_n_m(&self, tau: f64) -> Option<f64> {
+        Some(tau)
+    }
 }
 
 /// `hinge_stiffness`: Q₁ = −k θ₁, energy ½ k θ₁².

@@ -41,6 +41,11 @@ pub trait Effect: std::fmt::Debug + Send + Sync {
     /// Adds ∂Q/∂coefficient.
     fn add_sensitivity(&self, _parameter: Parameter, _chain: &Chain, _motion: &Motion, _q: &mut [f64]) {}
 
+    /// What the hinge's dry friction can hold (N·m), where it is such a law.
+    fn friction_n_m(&self, _motion: &Motion) -> Option<f64> {
+        None
+    }
+
     /// The sideways acceleration that all masses feel from it (m/s²), on which the derivatives with masses and lengths depend.
     fn sideways_m_s2(&self, _motion: &Motion) -> f64 {
         0.0
@@ -85,6 +90,11 @@ pub trait Law: std::fmt::Debug + Send + Sync {
     fn energy_j(&self, _chain: &Chain, _motion: &Motion, _coefficient: f64) -> f64 {
         0.0
     }
+
+    /// What the hinge's dry friction can hold (N·m), where it is such a law.
+    fn friction_n_m(&self, _coefficient: f64) -> Option<f64> {
+        None
+    }
 }
 
 /// A [`Law`] with its coefficient.
@@ -123,6 +133,10 @@ impl<L: Law> Effect for Proportional<L> {
 
     fn energy_j(&self, chain: &Chain, motion: &Motion) -> f64 {
         self.law.energy_j(chain, motion, self.coefficient)
+    }
+
+    fn friction_n_m(&self, _: &Motion) -> Option<f64> {
+        self.law.friction_n_m(self.coefficient)
     }
 }
 

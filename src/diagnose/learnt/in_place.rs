@@ -1,0 +1,52 @@
+//! Terms in the place of one name: those that exert nearly its torque along the motion of the fit begin where that fit stands, whatever is linear of them.
+
+use rayon::prelude::*;
+
+use super::super::context::FitContext;
+use super::super::effect::Effect;
+use super::super::grammar::{Form, Term};
+use super::super::refit::Refit;
+use super::along::{Along, cosine};
+use super::fitted::with_laws;
+use super::sought::{Candidate, started};
+
+/// Of each name of a fit the terms that go best with its torque, each form once with the start that leaves least, and with the amplitude a of the least squares
+///
+/// ```text
+/// a = Q·T / T·T      Q: torques of the name's law, T: of a unit of the term, along the motion
+/// ```
+///
+/// A form without further coefficients that exerts the name's torque is the name; one with them may do so at one end of its range.
+pub fn in_place_of_names(context: &FitContext<'_>, best: &Refit<'_>, every_start: &[Term]) -> Option<Vec<Candidate>> {
+    let law = &context.settings.law;
+    let along = Along::of(context, best, &[], std::iter::empty())?;
+    let units: Vec<_> = every_start.iter().map(|term| along.of_term(&started(term, 1.0, 0))).collect::<Option<_>>()?;
+    let in_place = |name: &Effect| {
+        let own = along.of_effect(*name) * best.value(name.parameters()[0]).unwrap_or(0.0);
+        let goes: Vec<f64> = units.iter().map(|unit| cosine(&own.as_view(), &unit.as_view()).abs()).collect();
+        let may_differ = |k: usize| goes[k] < law.the_same || every_start[k].law.parameters.len() > 1;
+        let mut near: Vec<usize> = (0..units.len()).filter(|k| goes[*k] > law.the_same_law && may_differ(*k)).collect();
+        near.sort_by(|a, b| goes[*b].total_cmp(&goes[*a]));
+        let mut forms: Vec<Form> = Vec::new();
+        for form in near.iter().map(|k| every_start[*k].form()) {
+            if !forms.contains(&form) {
+                forms.push(form);
+            }
+        }
+        let hypothesis = best.hypothesis.without(*name);
+        let of_form = |(rank, form): (usize, &Form)| {
+            let of_start = |k: &usize| {
+                let terms = vec![started(&every_start[*k], own.dot(&units[*k]) / units[*k].norm_squared(), 0)];
+                (with_laws(context, &terms).cost_at(&hypothesis, best, &[]), terms)
+            };
+            let starts = near.iter().filter(|k| every_start[**k].form() == *form).map(of_start);
+            let (_, terms) = starts.min_by(|a, b| a.0.total_cmp(&b.0))?;
+            let (hypothesis, step) = (hypothesis.clone(), vec![0.0; best.x.len()]);
+            Some(Candidate { hypothesis, terms, step, gain: best.chi2, rank })
+        };
+        forms.truncate(law.in_place);
+        forms.par_iter().with_max_len(1).enumerate().filter_map(of_form).collect::<Vec<_>>()
+    };
+    let proportional = best.hypothesis.effects.iter().filter(|name| name.parameters()[0].is_proportional());
+    Some(proportional.flat_map(in_place).collect())
+}
