@@ -463,7 +463,7 @@ impl Default for LawSettings {
             paired: 12,
             most: 16,
             begun: 0.6,
-            in_place: 4,
+            in_place: 2,
             asked: 1000.0,
             along: 400.0,
             active: 0.1,

@@ -51,11 +51,12 @@ pub fn descriptions<'a>(
     let linearised = best.linearised()?;
     let each = (context.work.done() - before).max(1) as f64;
     let (promising, terms, every_start) = candidates(best, &linearised, &context.settings.law)?;
-    let in_place = in_place_of_names(context, best, &every_start)?;
-    let candidates: Vec<Candidate> = in_place.iter().cloned().chain(promising).collect();
+    let mut candidates: Vec<Candidate> =
+        promising.into_iter().chain(in_place_of_names(context, best, &every_start)?).collect();
+    candidates.sort_by_key(|candidate| candidate.rank);
     let prior = Prior::of(context, best, effects, &terms)?;
-    let along = |base: &Refit<'a>| along_the_recording(context, base, (effects, &terms), &in_place);
-    let with_laws = fitted(context, posterior, (candidates, each), along);
+    let with_laws =
+        fitted(context, posterior, (candidates, each), |base| along_the_recording(context, base, effects, &terms));
     // what the table has been fitted with is a description, too
     let possible = posterior.candidates.iter().filter(|candidate| candidate.ln_posterior.is_finite());
     let of_table = possible.map(|candidate| (Vec::new(), candidate.fit.clone()));

@@ -11,7 +11,6 @@ use super::super::refit::Refit;
 use super::super::stretches::{Asked, terms_asked_for};
 use super::sought::{Candidate, started};
 use crate::experiment::{Coefficient, Law};
-use crate::model::Parameter;
 
 /// A scale that many times the one from which it began has run away.
 const AWAY: f64 = 100.0;
@@ -84,28 +83,22 @@ fn begun_fit<'a>(
     begun.into_iter().chain(along).min_by(|a, b| a.chi2.total_cmp(&b.chi2))
 }
 
-/// Terms, and names beside them, that short stretches ask for, and the foremost in the place of each name, fitted along the recorded motion: where the names of the
-/// table lead nowhere, no motion of theirs shows what is missing.
+/// Terms, and names beside them, that short stretches ask for, fitted along the recorded motion: where the names of the table lead nowhere, no motion of theirs shows
+/// what is missing.
 pub fn along_the_recording<'a>(
     context: &FitContext<'a>,
     base: &Refit<'a>,
-    (effects, terms): (&[Effect], &[Term]),
-    in_place: &[Candidate],
+    effects: &[Effect],
+    terms: &[Term],
 ) -> Vec<Begun<'a>> {
-    let of_stretches = |(Asked { hypothesis, start }, of_terms): (Asked, Vec<(usize, f64)>)| {
+    let asked = terms_asked_for(context, base, effects, terms, context.settings.search.asked);
+    let fitted = |(asked, of_terms): (Asked, Vec<(usize, f64)>)| {
         let own = of_terms.into_iter().enumerate();
-        (hypothesis, own.map(|(place, (k, amplitude))| started(&terms[k], amplitude, place)).collect(), start)
-    };
-    let of_stretches =
-        terms_asked_for(context, base, effects, terms, context.settings.search.asked).into_iter().map(of_stretches);
-    let foremost = in_place.iter().filter(|candidate| candidate.rank == 0);
-    let of_names = foremost.map(|candidate| (candidate.hypothesis.clone(), candidate.terms.clone(), Vec::new()));
-    let fitted = |(hypothesis, terms, start): (Hypothesis, Vec<Term>, Vec<(Parameter, f64)>)| {
-        let fit = with_laws(context, &terms).refit_along_recording(&hypothesis, base, &start)?;
+        let terms: Vec<Term> = own.map(|(place, (k, amplitude))| started(&terms[k], amplitude, place)).collect();
+        let fit = with_laws(context, &terms).refit_along_recording(&asked.hypothesis, base, &asked.start)?;
         Some((terms, fit))
     };
-    let all: Vec<_> = of_names.chain(of_stretches).collect();
-    all.into_par_iter().with_max_len(1).filter_map(fitted).collect()
+    asked.into_par_iter().with_max_len(1).filter_map(fitted).collect()
 }
 
 /// What was begun, without what has no hope: the best term and the best pair beside each set of names, then the rest, the better ones first.

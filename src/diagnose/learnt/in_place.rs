@@ -16,7 +16,8 @@ use super::sought::{Candidate, started};
 /// a = Q·T / T·T      Q: torques of the name's law, T: of a unit of the term, along the motion
 /// ```
 ///
-/// A form without further coefficients that exerts the name's torque is the name; one with them may do so at one end of its range.
+/// A form without further coefficients that exerts the name's torque is the name; one with them may do so at one end of its range. One that drifts is told only by its
+/// promise: in a single release every loss fades with the swing. As many that promise more begin before them.
 pub fn in_place_of_names(context: &FitContext<'_>, best: &Refit<'_>, every_start: &[Term]) -> Option<Vec<Candidate>> {
     let law = &context.settings.law;
     let along = Along::of(context, best, &[], std::iter::empty())?;
@@ -24,7 +25,8 @@ pub fn in_place_of_names(context: &FitContext<'_>, best: &Refit<'_>, every_start
     let in_place = |name: &Effect| {
         let own = along.of_effect(*name) * best.value(name.parameters()[0]).unwrap_or(0.0);
         let goes: Vec<f64> = units.iter().map(|unit| cosine(&own.as_view(), &unit.as_view()).abs()).collect();
-        let may_differ = |k: usize| goes[k] < law.the_same || every_start[k].law.parameters.len() > 1;
+        let may_differ =
+            |k: usize| !every_start[k].drifts && (goes[k] < law.the_same || every_start[k].law.parameters.len() > 1);
         let mut near: Vec<usize> = (0..units.len()).filter(|k| goes[*k] > law.the_same_law && may_differ(*k)).collect();
         near.sort_by(|a, b| goes[*b].total_cmp(&goes[*a]));
         let mut forms: Vec<Form> = Vec::new();
@@ -42,7 +44,7 @@ pub fn in_place_of_names(context: &FitContext<'_>, best: &Refit<'_>, every_start
             let starts = near.iter().filter(|k| every_start[**k].form() == *form).map(of_start);
             let (_, terms) = starts.min_by(|a, b| a.0.total_cmp(&b.0))?;
             let (hypothesis, step) = (hypothesis.clone(), vec![0.0; best.x.len()]);
-            Some(Candidate { hypothesis, terms, step, gain: best.chi2, rank })
+            Some(Candidate { hypothesis, terms, step, gain: best.chi2, rank: rank + law.in_place })
         };
         forms.truncate(law.in_place);
         forms.par_iter().with_max_len(1).enumerate().filter_map(of_form).collect::<Vec<_>>()
