@@ -296,6 +296,8 @@ pub struct LawSettings {
     pub begun: f64,
     /// Terms begun in the place of a name whose torque they nearly exert (cost).
     pub in_place: usize,
+    /// After so many that promise more beside each set of names (cost).
+    pub in_place_after: usize,
     /// Short stretches of the recordings are asked, too, where the budget allows so many motions with derivatives (cost).
     pub asked: f64,
     /// The foremost fits are begun along the motion that names follow, too, where it allows so many (cost).
@@ -464,6 +466,7 @@ impl Default for LawSettings {
             most: 16,
             begun: 0.6,
             in_place: 2,
+            in_place_after: 2,
             asked: 1000.0,
             along: 400.0,
             active: 0.1,

@@ -302,15 +302,14 @@ impl<'a> Run<'a> {
     /// Where in the step the hinge first reverses or is let go, or a law comes to a corner.
     fn turn_in(&mut self, step: &Step) -> Option<(f64, Turn)> {
         let turn = if self.hinge == Hinge::Sticks { Turn::Lets } else { Turn::Reverses };
-        let is_dry = self.is_dry;
-        if !is_dry && self.sides.is_empty() {
+        if !self.is_dry && self.sides.is_empty() {
             return None;
         }
         let mut inside = 0.0;
         for look in 1..=LOOKS {
             let tau = look as f64 / LOOKS as f64;
             let mut first: Option<(f64, Turn)> = None;
-            if is_dry && self.hinge_goes_on(step, tau, turn) < 0.0 {
+            if self.is_dry && self.hinge_goes_on(step, tau, turn) < 0.0 {
                 first = Some((root(inside, tau, |tau| self.hinge_goes_on(step, tau, turn)), turn));
             }
             let corners = self.before_corners(step, tau);

@@ -22,8 +22,8 @@ impl ForwardModel {
         Self::of(&still)
     }
 
-    /// Angles θ₀ of a stable rest where dry friction bears nothing, Q(θ₀) = 0, by Newton's method from an angle near by. `further` adds torques that are not the chain's own to Q(θ), and
-    /// takes their derivatives from −∂Q/∂θ.
+    /// Angles θ₀ of a stable rest where dry friction bears nothing, Q(θ₀) = 0, by Newton's method from an angle near by. `further` adds torques that are not the
+    /// chain's own to Q(θ), and takes their derivatives from −∂Q/∂θ.
     ///
     /// # Errors
     /// [`Error::Simulation`] where there is none.

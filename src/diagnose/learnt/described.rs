@@ -13,9 +13,9 @@ use super::super::refit::Refit;
 use super::super::settings::LawSettings;
 use super::Needed;
 use super::along::Along;
-use super::fitted::{Begun, along_the_recording, fitted, gone_on, with_laws};
+use super::fitted::{Begun, Budget, along_the_recording, fitted, gone_on, with_laws};
 use super::in_place::in_place_of_names;
-use super::sought::{Candidate, candidates};
+use super::sought::candidates;
 use crate::model::Parameter;
 
 /// Scales of a term's state to begin with, over those that it had beside a name.
@@ -49,14 +49,13 @@ pub fn descriptions<'a>(
     let best = posterior.best();
     let before = context.work.done();
     let linearised = best.linearised()?;
-    let each = (context.work.done() - before).max(1) as f64;
-    let (promising, terms, every_start) = candidates(best, &linearised, &context.settings.law)?;
-    let mut candidates: Vec<Candidate> =
-        promising.into_iter().chain(in_place_of_names(context, best, &every_start)?).collect();
-    candidates.sort_by_key(|candidate| candidate.rank);
+    let budget = Budget::of(context, before);
+    let (mut candidates, terms, every_start) = candidates(best, &linearised, &context.settings.law)?;
     let prior = Prior::of(context, best, effects, &terms)?;
+    candidates.extend(in_place_of_names(context, best, &prior.along, &every_start));
+    candidates.sort_by_key(|candidate| candidate.rank);
     let with_laws =
-        fitted(context, posterior, (candidates, each), |base| along_the_recording(context, base, effects, &terms));
+        fitted(context, posterior, (candidates, &budget), |base| along_the_recording(context, base, effects, &terms));
     // what the table has been fitted with is a description, too
     let possible = posterior.candidates.iter().filter(|candidate| candidate.ln_posterior.is_finite());
     let of_table = possible.map(|candidate| (Vec::new(), candidate.fit.clone()));

@@ -22,26 +22,41 @@ const GONE_ON_AT_ONCE: usize = 2;
 /// Terms, and a fit with them, wherever it has come to.
 pub type Begun<'a> = (Vec<Term>, Refit<'a>);
 
-/// The candidates that came to an end, and those that short stretches ask for, of the base model's fit; `each` motion with its
-/// derivatives costs so much.
+/// The work that laws may take.
+pub struct Budget {
+    /// What will have been done when it is spent.
+    until: u64,
+    /// It in motions with their derivatives.
+    motions: f64,
+}
+
+impl Budget {
+    /// After one motion with its derivatives, before which so much had been done.
+    pub fn of(context: &FitContext<'_>, before: u64) -> Self {
+        let allowed = context.settings.search.shares.law * context.settings.search.budget as f64;
+        let each = (context.work.done() - before).max(1) as f64;
+        Self { until: before + allowed as u64, motions: allowed / each }
+    }
+}
+
+/// The candidates that came to an end, and those that short stretches ask for, of the base model's fit.
 pub fn fitted<'a>(
     context: &FitContext<'a>,
     posterior: &Posterior<'a>,
-    (candidates, each): (Vec<Candidate>, f64),
+    (candidates, budget): (Vec<Candidate>, &Budget),
     asked_for: impl FnOnce(&Refit<'a>) -> Vec<Begun<'a>>,
 ) -> Vec<Begun<'a>> {
     let (best, law) = (posterior.best(), &context.settings.law);
-    let allowed = context.settings.search.shares.law * context.settings.search.budget as f64;
-    let until = context.work.done() + allowed as u64;
+    let until = budget.until;
     // what leaves more than the base model leads nowhere
     let base = context.judged_by(&best.problem.noise, posterior.base(), 0);
     let bound = base.map_or(f64::INFINITY, |base| base.chi2);
     let along_best = |candidate: Candidate| {
-        let fit = begun_fit(context, best, &candidate, (bound, allowed > law.along * each))?;
+        let fit = begun_fit(context, best, &candidate, (bound, budget.motions > law.along))?;
         Some((candidate.terms, fit))
     };
     // their fits begin far away, and cost as much as all others
-    let mut begun = if allowed > law.asked * each { asked_for(posterior.base()) } else { Vec::new() };
+    let mut begun = if budget.motions > law.asked { asked_for(posterior.base()) } else { Vec::new() };
     let mut candidates = candidates.into_iter().peekable();
     let mut made = Vec::new();
     loop {

@@ -4,11 +4,11 @@ use rayon::prelude::*;
 
 use super::super::context::FitContext;
 use super::super::effect::Effect;
-use super::super::grammar::{Form, Term};
+use super::super::grammar::Term;
 use super::super::refit::Refit;
 use super::along::{Along, cosine};
 use super::fitted::with_laws;
-use super::sought::{Candidate, started};
+use super::sought::{Candidate, each_form_once, started};
 
 /// Of each name of a fit the terms that go best with its torque, each form once with the start that leaves least, and with the amplitude a of the least squares
 ///
@@ -18,10 +18,15 @@ use super::sought::{Candidate, started};
 ///
 /// A form without further coefficients that exerts the name's torque is the name; one with them may do so at one end of its range. One that drifts is told only by its
 /// promise: in a single release every loss fades with the swing. As many that promise more begin before them.
-pub fn in_place_of_names(context: &FitContext<'_>, best: &Refit<'_>, every_start: &[Term]) -> Option<Vec<Candidate>> {
+pub fn in_place_of_names(
+    context: &FitContext<'_>,
+    best: &Refit<'_>,
+    along: &Along,
+    every_start: &[Term],
+) -> Vec<Candidate> {
     let law = &context.settings.law;
-    let along = Along::of(context, best, &[], std::iter::empty())?;
-    let units: Vec<_> = every_start.iter().map(|term| along.of_term(&started(term, 1.0, 0))).collect::<Option<_>>()?;
+    let of_unit = |term: &Term| along.of_term(&started(term, 1.0, 0));
+    let Some(units) = every_start.iter().map(of_unit).collect::<Option<Vec<_>>>() else { return Vec::new() };
     let in_place = |name: &Effect| {
         let own = along.of_effect(*name) * best.value(name.parameters()[0]).unwrap_or(0.0);
         let goes: Vec<f64> = units.iter().map(|unit| cosine(&own.as_view(), &unit.as_view()).abs()).collect();
@@ -29,26 +34,22 @@ pub fn in_place_of_names(context: &FitContext<'_>, best: &Refit<'_>, every_start
             |k: usize| !every_start[k].drifts && (goes[k] < law.the_same || every_start[k].law.parameters.len() > 1);
         let mut near: Vec<usize> = (0..units.len()).filter(|k| goes[*k] > law.the_same_law && may_differ(*k)).collect();
         near.sort_by(|a, b| goes[*b].total_cmp(&goes[*a]));
-        let mut forms: Vec<Form> = Vec::new();
-        for form in near.iter().map(|k| every_start[*k].form()) {
-            if !forms.contains(&form) {
-                forms.push(form);
-            }
-        }
+        let mut forms = each_form_once(near.iter().copied(), every_start);
+        forms.truncate(law.in_place);
         let hypothesis = best.hypothesis.without(*name);
-        let of_form = |(rank, form): (usize, &Form)| {
+        let of_form = |(rank, first): (usize, &usize)| {
+            let form = every_start[*first].form();
             let of_start = |k: &usize| {
                 let terms = vec![started(&every_start[*k], own.dot(&units[*k]) / units[*k].norm_squared(), 0)];
                 (with_laws(context, &terms).cost_at(&hypothesis, best, &[]), terms)
             };
-            let starts = near.iter().filter(|k| every_start[**k].form() == *form).map(of_start);
+            let starts = near.iter().filter(|k| every_start[**k].form() == form).map(of_start);
             let (_, terms) = starts.min_by(|a, b| a.0.total_cmp(&b.0))?;
             let (hypothesis, step) = (hypothesis.clone(), vec![0.0; best.x.len()]);
-            Some(Candidate { hypothesis, terms, step, gain: best.chi2, rank: rank + law.in_place })
+            Some(Candidate { hypothesis, terms, step, gain: best.chi2, rank: rank + law.in_place_after })
         };
-        forms.truncate(law.in_place);
         forms.par_iter().with_max_len(1).enumerate().filter_map(of_form).collect::<Vec<_>>()
     };
     let proportional = best.hypothesis.effects.iter().filter(|name| name.parameters()[0].is_proportional());
-    Some(proportional.flat_map(in_place).collect())
+    proportional.flat_map(in_place).collect()
 }

@@ -177,15 +177,21 @@ fn ranked(mut all: Vec<Promising>) -> Vec<Promising> {
 
 /// Of single terms each form once, with the other coefficients at which it promises most; the foremost first.
 fn foremost_of_forms(alone: Vec<Promising>, all: &[Term]) -> Vec<Promising> {
-    let mut forms = Vec::new();
     let mut foremost = ranked(alone);
-    foremost.retain(|own| {
-        let form = all[own.terms[0].0].form();
-        let is_first = !forms.contains(&form);
-        forms.push(form);
-        is_first
-    });
+    let first = each_form_once(foremost.iter().map(|own| own.terms[0].0), all);
+    foremost.retain(|own| first.contains(&own.terms[0].0));
     ranked(foremost)
+}
+
+/// Of the places of some terms the first of each form.
+pub(super) fn each_form_once(places: impl Iterator<Item = usize>, all: &[Term]) -> Vec<usize> {
+    let mut first: Vec<usize> = Vec::new();
+    for k in places {
+        if !first.iter().any(|own| all[*own].form() == all[k].form()) {
+            first.push(k);
+        }
+    }
+    first
 }
 
 /// The foremost of single terms, and of pairs of them: so many of each; paired are so many.

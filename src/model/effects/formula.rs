@@ -49,16 +49,10 @@ impl Formula {
         })
     }
 
-    fn at(&self, state: &[f64]) -> Dual {
+    /// In a state; the hinge moves at a rate with this sign.
+    fn at(&self, state: &[f64], sign: f64) -> Dual {
         let mut values = self.values.clone();
         values[..state.len()].copy_from_slice(state);
-        self.expression.at(&values)
-    }
-
-    /// At the hinge, which moves at a rate with this sign.
-    fn at_hinge(&self, motion: &Motion, rate: f64, sign: f64) -> Dual {
-        let mut values = self.values.clone();
-        values[..RATE + 2].copy_from_slice(&[motion.theta_rad[0], rate, motion.t_s]);
         if let Some(of_rate) = values.last_mut().filter(|_| self.is_dry) {
             *of_rate = sign;
         }
@@ -74,16 +68,17 @@ impl Formula {
     /// The formula at every place of the chain where it acts.
     fn visit(&self, chain: &Chain, motion: &Motion, mut each: impl FnMut(&Acts<'_>, Dual)) {
         let (theta, rate, t_s) = (&motion.theta_rad, &motion.rate, motion.t_s);
+        let at = |state: &[f64]| self.at(state, motion.hinge.sign());
         match self.place {
-            LawPlace::Hinge => each(&Acts::Hinge, self.at_hinge(motion, rate[0], motion.hinge.sign())),
+            LawPlace::Hinge => each(&Acts::Hinge, at(&[theta[0], rate[0], t_s])),
             LawPlace::Joint => (1..chain.count()).for_each(|i| {
-                each(&Acts::Joint(i), self.at(&[theta[i] - theta[i - 1], rate[i] - rate[i - 1], t_s]));
+                each(&Acts::Joint(i), at(&[theta[i] - theta[i - 1], rate[i] - rate[i - 1], t_s]));
             }),
             LawPlace::Strip => {
-                air::fine_stations(chain, motion, |at| each(&Acts::Across(at), self.at(&[at.speed_m_s, t_s])))
+                air::fine_stations(chain, motion, |own| each(&Acts::Across(own), at(&[own.speed_m_s, t_s])));
             }
-            LawPlace::Tip => air::tip(chain, motion, |at| each(&Acts::Across(at), self.at(&[at.speed_m_s, t_s]))),
-            LawPlace::Support => each(&Acts::Support, self.at(&[t_s])),
+            LawPlace::Tip => air::tip(chain, motion, |own| each(&Acts::Across(own), at(&[own.speed_m_s, t_s]))),
+            LawPlace::Support => each(&Acts::Support, at(&[t_s])),
         }
     }
 
@@ -133,12 +128,12 @@ impl Effect for Formula {
     }
 
     fn friction_n_m(&self, motion: &Motion) -> Option<f64> {
-        let of_sign = |sign: f64| self.at_hinge(motion, 0.0, sign).value;
+        let of_sign = |sign: f64| self.at(&[motion.theta_rad[0], 0.0, motion.t_s], sign).value;
         self.is_dry.then(|| 0.5 * (of_sign(-1.0) - of_sign(1.0)))
     }
 
     fn sideways_m_s2(&self, motion: &Motion) -> f64 {
-        if self.place == LawPlace::Support { -self.at(&[motion.t_s]).value } else { 0.0 }
+        if self.place == LawPlace::Support { -self.at(&[motion.t_s], 0.0).value } else { 0.0 }
     }
 
     fn parameters(&self) -> Vec<(Parameter, f64)> {
