@@ -5,12 +5,13 @@ use nalgebra::{DVector, DVectorView};
 use super::super::context::FitContext;
 use super::super::effect::{Effect, Phase, Place};
 use super::super::grammar::Term;
+use super::super::linearisation::motion_at;
 use super::super::refit::Refit;
 use super::super::settings::LawSettings;
 use crate::experiment::LawPlace;
 use crate::model::effects::Effect as _;
 use crate::model::effects::formula::Formula;
-use crate::model::{ForwardModel, Motion, Parameter, Partials};
+use crate::model::{ForwardModel, Hinge, Motion, Parameter, Partials};
 
 /// Whether a term has the state and the shape of an effect's law.
 pub fn is_of_kind(term: &Term, effect: Effect) -> bool {
@@ -52,11 +53,7 @@ impl Along {
         let fit = Refit { hypothesis, problem, x, ..fit.clone() };
         let of_record = |record: usize| {
             let (model, swing, true_s) = fit.motion(record)?;
-            let at = |t_s: &f64| {
-                let state = swing.at(*t_s);
-                model.motion(*t_s, &state.theta_rad, &[state.omega_rad_s, state.hidden].concat())
-            };
-            let motions = true_s.iter().map(at).collect();
+            let motions = true_s.iter().map(|t_s| motion_at(&model, &swing, *t_s)).collect::<Option<_>>()?;
             Some((model, motions))
         };
         let motions = (0..fit.problem.records.len()).map(of_record).collect::<Option<_>>()?;
@@ -65,13 +62,16 @@ impl Along {
         Some(along)
     }
 
-    /// Torques on the links, one instant after another.
+    /// Torques on the links, one instant after another; on a link that friction holds none does anything.
     fn torques(&self, torque: impl Fn(&ForwardModel, &Motion, &mut [f64])) -> DVector<f64> {
         let mut all = Vec::new();
         for (model, motion) in self.motions.iter().flat_map(|(model, motions)| motions.iter().map(move |m| (model, m)))
         {
             let mut q = vec![0.0; model.rates()];
             torque(model, motion, &mut q);
+            if motion.hinge == Hinge::Sticks {
+                q[0] = 0.0;
+            }
             all.extend_from_slice(&q[..model.chain().count()]);
         }
         DVector::from_vec(all)
