@@ -144,8 +144,8 @@ mod tests {
 
     /// Along the swing of one link that dry friction brings to rest, for 40 s.
     fn along_a_swing_to_rest() -> Along {
-        let rig = "[[specimen.links]]\nlength_m = 0.37\nmass_kg = 0.23\ncom_m = 0.27\ninertia_kg_m2 = 1.5e-3\n[model]\nrelease_rad = [0.5]\n\
-                   [model.effects]\nhinge_coulomb = 6e-3";
+        let rig = "[[specimen.links]]\nlength_m = 0.37\nmass_kg = 0.23\ncom_m = 0.27\ninertia_kg_m2 = 1.5e-3\n\
+                   [model]\nrelease_rad = [0.5]\n[model.effects]\nhinge_coulomb = 6e-3";
         let experiment = Experiment::parse_with_specimen(rig, Path::new("rig.toml")).unwrap();
         let model = ForwardModel::of(&experiment).unwrap();
         let start = State::released(&model, &[0.5]).unwrap();
@@ -157,8 +157,7 @@ mod tests {
             "it does not come to rest"
         );
         let mut along = Along { motions: vec![(model, motions)], effects: Vec::new() };
-        let effects = [Effect::HingeCoulomb];
-        along.effects = effects.into_iter().map(|effect| (effect, along.of_effect(effect))).collect();
+        along.effects.push((Effect::HingeCoulomb, along.of_effect(Effect::HingeCoulomb)));
         along
     }
 
@@ -166,11 +165,8 @@ mod tests {
     fn a_swing_that_ends_at_rest_tells_friction_by_what_it_does_while_the_link_moves() {
         let along = along_a_swing_to_rest();
         let largest = Largest { angle: 0.5, rate: 3.0, time_s: 40.0 };
-        let of_shape = |shape: &str| {
-            let mut term = terms(LawPlace::Strip, largest).into_iter().find(|term| term.shape == shape).unwrap();
-            term.law.parameters.get_mut("a").unwrap().start = 0.03;
-            along.stands_for((&term, false), &LawSettings::default())
-        };
-        assert_eq!(of_shape("sign"), [(Effect::HingeCoulomb, 1.0)]);
+        let mut term = terms(LawPlace::Strip, largest).into_iter().find(|term| term.shape == "sign").unwrap();
+        term.law.parameters.get_mut("a").unwrap().start = 0.03;
+        assert_eq!(along.stands_for((&term, false), &LawSettings::default()), [(Effect::HingeCoulomb, 1.0)]);
     }
 }

@@ -17,7 +17,7 @@ use super::sought::{Candidate, each_form_once, started};
 /// ```
 ///
 /// A form without further coefficients that exerts the name's torque is the name; one with them may do so at one end of its range. One that drifts is told only by its
-/// promise: in a single release every loss fades with the swing. As many that promise more begin before them.
+/// promise: in a single release every loss fades with the swing. `LawSettings::in_place_after` that promise more begin before them.
 pub fn in_place_of_names(
     context: &FitContext<'_>,
     best: &Refit<'_>,
