@@ -81,7 +81,7 @@ pub fn borne_out<'a>(
     let best = posterior.best();
     let fewer = (best.hypothesis.effects.len() > most && is_beyond_noise(best, &settings.noise)).then(|| {
         let few = fits.into_iter().filter(|fit| fit.hypothesis.effects.len() <= most);
-        weigh(few.collect(), effects, posterior.compared, settings)
+        weigh(few.collect(), effects, &posterior.compared, settings)
     });
     let named: Vec<&Refit<'a>> = std::iter::once(&posterior).chain(&fewer).map(Posterior::best).collect();
     let mut proofs = held_out(context, posterior.base(), &named, from_s).into_iter();

@@ -55,9 +55,34 @@ impl Hypothesis {
     }
 }
 
+/// How many effects of a hypothesis have been held against every other effect.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Compared {
+    /// Of any hypothesis, those that explain most.
+    pub of_any: usize,
+    /// Hypotheses of which every effect has been.
+    pub whole: Vec<Vec<Effect>>,
+}
+
+impl Compared {
+    /// Of some effects, those that explain most.
+    pub fn of(&self, effects: &[Effect]) -> usize {
+        if self.whole.iter().any(|whole| whole == effects) { effects.len() } else { self.of_any }
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn names_beyond_two_are_compared_where_each_was_exchanged() {
+        let three = [Effect::HingeCoulomb, Effect::AirQuadratic, Effect::CameraTilt];
+        let compared = Compared { of_any: 2, whole: vec![three.to_vec()] };
+        assert_eq!([compared.of(&three), compared.of(&three[..2])], [3, 2]);
+        let other = [Effect::HingeCoulomb, Effect::AirQuadratic, Effect::CameraOblique];
+        assert_eq!(compared.of(&other), 2);
+    }
 
     #[test]
     fn a_hypothesis_nests_in_a_richer_one_about_the_same_chain_only() {

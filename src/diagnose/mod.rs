@@ -150,7 +150,7 @@ fn weighed<'a, 'p>(
 ) -> (Search<'a, 'p>, Posterior<'a>) {
     let weigh = |search: &Search<'a, 'p>| {
         progress.begin("weighing", None);
-        posterior::weigh(search.fits.clone(), search.effects.len(), search.compared(), settings)
+        posterior::weigh(search.fits.clone(), search.effects.len(), &search.compared(), settings)
     };
     let at_once = (!search.leaves_more_than_noise()).then(|| weigh(&search));
     match at_once {

@@ -4,6 +4,7 @@ use super::bag;
 use super::effect::{Effect, Place};
 use super::energy::added_torque_n_m;
 use super::evidence::{self, Scatter, normalised};
+use super::hypothesis::Compared;
 use super::latent::{Assumed, Latent};
 use super::laws::law_of;
 use super::misfit::{leaves_more_than_noise, most_of_noise, needs};
@@ -46,14 +47,14 @@ pub struct Posterior<'a> {
     /// That something around the likeliest fit, at each place.
     pub unknowns: Vec<Latent>,
     /// How many effects of a hypothesis have been held against every other.
-    pub compared: usize,
+    pub compared: Compared,
     /// How probable each name of the likeliest fit is where any law may stand in its place, as far as that was asked.
     pub needed: Vec<(Effect, f64)>,
 }
 
 /// Weighs the hypotheses of some fits, out of so many candidate effects, beside the unknown around the likeliest of them. So many effects of each have been held
 /// against every other.
-pub fn weigh<'a>(fits: Vec<Refit<'a>>, effects: usize, compared: usize, settings: &Settings) -> Posterior<'a> {
+pub fn weigh<'a>(fits: Vec<Refit<'a>>, effects: usize, compared: &Compared, settings: &Settings) -> Posterior<'a> {
     let values = fits.first().map_or(0, Refit::values);
     let least = refit::least(&fits);
     let scatter = least.map_or(Scatter::NOISE, |best| Scatter::of(best, values));
@@ -115,7 +116,16 @@ pub fn weigh<'a>(fits: Vec<Refit<'a>>, effects: usize, compared: usize, settings
     // where the unknown takes all, or next to all, their order among themselves still counts
     candidates
         .sort_by(|a, b| (b.probability.total_cmp(&a.probability)).then(b.ln_posterior.total_cmp(&a.ln_posterior)));
-    Posterior { candidates, unknown, remains, lowest, uncertified, unknowns: latents, compared, needed: Vec::new() }
+    Posterior {
+        candidates,
+        unknown,
+        remains,
+        lowest,
+        uncertified,
+        unknowns: latents,
+        compared: compared.clone(),
+        needed: Vec::new(),
+    }
 }
 
 /// The names in layers: P(S) = (1 − z) P(S | nothing remains) + z g P(S | something remains), z being the probability that something does, and g the odds
@@ -181,13 +191,13 @@ fn uncertified_within_reach(fits: &[Refit<'_>], best: usize, settings: &Settings
 }
 
 /// The odds that a fit's effects are what has been filmed, and stand for nothing else.
-fn genuine(fit: &Refit<'_>, others: &[&Refit<'_>], compared: usize, settings: &Settings) -> f64 {
+fn genuine(fit: &Refit<'_>, others: &[&Refit<'_>], compared: &Compared, settings: &Settings) -> f64 {
     let effects = &fit.hypothesis.effects;
     if effects.is_empty() {
         return 1.0;
     }
     let odds: f64 = effects.iter().map(|effect| law_of(*effect).odds(fit, others, settings)).product();
-    let further = effects.len().saturating_sub(compared) as i32;
+    let further = effects.len().saturating_sub(compared.of(effects)) as i32;
     odds * (1.0 - settings.prior.imitated) * settings.prior.not_compared.powi(further)
 }
 
@@ -261,7 +271,8 @@ impl<'a> Posterior<'a> {
         let others: Vec<&Refit<'_>> = self.candidates.iter().map(|c| &c.fit).collect();
         let genuine = |fit: &Refit<'_>| {
             let explaining = self.by_what_they_explain(fit);
-            let is_further = explaining.iter().skip(self.compared).any(|further| *further == effect);
+            let compared = self.compared.of(&fit.hypothesis.effects);
+            let is_further = explaining.iter().skip(compared).any(|further| *further == effect);
             genuine_alone(effect, is_further, fit, &others, settings)
         };
         let with = || self.candidates.iter().filter(|c| c.fit.hypothesis.has(effect));

@@ -184,23 +184,77 @@ fn described<'a>(fitted: Vec<Begun<'a>>, prior: &Prior) -> Option<Vec<Described<
     Some(order)
 }
 
-/// The probability of each effect among all descriptions: of those that name it, and of those with a term that does what it does along the motion of a fit.
-pub fn needed(context: &FitContext<'_>, order: &[Described<'_>], best: &Refit<'_>, effects: &[Effect]) -> Needed {
+/// Effects that do as well in the place of a name, as the table's fits say, with their odds over it.
+struct Twins(Vec<(Effect, Effect, f64)>);
+
+impl Twins {
+    /// Of the names of the likeliest fit.
+    fn of(posterior: &Posterior<'_>, effects: &[Effect]) -> Self {
+        let (likeliest, best) = (posterior.candidates[0].ln_posterior, &posterior.best().hypothesis);
+        let odds = |(name, twin): (Effect, Effect)| {
+            let exchanged = best.without(name).and(twin, best.dropped).effects;
+            let candidate = posterior.candidates.iter().find(|own| own.fit.hypothesis.effects == exchanged)?;
+            Some((name, twin, (candidate.ln_posterior - likeliest).exp()))
+        };
+        let others = || effects.iter().copied().filter(|effect| !best.has(*effect));
+        Self(best.effects.iter().flat_map(|name| others().map(move |twin| (*name, twin))).filter_map(odds).collect())
+    }
+
+    /// The part of a hypothesis that is an effect's: what tells a name of it from others tells them apart beside a law, too, and nothing else does.
+    fn share(&self, effect: Effect, hypothesis: &Hypothesis) -> f64 {
+        let of_name = |name: Effect| self.0.iter().filter(move |own| own.0 == name && !hypothesis.has(own.1));
+        let all = |name: Effect| 1.0 + of_name(name).map(|own| own.2).sum::<f64>();
+        if hypothesis.has(effect) {
+            return 1.0 / all(effect);
+        }
+        let names = hypothesis.effects.iter();
+        let of_twin =
+            |name: &Effect| of_name(*name).filter(|own| own.1 == effect).map(|own| own.2).sum::<f64>() / all(*name);
+        names.map(of_twin).fold(0.0, f64::max)
+    }
+}
+
+/// The probability of each effect among all descriptions: of those that name it, or one that it does as well as, and of those with a term that does what it does along
+/// the motion of a fit.
+pub fn needed(
+    context: &FitContext<'_>,
+    order: &[Described<'_>],
+    posterior: &Posterior<'_>,
+    effects: &[Effect],
+) -> Needed {
     let weights = normalised(&order.iter().map(|own| -own.length).collect::<Vec<f64>>());
-    let along = Along::of(context, best, effects, order.iter().flat_map(|own| &own.terms));
+    let along = Along::of(context, posterior.best(), effects, order.iter().flat_map(|own| &own.terms));
     let (law, misfit) = (&context.settings.law, &context.settings.misfit);
     let of_description = |own: &Described<'_>| -> Vec<(Effect, f64)> {
         let is_exact = own.fit.chi2 < most_of_noise(own.fit.values(), misfit);
         let Some(along) = along.as_ref() else { return Vec::new() };
         own.terms.iter().flat_map(|term| along.stands_for((term, is_exact), law)).collect()
     };
+    let twins = Twins::of(posterior, effects);
     let shares: Vec<Vec<(Effect, f64)>> = order.iter().map(of_description).collect();
     let of_effect = |effect: &Effect| {
         let share = |(own, shares): (&Described<'_>, &Vec<(Effect, f64)>)| {
             let of_terms = shares.iter().filter(|share| share.0 == *effect).map(|share| share.1).fold(0.0, f64::max);
-            if own.fit.hypothesis.has(*effect) { 1.0 } else { of_terms }
+            twins.share(*effect, &own.fit.hypothesis).max(of_terms)
         };
         (*effect, order.iter().zip(&shares).map(share).zip(&weights).map(|(share, weight)| share * weight).sum())
     };
     effects.iter().map(of_effect).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_name_shares_its_weight_with_what_does_as_well_in_its_place() {
+        let twins = Twins(vec![(Effect::CameraTilt, Effect::SideForce, 0.5)]);
+        let of = |effects: &[Effect]| Hypothesis { effects: effects.to_vec(), dropped: None };
+        let (tilted, both) = (of(&[Effect::CameraTilt]), of(&[Effect::CameraTilt, Effect::SideForce]));
+        assert!((twins.share(Effect::CameraTilt, &tilted) - 2.0 / 3.0).abs() < 1e-12);
+        assert!((twins.share(Effect::SideForce, &tilted) - 1.0 / 3.0).abs() < 1e-12);
+        // beside each other none stands in the other's place
+        assert_eq!([Effect::CameraTilt, Effect::SideForce].map(|own| twins.share(own, &both)), [1.0, 1.0]);
+        assert_eq!(twins.share(Effect::HingeCoulomb, &tilted), 0.0);
+    }
 }

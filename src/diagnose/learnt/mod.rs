@@ -63,12 +63,11 @@ pub fn beside<'a>(
     let is_worth = posterior.remains > context.settings.verdict.even && !context.is_strip();
     let order = if is_worth { descriptions(context, posterior, effects) } else { None };
     let Some(order) = order else { return (Needed::new(), None) };
-    let best = posterior.best();
-    let Some(proof) = proof else { return (needed(context, &order, best, effects), None) };
+    let Some(proof) = proof else { return (needed(context, &order, posterior, effects), None) };
     let foretold = foretold(context, order, from_s);
     let learnt = proven(context, &foretold, proof);
     let order: Vec<Described<'a>> = foretold.into_iter().map(|own| own.0).collect();
     // where no motion could be integrated, that says nothing of any effect
-    let needed = if order.is_empty() { Needed::new() } else { needed(context, &order, best, effects) };
+    let needed = if order.is_empty() { Needed::new() } else { needed(context, &order, posterior, effects) };
     (needed, learnt)
 }

@@ -24,6 +24,7 @@ use rayon::prelude::*;
 use super::base;
 use super::context::{FitContext, without_errors_in_step};
 use super::effect::Effect;
+use super::hypothesis::Compared;
 use super::laws::{self, bending};
 use super::learnt_noise::learnt_noise;
 use super::misfit::{Misfit, leaves_more_than_noise};
@@ -78,6 +79,8 @@ pub struct Search<'a, 'p> {
     tied: Vec<Effect>,
     /// Whether the file is taken loosely.
     is_loose: bool,
+    /// What searches that it goes on from have held against every other effect, and the hypotheses of which each effect was exchanged.
+    compared: Compared,
     /// The work that had been done when it began, the base model's fit with it.
     begun_at: u64,
     /// The work up to which the present phase may go.
@@ -127,6 +130,7 @@ impl<'a, 'p> Search<'a, 'p> {
             scores,
             tied: Vec::new(),
             is_loose: false,
+            compared: Compared::default(),
             begun_at,
             until: begun_at,
             part: 1.0,
@@ -196,6 +200,9 @@ impl<'a, 'p> Search<'a, 'p> {
 
     /// The same with what another search has spent before, or in vain.
     fn after(mut self, other: Self) -> Self {
+        let Compared { of_any, whole } = other.compared();
+        self.compared.of_any = self.compared.of_any.max(of_any);
+        self.compared.whole.extend(whole);
         self.rounds.splice(0..0, other.rounds);
         let new = other.undecided.into_iter().filter(|name| !self.undecided.contains(name));
         self.undecided.extend(new.collect::<Vec<_>>());
@@ -268,8 +275,13 @@ impl<'a, 'p> Search<'a, 'p> {
         self.after(of_pieces)
     }
 
-    /// How many effects of an answer have been held against every other: two where pairs were, one where only single effects were, none where the budget ended before.
-    pub fn compared(&self) -> usize {
+    /// How many effects of an answer have been held against every other: two where pairs were, one where only single effects were, none where the budget ended before;
+    /// all where each has been exchanged.
+    pub fn compared(&self) -> Compared {
+        Compared { of_any: self.compared.of_any.max(self.compared_of_any()), whole: self.compared.whole.clone() }
+    }
+
+    fn compared_of_any(&self) -> usize {
         let done = |round: Round| {
             self.rounds.iter().any(|end| end.round == round.name()) && !self.undecided.contains(&round.name())
         };
@@ -358,7 +370,8 @@ impl<'a, 'p> Search<'a, 'p> {
             found.extend(self.fitted(some));
             proposed += some.len();
         }
-        drop(proposals);
+        let exchanged = proposal::exchanged(&proposals[..proposed]);
+        self.compared.whole.extend(exchanged);
         if proposed < count {
             self.leave_undecided(round);
         }

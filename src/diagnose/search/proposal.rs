@@ -49,6 +49,14 @@ pub enum Proposal<'f, 'a> {
 }
 
 impl<'a> Proposal<'_, 'a> {
+    /// The effects of a fit of which one is held against every other.
+    fn exchanges(&self) -> Option<&[Effect]> {
+        match self {
+            Self::Instead(fit, _, others) if !others.is_empty() => Some(&fit.hypothesis.effects),
+            _ => None,
+        }
+    }
+
     /// The fits that it leads to.
     pub fn fitted(&self, context: &FitContext<'a>) -> Vec<Refit<'a>> {
         match self {
@@ -83,6 +91,15 @@ impl<'a> Proposal<'_, 'a> {
             Self::Continued(fits, effects) => horizon::continued(context, fits, effects),
         }
     }
+}
+
+/// The hypotheses of which each effect was held against every other.
+pub fn exchanged(proposals: &[Proposal<'_, '_>]) -> Vec<Vec<Effect>> {
+    let sets: Vec<&[Effect]> = proposals.iter().filter_map(Proposal::exchanges).collect();
+    let of = |set: &[Effect]| sets.iter().filter(|other| **other == set).count();
+    let mut whole: Vec<Vec<Effect>> = sets.iter().filter(|set| of(set) == set.len()).map(|set| set.to_vec()).collect();
+    whole.dedup();
+    whole
 }
 
 /// A fit anew from where another one is, with its own coefficients, if that is a better place to begin from than where it ended.
