@@ -255,6 +255,16 @@ impl<'a> Posterior<'a> {
         self
     }
 
+    /// Whether a name of the likeliest fit often stands for something else.
+    pub fn may_stand_in(&self, settings: &Settings) -> bool {
+        let (best, others) = (self.best(), self.fits());
+        best.hypothesis.effects.iter().any(|effect| law_of(*effect).odds(best, &others, settings) < 1.0)
+    }
+
+    fn fits(&self) -> Vec<&Refit<'a>> {
+        self.candidates.iter().map(|c| &c.fit).collect()
+    }
+
     /// The fit of some effects and no others.
     pub fn of(&self, effects: &[Effect]) -> Option<&Refit<'a>> {
         self.candidates.iter().find(|c| c.fit.hypothesis.effects == effects).map(|c| &c.fit)
@@ -265,10 +275,10 @@ impl<'a> Posterior<'a> {
         self.of(&[]).unwrap_or(self.best())
     }
 
-    /// How probable an effect is, over all sets of names that hold it, whatever remains beside them: as the fits of the table say, and where something remains as
-    /// the laws say that may stand in its place.
+    /// How probable an effect is, over all sets of names that hold it, whatever remains beside them: as the fits of the table say, or, where laws were
+    /// sought, all descriptions.
     fn inclusion(&self, effect: Effect, settings: &Settings) -> f64 {
-        let others: Vec<&Refit<'_>> = self.candidates.iter().map(|c| &c.fit).collect();
+        let others = self.fits();
         let genuine = |fit: &Refit<'_>| {
             let explaining = self.by_what_they_explain(fit);
             let compared = self.compared.of(&fit.hypothesis.effects);
@@ -280,8 +290,8 @@ impl<'a> Posterior<'a> {
         let of_table = counts.map(|c| c.in_layers * genuine(&c.fit)).fold(0.0, |sum, p| sum + p).min(1.0);
         let needed = self.needed.iter().find(|own| own.0 == effect);
         let likeliest = with().next().map_or(1.0 - settings.prior.imitated, |c| genuine(&c.fit));
-        let beside = |(_, needed): &(Effect, f64)| (1.0 - self.remains) * of_table + self.remains * needed * likeliest;
-        needed.map_or(of_table, beside)
+        // the descriptions hold those of the table, too
+        needed.map_or(of_table, |(_, needed)| needed * likeliest)
     }
 
     /// How probable each effect of the table is.

@@ -52,7 +52,7 @@ pub use proven::Learnt;
 /// How probable each effect is where any law may stand in its place; nothing where that was not asked.
 pub type Needed = Vec<(Effect, f64)>;
 
-/// Learns what the likeliest fit leaves, where that is more than noise; the effects are those that may be at work. A strip's fits are too dear for it.
+/// Learns what the likeliest fit leaves, where that is more than noise, or where one of its names often stands for something else; the effects are those that may be at work. A strip's fits are too dear for it.
 pub fn beside<'a>(
     context: &FitContext<'a>,
     posterior: &Posterior<'a>,
@@ -60,7 +60,9 @@ pub fn beside<'a>(
     proof: Option<&HeldOut>,
     from_s: Option<f64>,
 ) -> (Needed, Option<Learnt<'a>>) {
-    let is_worth = posterior.remains > context.settings.verdict.even && !context.is_strip();
+    let settings = context.settings;
+    let remains = posterior.remains > settings.verdict.even || posterior.may_stand_in(settings);
+    let is_worth = remains && !context.is_strip();
     let order = if is_worth { descriptions(context, posterior, effects) } else { None };
     let Some(order) = order else { return (Needed::new(), None) };
     let Some(proof) = proof else { return (needed(context, &order, posterior, effects), None) };

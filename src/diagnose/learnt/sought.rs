@@ -1,10 +1,12 @@
 //! What is sought: the terms, and pairs of them, that would lower most of what is left beside the names of a fit, without each of them, and in their place.
 
+use std::iter;
+
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
 use super::super::basis_law::{Swing, swings};
-use super::super::effect::{Acts, Effect};
+use super::super::effect::{Acts, Effect, Place};
 use super::super::grammar::{Largest, Term, terms};
 use super::super::hypothesis::Hypothesis;
 use super::super::linearisation::Linearisation;
@@ -37,7 +39,7 @@ pub struct Candidate {
     pub rank: usize,
 }
 
-/// What promises most, beside the names of a fit, without each of them, and in the place of them all, from the fit's residuals and their derivatives; the terms
+/// What promises most, beside the names of a fit, without each of them, in the place of those that are no camera's, and of them all, from the fit's residuals and their derivatives; the terms
 /// out of which it was chosen; and every term with every start.
 pub fn candidates(
     best: &Refit<'_>,
@@ -46,9 +48,7 @@ pub fn candidates(
 ) -> Option<(Vec<Candidate>, Vec<Term>, Vec<Term>)> {
     let (all, columns, torques) = effects_of_terms(best, residual.len())?;
     let names = &best.hypothesis.effects;
-    let mut left_out: Vec<Vec<Effect>> = vec![Vec::new()];
-    left_out.extend(names.iter().map(|effect| vec![*effect]));
-    left_out.extend((names.len() > 1).then(|| names.clone()));
+    let left_out = left_out(names);
     let lower = best.problem.lower();
     let (apart, alone) = (told_apart(&torques, settings.the_same), recordings(best.problem.records).len() == 1);
     // in a single release the amplitude falls with time, and a loss that drifts stands for any loss
@@ -87,6 +87,19 @@ pub fn candidates(
     let mut candidates: Vec<Candidate> = left_out.iter().flat_map(promise).collect();
     candidates.sort_by_key(|candidate| candidate.rank);
     Some((candidates, apart.iter().map(|k| all[*k].clone()).collect(), all))
+}
+
+/// Of some names those that are left out at a time: none, each, all that are no camera's, and all.
+fn left_out(names: &[Effect]) -> Vec<Vec<Effect>> {
+    let of_physics = names.iter().copied().filter(|effect| effect.place() != Place::Camera).collect();
+    let each = names.iter().map(|effect| vec![*effect]);
+    let mut all: Vec<Vec<Effect>> = iter::once(Vec::new()).chain(each).collect();
+    for out in [of_physics, names.to_vec()] {
+        if !all.contains(&out) {
+            all.push(out);
+        }
+    }
+    all
 }
 
 /// The terms that exert another torque than any before them: on a single link hinge, strip and tip are one place.
