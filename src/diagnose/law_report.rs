@@ -5,6 +5,7 @@ use std::fmt::Write;
 
 use serde::Serialize;
 
+use super::effect::Effect;
 use super::grammar::Term;
 use super::learnt::Learnt;
 use super::quantity::Quantity;
@@ -25,7 +26,7 @@ pub struct LearntLaw {
     /// What it leaves, with the names beside it, of each angle of what was not fitted.
     pub heldout_rmse_rad: Vec<f64>,
     /// Its effects beside it: none where it stands in the place of the names.
-    pub beside: Vec<super::effect::Effect>,
+    pub beside: Vec<Effect>,
     /// For an experiment file.
     pub toml: String,
 }
@@ -41,6 +42,8 @@ pub struct WrittenTerm {
     pub shape: &'static str,
     /// How that changes.
     pub modulation: &'static str,
+    /// The effects of the table that it is nearly, along the motion.
+    pub stands_for: Vec<Effect>,
     /// With the names of its coefficients.
     pub formula: String,
     /// These.
@@ -65,7 +68,12 @@ impl LearntLaw {
             place: first.law.place.id(),
             formula: learnt.formula(),
             unit: first.law.place.unit(),
-            terms: learnt.terms.iter().map(|term| WrittenTerm::of(term, learnt)).collect(),
+            terms: learnt
+                .terms
+                .iter()
+                .zip(&learnt.stand_for)
+                .map(|(term, of)| WrittenTerm::of(term, of, learnt))
+                .collect(),
             alternatives: alternatives
                 .map(|(formula, nats)| Alternative { formula: formula.clone(), nats: *nats })
                 .collect(),
@@ -77,7 +85,7 @@ impl LearntLaw {
 }
 
 impl WrittenTerm {
-    fn of(term: &Term, learnt: &Learnt<'_>) -> Self {
+    fn of(term: &Term, stands_for: &[Effect], learnt: &Learnt<'_>) -> Self {
         let law = &term.law;
         let parameters = law.parameters.keys().zip(law.coefficients()).map(|(name, (parameter, own))| {
             let quantity = Quantity { value: Some(own.start), sd: learnt.sd(parameter), unit: parameter.unit() };
@@ -88,6 +96,7 @@ impl WrittenTerm {
             state: term.state,
             shape: term.shape,
             modulation: term.modulation,
+            stands_for: stands_for.to_vec(),
             formula: law.formula.clone(),
             parameters: parameters.collect(),
         }

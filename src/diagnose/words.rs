@@ -116,7 +116,7 @@ impl Findings<'_> {
         if let Some(hz) = self.remaining.frequency_hz {
             let _ = write!(words, ", {}", self.in_swings(hz));
         }
-        words + ": not in the table."
+        words + if self.is_of_table() { "." } else { ": not in the table." }
     }
 
     /// The law that was learnt of what the names leave.
@@ -130,18 +130,36 @@ impl Findings<'_> {
             LawPlace::Tip => "a force at the tip",
             LawPlace::Support => "an acceleration of the support",
         };
-        let beside = match learnt.fit.hypothesis.effects.is_empty() {
-            true => " It is described best without a name of the table, by",
-            false => " What remains is described best by",
+        let beside = &learnt.fit.hypothesis;
+        let replaced: Vec<Effect> =
+            self.named().hypothesis.effects.iter().copied().filter(|named| !beside.has(*named)).collect();
+        let beside = match (beside.effects.is_empty(), &replaced[..]) {
+            (true, _) => " It is described best without a name of the table, by".to_owned(),
+            (false, []) => " What remains is described best by".to_owned(),
+            (false, replaced) => format!(" It is described best with, in the place of {},", words(replaced)),
         };
         let milli = |of: &[f64]| of.iter().map(|rad| number(1e3 * rad, 2)).collect::<Vec<_>>().join(" and ");
         format!(
-            "{beside} {place} of {} {}: of what was not fitted that leaves {} mrad, the names alone {} mrad.",
+            "{beside} {place} of {} {}: of what was not fitted that leaves {} mrad, the names alone {} mrad.{}",
             learnt.formula(),
             first.law.place.unit(),
             milli(&learnt.prediction.rmse_rad),
-            milli(&proof.augmented.rmse_rad)
+            milli(&proof.augmented.rmse_rad),
+            self.law_of_table()
         )
+    }
+
+    /// The effects of the table that terms of the learnt law are nearly.
+    fn law_of_table(&self) -> String {
+        let mut all: Vec<Effect> = self.learnt.iter().flat_map(|learnt| learnt.stand_for.concat()).collect();
+        all.sort_unstable();
+        all.dedup();
+        if all.is_empty() { String::new() } else { format!(" Along this motion that is nearly {}.", words(&all)) }
+    }
+
+    /// Whether every term of the learnt law is nearly an effect of the table.
+    fn is_of_table(&self) -> bool {
+        self.learnt.as_ref().is_some_and(|learnt| learnt.stand_for.iter().all(|of_term| !of_term.is_empty()))
     }
 
     /// A frequency, as a multiple of the swing's where it is one.

@@ -38,6 +38,13 @@ impl Described<'_> {
     fn kind(&self) -> Kind {
         (self.fit.hypothesis.clone(), self.terms.iter().map(Term::form).collect())
     }
+
+    /// The effects that each of its terms stands for along a motion, with the share of each.
+    pub fn stand_for(&self, context: &FitContext<'_>, along: &Along) -> Vec<Vec<(Effect, f64)>> {
+        let (law, misfit) = (&context.settings.law, &context.settings.misfit);
+        let is_exact = self.fit.chi2 < most_of_noise(self.fit.values(), misfit);
+        self.terms.iter().map(|term| along.stands_for((term, is_exact), law)).collect()
+    }
 }
 
 /// Names with and without laws of the grammar, fitted in full simulation, the shortest description first.
@@ -221,17 +228,12 @@ pub fn needed(
     order: &[Described<'_>],
     posterior: &Posterior<'_>,
     effects: &[Effect],
+    along: &Along,
 ) -> Needed {
     let weights = normalised(&order.iter().map(|own| -own.length).collect::<Vec<f64>>());
-    let along = Along::of(context, posterior.best(), effects, order.iter().flat_map(|own| &own.terms));
-    let (law, misfit) = (&context.settings.law, &context.settings.misfit);
-    let of_description = |own: &Described<'_>| -> Vec<(Effect, f64)> {
-        let is_exact = own.fit.chi2 < most_of_noise(own.fit.values(), misfit);
-        let Some(along) = along.as_ref() else { return Vec::new() };
-        own.terms.iter().flat_map(|term| along.stands_for((term, is_exact), law)).collect()
-    };
     let twins = Twins::of(posterior, effects);
-    let shares: Vec<Vec<(Effect, f64)>> = order.iter().map(of_description).collect();
+    let shares: Vec<Vec<(Effect, f64)>> =
+        order.iter().map(|own| own.stand_for(context, along).into_iter().flatten().collect()).collect();
     let of_effect = |effect: &Effect| {
         let share = |(own, shares): (&Described<'_>, &Vec<(Effect, f64)>)| {
             let of_terms = shares.iter().filter(|share| share.0 == *effect).map(|share| share.1).fold(0.0, f64::max);

@@ -44,6 +44,7 @@ use super::context::FitContext;
 use super::effect::Effect;
 use super::heldout::HeldOut;
 use super::posterior::Posterior;
+use along::Along;
 use described::{Described, descriptions, needed};
 use proven::{foretold, proven};
 
@@ -65,11 +66,14 @@ pub fn beside<'a>(
     let is_worth = remains && !context.is_strip();
     let order = if is_worth { descriptions(context, posterior, effects) } else { None };
     let Some(order) = order else { return (Needed::new(), None) };
-    let Some(proof) = proof else { return (needed(context, &order, posterior, effects), None) };
+    let along = Along::of(context, posterior.best(), effects, order.iter().flat_map(|own| &own.terms));
+    let Some(along) = along else { return (Needed::new(), None) };
+    let needed = |order: &[Described<'_>]| needed(context, order, posterior, effects, &along);
+    let Some(proof) = proof else { return (needed(&order), None) };
     let foretold = foretold(context, order, from_s);
-    let learnt = proven(context, &foretold, proof);
+    let learnt = proven(context, &foretold, proof, &along);
     let order: Vec<Described<'a>> = foretold.into_iter().map(|own| own.0).collect();
     // where no motion could be integrated, that says nothing of any effect
-    let needed = if order.is_empty() { Needed::new() } else { needed(context, &order, posterior, effects) };
+    let needed = if order.is_empty() { Needed::new() } else { needed(&order) };
     (needed, learnt)
 }

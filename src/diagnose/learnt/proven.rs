@@ -3,9 +3,11 @@
 use rayon::prelude::*;
 
 use super::super::context::FitContext;
+use super::super::effect::Effect;
 use super::super::grammar::Term;
 use super::super::heldout::{self, HeldOut, Prediction};
 use super::super::refit::Refit;
+use super::along::Along;
 use super::described::Described;
 use super::fitted::with_laws;
 use crate::model::Parameter;
@@ -15,6 +17,8 @@ use crate::model::Parameter;
 pub struct Learnt<'a> {
     /// Its terms, with their coefficients.
     pub terms: Vec<Term>,
+    /// The effects that each term is nearly, along the motion.
+    pub stand_for: Vec<Vec<Effect>>,
     /// The fit of the names that stand beside it, with it.
     pub fit: Refit<'a>,
     /// The prediction of what was not fitted.
@@ -83,6 +87,7 @@ pub fn proven<'a>(
     context: &FitContext<'a>,
     foretold: &[(Described<'a>, Prediction)],
     proof: &HeldOut,
+    along: &Along,
 ) -> Option<Learnt<'a>> {
     let settings = context.settings;
     let (own, prediction) = foretold.first().filter(|(own, _)| !own.terms.is_empty())?;
@@ -91,6 +96,11 @@ pub fn proven<'a>(
     let near = near.filter(|other| other.length < own.length + settings.law.alternatives);
     Some(Learnt {
         terms: own.terms.clone(),
+        stand_for: own
+            .stand_for(context, along)
+            .into_iter()
+            .map(|of| of.into_iter().map(|own| own.0).collect())
+            .collect(),
         fit: own.fit.clone(),
         prediction: prediction.clone(),
         alternatives: near.map(|other| (formula_of(&other.terms), other.length - own.length)).collect(),
