@@ -467,12 +467,14 @@ impl<'a, 'p> Search<'a, 'p> {
         let best = least(&self.fits);
         let learnt = best.and_then(|best| learnt_noise(context, best));
         let (least, base) = (best.map_or(0.0, |best| best.chi2), self.base().chi2);
-        let most_steps = context.settings.descent.most_steps;
+        let (descent, is_spent) = (&context.settings.descent, self.is_spent());
         let again = |fit: Refit<'a>| {
             let worth = is_worth_more(context, &fit, least, base);
+            // where the budget is spent only the best one goes to its end
+            let steps = if is_spent && fit.chi2 > least { descent.few_steps } else { descent.most_steps };
             match (&learnt, worth) {
-                (Some(noise), _) => context.judged_by(noise, &fit, if worth { most_steps } else { 0 }).unwrap_or(fit),
-                (None, true) if !fit.converged => context.go_on(&fit, most_steps).unwrap_or(fit),
+                (Some(noise), _) => context.judged_by(noise, &fit, if worth { steps } else { 0 }).unwrap_or(fit),
+                (None, true) if !fit.converged => context.go_on(&fit, steps).unwrap_or(fit),
                 _ => fit,
             }
         };
