@@ -105,6 +105,8 @@ pub struct BudgetShares {
     pub further: f64,
     /// A law that no table holds is learnt beside all of that, with this much.
     pub law: f64,
+    /// And made simpler, turn by turn, until so much is spent.
+    pub simpler: f64,
 }
 
 /// What is fitted.
@@ -347,7 +349,7 @@ impl Default for SearchSettings {
     fn default() -> Self {
         Self {
             budget: 90_000_000,
-            shares: BudgetShares { usual: 0.45, restarts: 0.6, certified: 0.7, further: 0.9, law: 0.7 },
+            shares: BudgetShares { usual: 0.45, restarts: 0.6, certified: 0.7, further: 0.9, law: 0.7, simpler: 0.8 },
             evaluations: 3000.0,
             early_swings: 12.0,
             part_worth: 0.6,

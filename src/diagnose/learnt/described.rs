@@ -73,7 +73,7 @@ pub fn descriptions<'a>(
         let near = order[0].length + context.settings.law.alternatives;
         let new = |own: &&Described<'a>| own.length < near && !own.terms.is_empty() && !tried.contains(&own.kind());
         let shortest: Vec<&Described<'a>> = order.iter().filter(new).collect();
-        if shortest.is_empty() {
+        if shortest.is_empty() || context.work.done() > budget.until_simpler {
             break;
         }
         tried.extend(shortest.iter().map(|own| own.kind()));

@@ -26,6 +26,8 @@ pub type Begun<'a> = (Vec<Term>, Refit<'a>);
 pub struct Budget {
     /// What will have been done when it is spent.
     until: u64,
+    /// The same when what was fitted has been made simpler.
+    pub until_simpler: u64,
     /// It in motions with their derivatives.
     motions: f64,
 }
@@ -33,9 +35,11 @@ pub struct Budget {
 impl Budget {
     /// After one motion with its derivatives, before which so much had been done.
     pub fn of(context: &FitContext<'_>, before: u64) -> Self {
-        let allowed = context.settings.search.shares.law * context.settings.search.budget as f64;
+        let (shares, all) = (&context.settings.search.shares, context.settings.search.budget as f64);
+        let allowed = shares.law * all;
         let each = (context.work.done() - before).max(1) as f64;
-        Self { until: before + allowed as u64, motions: allowed / each }
+        let until_simpler = before + (shares.simpler * all) as u64;
+        Self { until: before + allowed as u64, until_simpler, motions: allowed / each }
     }
 }
 
