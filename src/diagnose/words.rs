@@ -4,6 +4,7 @@ use std::fmt::Write;
 
 use super::effect::{Effect, Place};
 use super::findings::Findings;
+use super::grammar::Term;
 use super::misfit::is_beyond_noise;
 use super::torque::MissingTorque;
 use super::verdict::{self, Status};
@@ -122,27 +123,20 @@ impl Findings<'_> {
     /// The law that was learnt of what the names leave.
     fn law(&self) -> String {
         let (Some(learnt), Some(proof)) = (&self.learnt, &self.held_out) else { return String::new() };
-        let Some(first) = learnt.terms.first() else { return String::new() };
-        let place = match first.law.place {
-            LawPlace::Hinge => "a torque at the hinge",
-            LawPlace::Joint => "a torque in the joint",
-            LawPlace::Strip => "a force along the strip",
-            LawPlace::Tip => "a force at the tip",
-            LawPlace::Support => "an acceleration of the support",
-        };
+        let terms: Vec<String> = learnt.terms.iter().map(words_of_term).collect();
         let beside = &learnt.fit.hypothesis;
         let replaced: Vec<Effect> =
             self.named().hypothesis.effects.iter().copied().filter(|named| !beside.has(*named)).collect();
         let beside = match (beside.effects.is_empty(), &replaced[..]) {
+            (true, _) if self.is_of_table() => " It is described best by".to_owned(),
             (true, _) => " It is described best without a name of the table, by".to_owned(),
             (false, []) => " What remains is described best by".to_owned(),
             (false, replaced) => format!(" It is described best with, in the place of {},", words(replaced)),
         };
         let milli = |of: &[f64]| of.iter().map(|rad| number(1e3 * rad, 2)).collect::<Vec<_>>().join(" and ");
         format!(
-            "{beside} {place} of {} {}: of what was not fitted that leaves {} mrad, the names alone {} mrad.{}",
-            learnt.formula(),
-            first.law.place.unit(),
+            "{beside} {}: of what was not fitted that leaves {} mrad, the names alone {} mrad.{}",
+            terms.join(" and "),
             milli(&learnt.prediction.rmse_rad),
             milli(&proof.augmented.rmse_rad),
             self.law_of_table()
@@ -151,10 +145,16 @@ impl Findings<'_> {
 
     /// The effects of the table that terms of the learnt law are nearly.
     fn law_of_table(&self) -> String {
-        let mut all: Vec<Effect> = self.learnt.iter().flat_map(|learnt| learnt.stand_for.concat()).collect();
-        all.sort_unstable();
-        all.dedup();
-        if all.is_empty() { String::new() } else { format!(" Along this motion that is nearly {}.", words(&all)) }
+        let Some(learnt) = &self.learnt else { return String::new() };
+        let of_term = |(place, effects): (usize, &Vec<Effect>)| {
+            let which = match (learnt.terms.len(), place) {
+                (1, _) => "that",
+                (_, 0) => "the first of them",
+                _ => "the second",
+            };
+            (!effects.is_empty()).then(|| format!(" Along this motion {which} is nearly {}.", words_of_any(effects)))
+        };
+        learnt.stand_for.iter().enumerate().filter_map(of_term).collect()
     }
 
     /// Whether every term of the learnt law is nearly an effect of the table.
@@ -224,6 +224,18 @@ impl Findings<'_> {
     }
 }
 
+/// A term of a law, with its place and unit.
+fn words_of_term(term: &Term) -> String {
+    let place = match term.law.place {
+        LawPlace::Hinge => "a torque at the hinge",
+        LawPlace::Joint => "a torque in the joint",
+        LawPlace::Strip => "a force along the strip",
+        LawPlace::Tip => "a force at the tip",
+        LawPlace::Support => "an acceleration of the support",
+    };
+    format!("{place} of {} {}", term.with_numbers(), term.law.place.unit())
+}
+
 /// A share as a percentage, with as many digits as it takes to tell it from all.
 fn percent_of_all(share: f64) -> String {
     let digits = if share > 0.999 { 2 } else { 1 };
@@ -259,10 +271,45 @@ pub fn names(effects: &[Effect], none: &str) -> String {
     if effects.is_empty() { none.to_owned() } else { effects.iter().map(|c| c.id()).collect::<Vec<_>>().join(", ") }
 }
 
+/// All of some effects.
 fn words(effects: &[Effect]) -> String {
+    words_joined(effects, "and")
+}
+
+/// One of some effects.
+fn words_of_any(effects: &[Effect]) -> String {
+    words_joined(effects, "or")
+}
+
+fn words_joined(effects: &[Effect], by: &str) -> String {
     let words: Vec<String> = effects.iter().map(|c| format!("{} ({})", c.words(), c.id())).collect();
     match &words[..] {
-        [first @ .., before, last] => [first, &[format!("{before} and {last}")]].concat().join(", "),
+        [first @ .., before, last] => [first, &[format!("{before} {by} {last}")]].concat().join(", "),
         few => few.concat(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::diagnose::grammar::{Largest, terms};
+
+    #[test]
+    fn each_term_of_a_law_is_said_with_its_own_place_and_unit() {
+        let of = |place, formula: &str| {
+            let largest = Largest { angle: 0.5, rate: 4.0, time_s: 30.0 };
+            let mut term = terms(place, largest).into_iter().find(|term| term.law.formula == formula).unwrap();
+            term.law.parameters.get_mut("a").unwrap().start = 0.02;
+            words_of_term(&term)
+        };
+        let drag = of(LawPlace::Strip, "-a * wind * abs(wind)");
+        assert_eq!(drag, "a force along the strip of -2.000e-2 * wind * abs(wind) N/m");
+        assert_eq!(of(LawPlace::Joint, "-a * rate"), "a torque in the joint of -2.000e-2 * rate N m");
+    }
+
+    #[test]
+    fn effects_that_are_not_told_apart_are_joined_by_or() {
+        let words = words_of_any(&[Effect::CameraTilt, Effect::SideForce]);
+        assert!(words.contains(" (camera_tilt) or ") && words.ends_with("(side_force)"), "{words}");
     }
 }
