@@ -58,8 +58,9 @@ pub fn candidates(
         let parameters: Vec<Parameter> = out.iter().flat_map(|effect| effect.parameters()).copied().collect();
         let gone: Vec<usize> = parameters.iter().filter_map(|parameter| best.place(*parameter)).collect();
         let kept: Vec<usize> = (0..best.x.len()).filter(|i| !gone.contains(i) && best.x[*i] > lower[*i]).collect();
-        // what the names explain is then the term's to explain
-        let left = gone.iter().fold(residual.clone(), |r, i| r - slopes.column(*i) * best.x[*i]);
+        // what the names explain is then the term's to explain; a yield angle or a frequency explains nothing by itself
+        let explaining = parameters.iter().filter(|p| p.is_proportional()).filter_map(|p| best.place(*p));
+        let left = explaining.fold(residual.clone(), |r, i| r - slopes.column(i) * best.x[i]);
         let hypothesis = out.iter().fold(best.hypothesis.clone(), |hypothesis, effect| hypothesis.without(*effect));
         let own = slopes.select_columns(&kept);
         let projection = Projection::off(left.clone(), own.clone());
