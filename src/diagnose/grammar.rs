@@ -100,15 +100,13 @@ const OF_ANGLE: [Shape; 3] = [
 ];
 /// The shape whose b may be negative.
 const BUMP: &str = "bump";
-/// Of a rate. At b = 0 this is dry friction, and near there its torque is linear in b, so that a fit finds its way from the one to the other; in 1/b it is not.
+/// Of a rate.
 const OF_RATE: [Shape; 1] = [Shape {
-    words: FADING,
-    formula: "sign(u) * exp(-b * abs(u))",
+    words: "sign that fades with speed",
+    formula: "sign(u) * exp(-abs(u) / b)",
     power: 0,
-    starts: &[&[20.0], &[5.0], &[1.0], &[0.25]],
+    starts: &[&[0.05], &[0.2], &[1.0], &[4.0]],
 }];
-/// The shape whose b is over the state's largest value.
-const FADING: &str = "sign that fades with speed";
 
 /// How an amplitude changes.
 struct Modulation {
@@ -148,8 +146,7 @@ fn of_state(place: LawPlace, state: &'static str, largest: Largest) -> Vec<Term>
     for shape in POWERS.iter().chain(own) {
         let none: &[&[f64]] = &[&[]];
         for starts in if shape.starts.is_empty() { none } else { shape.starts } {
-            let unit = if shape.words == FADING { size.recip() } else { size };
-            let starts: Vec<f64> = starts.iter().map(|part| part * unit).collect();
+            let starts: Vec<f64> = starts.iter().map(|part| part * size).collect();
             all.push(term(place, state, (shape, &starts), None));
         }
         // what changes is plain: a damper, a spring, a dry friction
@@ -184,11 +181,10 @@ fn term(
     let powers = changes.map_or([0; 2], |(modulation, _)| modulation.powers);
     let amplitude = coefficient(0.0, None, &unit_of(place, state, shape.power, powers));
     let mut parameters = BTreeMap::from([("a".to_owned(), amplitude)]);
-    let is_fading = shape.words == FADING;
     for (name, start) in ["b", "c"].into_iter().zip(starts) {
         // a width or a threshold has no meaning below nothing; the middle of a bump has
-        let least = (name == "c" || shape.words != BUMP).then_some(if is_fading { 0.0 } else { 1e-3 * start.abs() });
-        parameters.insert(name.to_owned(), coefficient(*start, least, if is_fading { "s/rad" } else { of_state }));
+        let least = (name == "c" || shape.words != BUMP).then_some(1e-3 * start.abs());
+        parameters.insert(name.to_owned(), coefficient(*start, least, of_state));
     }
     if let Some(d) = changes.and_then(|(_, d)| d) {
         parameters.insert("d".to_owned(), coefficient(d, Some(1e-3 * d), "s"));

@@ -14,8 +14,6 @@ use crate::experiment::{Coefficient, Law};
 
 /// A scale that many times the one from which it began has run away.
 const AWAY: f64 = 100.0;
-/// Parts of the step that a linear approximation leads to: where a frequency or a yield angle goes along, the whole of it may be far too long.
-const STEPS: [f64; 3] = [1.0, 0.3, 0.0];
 /// So many fits are begun before it is asked whether the budget allows more, on every machine the same ones at once.
 const BEGUN_AT_ONCE: usize = 8;
 /// The same of fits that go on.
@@ -95,13 +93,8 @@ fn begun_fit<'a>(
 ) -> Option<Refit<'a>> {
     (candidate.gain > context.settings.misfit.counts).then_some(())?;
     let (with, hypothesis) = (with_laws(context, &candidate.terms), &candidate.hypothesis);
-    let led = |part: f64| {
-        let x = best.x.iter().zip(&candidate.step).map(|(x, step)| x + part * step).collect();
-        let led = Refit { x, ..best.clone() };
-        (with.cost_at(hypothesis, &led, &[]), led)
-    };
-    let (cost, led) = STEPS.map(led).into_iter().min_by(|a, b| a.0.total_cmp(&b.0))?;
-    let begun = if cost < bound { with.begin(hypothesis, &led, &[]) } else { None };
+    let led = Refit { x: best.x.iter().zip(&candidate.step).map(|(x, step)| x + step).collect(), ..best.clone() };
+    let begun = if with.cost_at(hypothesis, &led, &[]) < bound { with.begin(hypothesis, &led, &[]) } else { None };
     let promised = context.settings.search.keeps_up * (best.chi2 - candidate.gain).max(best.values() as f64);
     let is_as_promised = begun.as_ref().is_some_and(|begun| begun.chi2 < promised);
     let is_worth = has_time && candidate.rank == 0 && !is_as_promised && *hypothesis != best.hypothesis;

@@ -10,8 +10,7 @@ use super::along::{Along, cosine};
 use super::fitted::with_laws;
 use super::sought::{Candidate, each_form_once, started};
 
-/// Of each name of a fit the terms that go best with its torque, each form from its starts, the one that leaves least first, and with the amplitude a of the least
-/// squares
+/// Of each name of a fit the terms that go best with its torque, each form once with the start that leaves least, and with the amplitude a of the least squares
 ///
 /// ```text
 /// a = Q·T / T·T      Q: torques of the name's law, T: of a unit of the term, along the motion
@@ -44,16 +43,12 @@ pub fn in_place_of_names(
                 let terms = vec![started(&every_start[*k], own.dot(&units[*k]) / units[*k].norm_squared(), 0)];
                 (with_laws(context, &terms).cost_at(&hypothesis, best, &[]), terms)
             };
-            let mut starts: Vec<_> = near.iter().filter(|k| every_start[**k].form() == form).map(of_start).collect();
-            starts.sort_by(|a, b| a.0.total_cmp(&b.0));
-            let candidate = |(turn, (_, terms)): (usize, (f64, Vec<Term>))| {
-                let (hypothesis, step) = (hypothesis.clone(), vec![0.0; best.x.len()]);
-                let rank = rank + (1 + turn) * law.in_place_after;
-                Candidate { hypothesis, terms, step, gain: best.chi2, rank }
-            };
-            starts.into_iter().enumerate().map(candidate).collect::<Vec<_>>()
+            let starts = near.iter().filter(|k| every_start[**k].form() == form).map(of_start);
+            let (_, terms) = starts.min_by(|a, b| a.0.total_cmp(&b.0))?;
+            let (hypothesis, step) = (hypothesis.clone(), vec![0.0; best.x.len()]);
+            Some(Candidate { hypothesis, terms, step, gain: best.chi2, rank: rank + law.in_place_after })
         };
-        forms.par_iter().with_max_len(1).enumerate().flat_map(of_form).collect::<Vec<_>>()
+        forms.par_iter().with_max_len(1).enumerate().filter_map(of_form).collect::<Vec<_>>()
     };
     let proportional = best.hypothesis.effects.iter().filter(|name| name.parameters()[0].is_proportional());
     proportional.flat_map(in_place).collect()
