@@ -267,7 +267,12 @@ impl<'a> Posterior<'a> {
 
     /// The fit of some effects and no others.
     pub fn of(&self, effects: &[Effect]) -> Option<&Refit<'a>> {
-        self.candidates.iter().find(|c| c.fit.hypothesis.effects == effects).map(|c| &c.fit)
+        self.candidate(effects).map(|c| &c.fit)
+    }
+
+    /// The same with its probabilities.
+    pub fn candidate(&self, effects: &[Effect]) -> Option<&Candidate<'a>> {
+        self.candidates.iter().find(|c| c.fit.hypothesis.effects == effects)
     }
 
     /// The base model's fit, which every search holds.

@@ -47,12 +47,13 @@ impl Described<'_> {
     }
 }
 
-/// Names with and without laws of the grammar, fitted in full simulation, the shortest description first.
+/// Names with and without laws of the grammar, fitted in full simulation, the shortest description first; and the motion along which their terms are compared with
+/// effects.
 pub fn descriptions<'a>(
     context: &FitContext<'a>,
     posterior: &Posterior<'a>,
     effects: &[Effect],
-) -> Option<Vec<Described<'a>>> {
+) -> Option<(Vec<Described<'a>>, Along)> {
     let best = posterior.best();
     let before = context.work.done();
     let linearised = best.linearised()?;
@@ -85,7 +86,7 @@ pub fn descriptions<'a>(
         let simpler: Vec<Begun<'a>> = shortest.par_iter().flat_map(simpler).collect();
         order = described(order.into_iter().map(|own| (own.terms, own.fit)).chain(simpler).collect(), &prior)?;
     }
-    Some(order)
+    Some((order, prior.along))
 }
 
 /// A description with terms without each of its names, from where it stands, and from there with the scales of the terms' states smaller and larger: a threshold
@@ -200,8 +201,8 @@ impl Twins {
         let (likeliest, best) = (posterior.candidates[0].ln_posterior, &posterior.best().hypothesis);
         let odds = |(name, twin): (Effect, Effect)| {
             let exchanged = best.without(name).and(twin, best.dropped).effects;
-            let candidate = posterior.candidates.iter().find(|own| own.fit.hypothesis.effects == exchanged)?;
-            Some((name, twin, (candidate.ln_posterior - likeliest).exp()))
+            let ln_posterior = posterior.candidate(&exchanged)?.ln_posterior;
+            Some((name, twin, (ln_posterior - likeliest).exp()))
         };
         let others = || effects.iter().copied().filter(|effect| !best.has(*effect));
         Self(best.effects.iter().flat_map(|name| others().map(move |twin| (*name, twin))).filter_map(odds).collect())
@@ -221,8 +222,8 @@ impl Twins {
     }
 }
 
-/// The probability of each effect among all descriptions: of those that name it, or one that it does as well as, and of those with a term that does what it does along
-/// the motion of a fit.
+/// The probability of each effect among all descriptions: of those that name it, or one that it does as well as, and of those with a term that does what it does along a
+/// motion.
 pub fn needed(
     context: &FitContext<'_>,
     order: &[Described<'_>],

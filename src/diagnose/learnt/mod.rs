@@ -18,7 +18,7 @@
 //! 5. The shortest are fitted to a part, and predict the rest. With what they predict in the length,
 //!
 //! ```text
-//! P(effect | something remains) = Σ exp(−L) of the descriptions with it / Σ exp(−L) of all
+//! P(effect) = Σ exp(−L) of the descriptions with it / Σ exp(−L) of all
 //! ```
 //!
 //! A term that has the shape of an effect's law, and nearly its torque along the motion, is that law: dry friction that reverses smoothly is dry friction.
@@ -44,7 +44,6 @@ use super::context::FitContext;
 use super::effect::Effect;
 use super::heldout::HeldOut;
 use super::posterior::Posterior;
-use along::Along;
 use described::{Described, descriptions, needed};
 use proven::{foretold, proven};
 
@@ -53,7 +52,8 @@ pub use proven::Learnt;
 /// How probable each effect is where any law may stand in its place; nothing where that was not asked.
 pub type Needed = Vec<(Effect, f64)>;
 
-/// Learns what the likeliest fit leaves, where that is more than noise, or where one of its names often stands for something else; the effects are those that may be at work. A strip's fits are too dear for it.
+/// Learns what the likeliest fit leaves, where that is more than noise, or where one of its names often stands for something else; the effects are those that may be
+/// at work. A strip's fits are too dear for it.
 pub fn beside<'a>(
     context: &FitContext<'a>,
     posterior: &Posterior<'a>,
@@ -64,10 +64,8 @@ pub fn beside<'a>(
     let settings = context.settings;
     let remains = posterior.remains > settings.verdict.even || posterior.may_stand_in(settings);
     let is_worth = remains && !context.is_strip();
-    let order = if is_worth { descriptions(context, posterior, effects) } else { None };
-    let Some(order) = order else { return (Needed::new(), None) };
-    let along = Along::of(context, posterior.best(), effects, order.iter().flat_map(|own| &own.terms));
-    let Some(along) = along else { return (Needed::new(), None) };
+    let found = if is_worth { descriptions(context, posterior, effects) } else { None };
+    let Some((order, along)) = found else { return (Needed::new(), None) };
     let needed = |order: &[Described<'_>]| needed(context, order, posterior, effects, &along);
     let Some(proof) = proof else { return (needed(&order), None) };
     let foretold = foretold(context, order, from_s);

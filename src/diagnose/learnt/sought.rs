@@ -39,7 +39,8 @@ pub struct Candidate {
     pub rank: usize,
 }
 
-/// What promises most, beside the names of a fit, without each of them, in the place of those that are no camera's, and of them all, from the fit's residuals and their derivatives; the terms
+/// What promises most, beside the names of a fit, without each of them, in the place of those that are no camera's, and of them all, from the fit's residuals and
+/// their derivatives; the terms
 /// out of which it was chosen; and every term with every start.
 pub fn candidates(
     best: &Refit<'_>,
