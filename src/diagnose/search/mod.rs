@@ -10,10 +10,12 @@
 //! | [`beside`] | an effect beside a fit |
 //! | `early` | the search of the first part, where the whole is dear |
 //! | [`horizon`] | horizon continuation: fits that follow a recording from its beginning |
+//! | `judged` | the noise by which all fits are judged |
 
 pub mod beside;
 mod early;
 pub mod horizon;
+mod judged;
 pub mod proposal;
 pub mod rounds;
 
@@ -26,7 +28,6 @@ use super::context::{FitContext, without_errors_in_step};
 use super::effect::Effect;
 use super::hypothesis::Compared;
 use super::laws::{self, bending};
-use super::learnt_noise::learnt_noise;
 use super::misfit::{Misfit, leaves_more_than_noise};
 use super::preparation::Prepared;
 use super::refit::{Refit, least, least_chi2, merged};
@@ -36,7 +37,6 @@ use super::settings::Settings;
 use super::taken::{Taken, lacks_a_damper};
 use crate::error::Result;
 use crate::experiment::Experiment;
-use crate::fit::whitening::RecordNoise;
 use crate::progress::Progress;
 use beside::Beside;
 use proposal::Proposal;
@@ -451,67 +451,4 @@ impl<'a, 'p> Search<'a, 'p> {
         self.keep(found);
         self.learn_noise();
     }
-
-    /// Judges all fits by the noise that the best of them leaves; those that have not yet converged, and are worth it, go on. Where that led far down, the noise is
-    /// what is left there.
-    fn learn_noise(&mut self) {
-        let before = least_chi2(&self.fits);
-        self.learn_noise_once();
-        if self.context.settings.search.far_down * least_chi2(&self.fits) < before {
-            self.learn_noise_once();
-        }
-    }
-
-    fn learn_noise_once(&mut self) {
-        let context = &self.context;
-        let best = least(&self.fits);
-        let learnt = best.and_then(|best| learnt_noise(context, best));
-        let (least, base) = (best.map_or(0.0, |best| best.chi2), self.base().chi2);
-        let (descent, is_spent) = (&context.settings.descent, self.is_spent());
-        let again = |fit: Refit<'a>| {
-            let worth = is_worth_more(context, &fit, least, base);
-            // where the budget is spent only the best one goes to its end
-            let steps = if is_spent && fit.chi2 > least { descent.few_steps } else { descent.most_steps };
-            match (&learnt, worth) {
-                (Some(noise), _) => context.judged_by(noise, &fit, if worth { steps } else { 0 }).unwrap_or(fit),
-                (None, true) if !fit.converged => context.go_on(&fit, steps).unwrap_or(fit),
-                _ => fit,
-            }
-        };
-        let fits = std::mem::take(&mut self.fits);
-        self.fits = fits.into_par_iter().with_max_len(1).map(again).collect();
-    }
-
-    /// The same fits beside the errors in step with the swing that a tracked angle may have; those that are near the noise go on from where they are.
-    fn allow_errors_in_step(&mut self) {
-        let mut noise = self.base().problem.noise.clone();
-        for (noise, record) in noise.iter_mut().zip(self.context.records) {
-            noise.in_step = record.in_step;
-        }
-        self.judge_by(&noise, self.context.settings.descent.few_steps);
-    }
-
-    fn judge_by(&mut self, noise: &[RecordNoise], steps: usize) {
-        if self.base().problem.noise == noise {
-            return;
-        }
-        let (context, least) = (&self.context, least_chi2(&self.fits));
-        let hopeless = context.settings.search.hopeless;
-        let again = |fit: Refit<'a>| {
-            let worth = fit.chi2 < hopeless * (least + hopeless);
-            context.judged_by(noise, &fit, if worth { steps } else { 0 }).unwrap_or(fit)
-        };
-        let fits = std::mem::take(&mut self.fits);
-        self.fits = fits.into_par_iter().with_max_len(1).map(again).collect();
-    }
-}
-
-/// Whether a fit is worth further steps beside the best and the base model's.
-fn is_worth_more(context: &FitContext<'_>, fit: &Refit<'_>, least: f64, base: f64) -> bool {
-    let settings = context.settings;
-    let (hopeless, dear) = (settings.search.hopeless, fit.hypothesis.has_corners());
-    // in every joint of a strip it has only begun
-    let bound = if dear && context.is_strip() { settings.descent.hopeful } else { hopeless };
-    fit.hypothesis.effects.is_empty()
-        || fit.chi2 < bound * (least + hopeless) && !(dear && fit.chi2 > base - settings.misfit.counts)
 }
