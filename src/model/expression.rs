@@ -10,12 +10,14 @@
 //! Functions: `abs sign step max min exp sin cos sqrt tanh`. `sign` and `step` rise within ±10⁻³ of the unit of what they are of, as tanh does: an integrator
 //! cannot step over a jump, unless it is told on which side it is ([`Expression::with_sign_given`]). Derivatives are taken forward, with all variables at once.
 
+use smallvec::SmallVec;
+
 /// Most variables of one formula: the state and the coefficients.
 pub const MOST_VARIABLES: usize = 12;
 /// Half the width over which a sign goes from −1 to 1, in the unit of what it is of.
 const SIGN_WIDTH: f64 = 1e-3;
 /// The variables, and a sign that is given.
-const SLOPES: usize = MOST_VARIABLES + 1;
+pub const MOST_VALUES: usize = MOST_VARIABLES + 1;
 
 /// A formula, ready to be evaluated.
 #[derive(Debug, Clone, PartialEq)]
@@ -71,24 +73,72 @@ pub struct Dual {
     /// The value.
     pub value: f64,
     /// With each variable.
-    pub slopes: [f64; SLOPES],
+    pub slopes: [f64; MOST_VALUES],
 }
 
-impl Dual {
-    fn constant(value: f64) -> Self {
-        Self { value, slopes: [0.0; SLOPES] }
-    }
+/// What a formula is evaluated with: values alone, or values with derivatives.
+trait Number: Copy {
+    fn constant(value: f64) -> Self;
+
+    fn variable(place: usize, value: f64) -> Self;
+
+    fn value(self) -> f64;
 
     /// A function of this one with a value and a slope.
+    fn chain(self, value: f64, slope: f64) -> Self;
+
+    /// A function of two with a value and both slopes.
+    fn join(self, other: Self, value: f64, slopes: [f64; 2]) -> Self;
+}
+
+impl Number for f64 {
+    fn constant(value: f64) -> Self {
+        value
+    }
+
+    fn variable(_: usize, value: f64) -> Self {
+        value
+    }
+
+    fn value(self) -> f64 {
+        self
+    }
+
+    fn chain(self, value: f64, _: f64) -> Self {
+        value
+    }
+
+    fn join(self, _: Self, value: f64, _: [f64; 2]) -> Self {
+        value
+    }
+}
+
+impl Number for Dual {
+    fn constant(value: f64) -> Self {
+        Self { value, slopes: [0.0; MOST_VALUES] }
+    }
+
+    fn variable(place: usize, value: f64) -> Self {
+        let mut slopes = [0.0; MOST_VALUES];
+        slopes[place] = 1.0;
+        Self { value, slopes }
+    }
+
+    fn value(self) -> f64 {
+        self.value
+    }
+
     fn chain(self, value: f64, slope: f64) -> Self {
         Self { value, slopes: self.slopes.map(|s| slope * s) }
     }
 
-    /// A function of two with a value and both slopes.
     fn join(self, other: Self, value: f64, [own, others]: [f64; 2]) -> Self {
         Self { value, slopes: std::array::from_fn(|i| own * self.slopes[i] + others * other.slopes[i]) }
     }
 }
+
+/// Operands that wait for their operator; a few are kept without asking for memory.
+type Stack<N> = SmallVec<[N; 8]>;
 
 impl Expression {
     /// Reads a formula of some variables.
@@ -124,19 +174,24 @@ impl Expression {
         (nodes != self.nodes).then_some(Self { nodes, variables: self.variables + 1 })
     }
 
+    /// The value.
+    pub fn value(&self, variables: &[f64]) -> f64 {
+        self.evaluate(variables)
+    }
+
     /// The value and its derivatives with every variable.
     pub fn at(&self, variables: &[f64]) -> Dual {
-        let mut stack: Vec<Dual> = Vec::with_capacity(8);
+        self.evaluate(variables)
+    }
+
+    fn evaluate<N: Number>(&self, variables: &[f64]) -> N {
+        let mut stack: Stack<N> = Stack::new();
         for node in &self.nodes {
             let result = match *node {
-                Node::Number(value) => Dual::constant(value),
-                Node::Variable(i) => {
-                    let mut dual = Dual::constant(variables.get(i).copied().unwrap_or(f64::NAN));
-                    dual.slopes[i] = 1.0;
-                    dual
-                }
-                Node::Negate => pop(&mut stack).chain_with(|v| (-v, -1.0)),
-                Node::Call(function) if function.takes_one() => pop(&mut stack).chain_with(|v| function.of(v)),
+                Node::Number(value) => N::constant(value),
+                Node::Variable(i) => N::variable(i, variables.get(i).copied().unwrap_or(f64::NAN)),
+                Node::Negate => of_one(pop(&mut stack), |v| (-v, -1.0)),
+                Node::Call(function) if function.takes_one() => of_one(pop(&mut stack), |v| function.of(v)),
                 two => {
                     let (b, a) = (pop(&mut stack), pop(&mut stack));
                     of_two(two, a, b)
@@ -149,20 +204,18 @@ impl Expression {
     }
 }
 
-impl Dual {
-    fn chain_with(self, of: impl Fn(f64) -> (f64, f64)) -> Self {
-        let (value, slope) = of(self.value);
-        self.chain(value, slope)
-    }
-}
-
 /// The parser leaves no operator without its operands.
-fn pop(stack: &mut Vec<Dual>) -> Dual {
-    stack.pop().unwrap_or(Dual::constant(f64::NAN))
+fn pop<N: Number>(stack: &mut Stack<N>) -> N {
+    stack.pop().unwrap_or(N::constant(f64::NAN))
 }
 
-fn of_two(node: Node, a: Dual, b: Dual) -> Dual {
-    let (x, y) = (a.value, b.value);
+fn of_one<N: Number>(operand: N, function: impl Fn(f64) -> (f64, f64)) -> N {
+    let (value, slope) = function(operand.value());
+    operand.chain(value, slope)
+}
+
+fn of_two<N: Number>(node: Node, a: N, b: N) -> N {
+    let (x, y) = (a.value(), b.value());
     match node {
         Node::Add => a.join(b, x + y, [1.0, 1.0]),
         Node::Subtract => a.join(b, x - y, [1.0, -1.0]),
@@ -187,7 +240,7 @@ fn of_two(node: Node, a: Dual, b: Dual) -> Dual {
                 b
             }
         }
-        _ => Dual::constant(f64::NAN),
+        _ => N::constant(f64::NAN),
     }
 }
 
@@ -362,7 +415,7 @@ mod tests {
     fn value(text: &str, variables: &[(&str, f64)]) -> f64 {
         let names: Vec<&str> = variables.iter().map(|(name, _)| *name).collect();
         let values: Vec<f64> = variables.iter().map(|(_, value)| *value).collect();
-        Expression::parse(text, &names).unwrap().at(&values).value
+        Expression::parse(text, &names).unwrap().value(&values)
     }
 
     #[test]
@@ -383,12 +436,13 @@ mod tests {
         let formula = Expression::parse(text, &names).unwrap();
         for at in [[0.3, 0.7, 2.0, 0.5, 0.2], [-0.4, -0.9, 1.0, -2.0, 0.6], [0.002, 0.0012, 1.0, 1.0, 1.0]] {
             let exact = formula.at(&at);
+            assert_eq!(formula.value(&at), exact.value);
             for variable in 0..names.len() {
                 let step = 1e-7;
                 let moved = |by: f64| {
                     let mut moved = at;
                     moved[variable] += by;
-                    formula.at(&moved).value
+                    formula.value(&moved)
                 };
                 let difference = (moved(step) - moved(-step)) / (2.0 * step);
                 let error = (exact.slopes[variable] - difference).abs();

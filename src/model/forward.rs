@@ -193,8 +193,8 @@ impl ForwardModel {
     pub fn sensitivity(&self, parameter: Parameter, motion: &Motion, partials: &Partials, q: &mut [f64]) {
         q.fill(0.0);
         if self.chain.value(parameter).is_some() {
-            let stated: f64 = self.effects.iter().map(|e| e.sideways_m_s2(motion)).sum();
-            let sideways_m_s2 = self.value(Parameter::SideForce).unwrap_or(0.0) + stated - motion.pivot_m_s2;
+            let of_effects: f64 = self.effects.iter().map(|e| e.sideways_m_s2(motion)).sum();
+            let sideways_m_s2 = of_effects - motion.pivot_m_s2;
             self.chain.add_sensitivity(parameter, [sideways_m_s2, self.gravity_m_s2], motion, q);
         }
         self.effects.iter().for_each(|e| e.add_sensitivity(parameter, &self.chain, motion, q));

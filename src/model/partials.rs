@@ -40,11 +40,13 @@ impl Partials {
 
     /// Sets every entry to zero.
     pub fn clear(&mut self) {
-        self.theta.fill(0.0);
-        self.rate.fill(0.0);
-        self.acceleration.fill(0.0);
-        self.pivot_velocity.fill(0.0);
-        self.pivot_acceleration.fill(0.0);
+        // slices are filled as a block of memory, matrices entry by entry
+        for matrix in [&mut self.theta, &mut self.rate, &mut self.acceleration] {
+            matrix.as_mut_slice().fill(0.0);
+        }
+        for vector in [&mut self.pivot_velocity, &mut self.pivot_acceleration] {
+            vector.as_mut_slice().fill(0.0);
+        }
     }
 
     /// Sets one row to zero.

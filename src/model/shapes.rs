@@ -199,7 +199,7 @@ impl Shapes {
     /// Tᵀ A T, T being Φ for the links and one for what follows, as far as A has it.
     fn reduce_matrix(&self, of_links: &DMatrix<f64>, along: &mut DMatrix<f64>) {
         let (links, rows) = (self.links(), along.nrows());
-        along.fill(0.0);
+        along.as_mut_slice().fill(0.0);
         let mut column = vec![0.0; rows];
         for (j, of_column) in of_links.column_iter().enumerate() {
             self.reduce(of_column.as_slice(), &mut column);

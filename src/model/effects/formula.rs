@@ -2,7 +2,7 @@
 
 use super::{Effect, air};
 use crate::experiment::{Law, LawPlace};
-use crate::model::expression::{Dual, Expression};
+use crate::model::expression::{Expression, MOST_VALUES};
 use crate::model::{Chain, Motion, Parameter, Partials};
 
 /// The law.
@@ -18,6 +18,9 @@ pub struct Formula {
 
 /// The rate among the variables of a law at the hinge.
 const RATE: usize = 1;
+
+/// The value of a formula, or the value with its derivatives.
+type Evaluate<N> = fn(&Expression, &[f64]) -> N;
 
 /// What a formula gives at one place, and how it acts there.
 enum Acts<'s> {
@@ -49,14 +52,16 @@ impl Formula {
         })
     }
 
-    /// In a state; the hinge moves at a rate with this sign.
-    fn at(&self, state: &[f64], sign: f64) -> Dual {
-        let mut values = self.values.clone();
+    /// Evaluated in a state; the hinge moves at a rate with this sign.
+    fn at<N>(&self, evaluate: Evaluate<N>, state: &[f64], sign: f64) -> N {
+        let mut all = [0.0; MOST_VALUES];
+        let values = &mut all[..self.values.len()];
+        values.copy_from_slice(&self.values);
         values[..state.len()].copy_from_slice(state);
         if let Some(of_rate) = values.last_mut().filter(|_| self.is_dry) {
             *of_rate = sign;
         }
-        self.expression.at(&values)
+        evaluate(&self.expression, values)
     }
 
     /// Where the derivative with a coefficient stands.
@@ -66,9 +71,15 @@ impl Formula {
     }
 
     /// The formula at every place of the chain where it acts.
-    fn visit(&self, chain: &Chain, motion: &Motion, mut each: impl FnMut(&Acts<'_>, Dual)) {
+    fn visit<N>(
+        &self,
+        evaluate: Evaluate<N>,
+        chain: &Chain,
+        motion: &Motion,
+        mut each: impl FnMut(&Acts<'_>, N),
+    ) {
         let (theta, rate, t_s) = (&motion.theta_rad, &motion.rate, motion.t_s);
-        let at = |state: &[f64]| self.at(state, motion.hinge.sign());
+        let at = |state: &[f64]| self.at(evaluate, state, motion.hinge.sign());
         match self.place {
             LawPlace::Hinge => each(&Acts::Hinge, at(&[theta[0], rate[0], t_s])),
             LawPlace::Joint => (1..chain.count()).for_each(|i| {
@@ -100,11 +111,11 @@ impl Formula {
 
 impl Effect for Formula {
     fn add_torque(&self, chain: &Chain, motion: &Motion, q: &mut [f64]) {
-        self.visit(chain, motion, |acts, dual| Self::exert(acts, dual.value, chain, motion, q));
+        self.visit(Expression::value, chain, motion, |acts, value| Self::exert(acts, value, chain, motion, q));
     }
 
     fn add_partials(&self, chain: &Chain, motion: &Motion, partials: &mut Partials) {
-        self.visit(chain, motion, |acts, dual| {
+        self.visit(Expression::at, chain, motion, |acts, dual| {
             let [with_angle, with_rate] = [dual.slopes[0], dual.slopes[1]];
             match acts {
                 Acts::Hinge => {
@@ -128,12 +139,12 @@ impl Effect for Formula {
     }
 
     fn friction_n_m(&self, motion: &Motion) -> Option<f64> {
-        let of_sign = |sign: f64| self.at(&[motion.theta_rad[0], 0.0, motion.t_s], sign).value;
+        let of_sign = |sign: f64| self.at(Expression::value, &[motion.theta_rad[0], 0.0, motion.t_s], sign);
         self.is_dry.then(|| 0.5 * (of_sign(-1.0) - of_sign(1.0)))
     }
 
     fn sideways_m_s2(&self, motion: &Motion) -> f64 {
-        if self.place == LawPlace::Support { -self.at(&[motion.t_s], 0.0).value } else { 0.0 }
+        if self.place == LawPlace::Support { -self.at(Expression::value, &[motion.t_s], 0.0) } else { 0.0 }
     }
 
     fn parameters(&self) -> Vec<(Parameter, f64)> {
@@ -149,7 +160,9 @@ impl Effect for Formula {
 
     fn add_sensitivity(&self, parameter: Parameter, chain: &Chain, motion: &Motion, q: &mut [f64]) {
         if let Some(place) = self.slope_of(parameter) {
-            self.visit(chain, motion, |acts, dual| Self::exert(acts, dual.slopes[place], chain, motion, q));
+            self.visit(Expression::at, chain, motion, |acts, dual| {
+                Self::exert(acts, dual.slopes[place], chain, motion, q);
+            });
         }
     }
 }

@@ -95,6 +95,11 @@ pub trait Law: std::fmt::Debug + Send + Sync {
     fn friction_n_m(&self, _coefficient: f64) -> Option<f64> {
         None
     }
+
+    /// The sideways acceleration that all masses feel from it (m/s²).
+    fn sideways_m_s2(&self, _coefficient: f64) -> f64 {
+        0.0
+    }
 }
 
 /// A [`Law`] with its coefficient.
@@ -137,6 +142,10 @@ impl<L: Law> Effect for Proportional<L> {
 
     fn friction_n_m(&self, _: &Motion) -> Option<f64> {
         self.law.friction_n_m(self.coefficient)
+    }
+
+    fn sideways_m_s2(&self, _: &Motion) -> f64 {
+        self.law.sideways_m_s2(self.coefficient)
     }
 }
 

@@ -27,6 +27,10 @@ impl Law for SideForce {
     fn energy_j(&self, chain: &Chain, motion: &Motion, a: f64) -> f64 {
         -(0..chain.count()).map(|i| a * chain.static_moment_kg_m(i) * motion.sin[i]).sum::<f64>()
     }
+
+    fn sideways_m_s2(&self, a: f64) -> f64 {
+        a
+    }
 }
 
 /// `support_motion`: the pivot moves sideways, xₚ = S sin 2πft + C cos 2πft.
