@@ -349,7 +349,7 @@ impl Default for SearchSettings {
     fn default() -> Self {
         Self {
             budget: 90_000_000,
-            shares: BudgetShares { usual: 0.45, restarts: 0.6, certified: 0.7, further: 0.9, law: 0.7, simpler: 0.8 },
+            shares: BudgetShares { usual: 0.45, restarts: 0.6, certified: 0.7, further: 0.9, law: 1.2, simpler: 1.5 },
             evaluations: 3000.0,
             early_swings: 12.0,
             part_worth: 0.6,
