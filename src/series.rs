@@ -11,6 +11,12 @@ use crate::statistics::{median, median_step_s};
 /// Fewest rows, and fewest values of each angle, from which anything can be said.
 pub const FEWEST_ROWS: usize = 8;
 
+/// A displacement is taken for the angle of a pendulum so many pixels long.
+pub const PX_PER_RAD: f64 = 1000.0;
+
+/// The column of a displacement.
+const DISPLACEMENT: &str = "displacement_px";
+
 /// An angle that varies by less than this (rad) does not swing; the best encoders resolve ten times more.
 const STILL_RAD: f64 = 1e-6;
 
@@ -24,6 +30,15 @@ const LONGEST_BY_FRAME_S: f64 = 10.0;
 
 /// Consecutive swings beyond a full turn that no hanging chain makes.
 const IMPOSSIBLE_SWINGS: usize = 4;
+
+/// What a table holds.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Measured {
+    /// Angles of one or more links.
+    Angles,
+    /// The displacement of one mark of which nobody knows where it hangs, over [`PX_PER_RAD`].
+    Displacement,
+}
 
 /// The angles of one recording as a table of numbers.
 #[derive(Debug, Clone, PartialEq)]
@@ -53,11 +68,24 @@ impl AngleSeries {
         Self::parse(&bytes, &name)
     }
 
+    /// The same of a table that may hold the displacement of one mark instead.
+    ///
+    /// # Errors
+    /// As [`AngleSeries::read`].
+    pub fn read_motion(path: &Path) -> Result<(Self, Measured)> {
+        let (name, bytes) = crate::input::read(path)?;
+        Self::parsed(&bytes, &name, true)
+    }
+
     /// Reads and checks the bytes of a table; `path` only appears in errors.
     ///
     /// # Errors
     /// As [`AngleSeries::read`].
     pub fn parse(bytes: &[u8], path: &Path) -> Result<Self> {
+        Self::parsed(bytes, path, false).map(|(series, _)| series)
+    }
+
+    fn parsed(bytes: &[u8], path: &Path, may_be_displacement: bool) -> Result<(Self, Measured)> {
         if bytes.is_empty() {
             return Err(Error::EmptyFile { path: path.to_owned() });
         }
@@ -68,7 +96,7 @@ impl AngleSeries {
         };
         let mut reader = csv::ReaderBuilder::new().trim(csv::Trim::All).flexible(true).from_reader(text.as_bytes());
         let header = reader.headers().map_err(|e| table.refuse(None, &e.to_string()))?.clone();
-        let columns = Columns::of(&header, &table)?;
+        let columns = Columns::of(&header, &table, may_be_displacement)?;
         let links = columns.theta.len();
         let mut series = Self {
             path: path.to_owned(),
@@ -82,10 +110,13 @@ impl AngleSeries {
             let record = record.map_err(|e| table.refuse(e.position().map(csv::Position::line), &e.to_string()))?;
             series.push(&Row { record: &record, header: &header, table: &table }, &columns)?;
         }
-        series.check(&table)?;
+        series.check(&table, columns.measured)?;
         series.keep_deviations();
+        if columns.measured == Measured::Displacement {
+            series.theta_rad.iter_mut().chain(&mut series.sd_rad).flatten().flatten().for_each(|px| *px /= PX_PER_RAD);
+        }
         series.warnings.extend(series.slow_clock());
-        Ok(series)
+        Ok((series, columns.measured))
     }
 
     fn push(&mut self, row: &Row, columns: &Columns) -> Result<()> {
@@ -148,7 +179,7 @@ impl AngleSeries {
         ))
     }
 
-    fn check(&self, table: &Table) -> Result<()> {
+    fn check(&self, table: &Table, measured: Measured) -> Result<()> {
         let rows = self.len();
         if rows == 0 {
             return Err(table.refuse(None, "holds no row of numbers; measure the recording again"));
@@ -158,7 +189,10 @@ impl AngleSeries {
             return Err(table.refuse(None, &format!("holds {only}; a swing needs at least {FEWEST_ROWS}")));
         }
         for (link, theta) in self.theta_rad.iter().enumerate() {
-            let name = format!("theta{}_rad", link + 1);
+            let name = match measured {
+                Measured::Angles => format!("theta{}_rad", link + 1),
+                Measured::Displacement => DISPLACEMENT.to_owned(),
+            };
             let values: Vec<f64> = theta.iter().copied().flatten().collect();
             if values.len() < FEWEST_ROWS {
                 let message = format!(
@@ -174,7 +208,8 @@ impl AngleSeries {
                 let message = format!("{name} stays at {low}: nothing swings; check the marks and the column");
                 return Err(table.refuse(None, &message));
             }
-            if let Some(swing) = impossible_swing(&values) {
+            let is_angle = measured == Measured::Angles;
+            if let Some(swing) = impossible_swing(&values).filter(|_| is_angle) {
                 let message = format!(
                     "{name} swings to and fro by {swing:.0} in one go, {:.1} full turns if radians: looks like degrees; multiply by π/180",
                     swing / std::f64::consts::TAU
@@ -233,7 +268,7 @@ impl AngleSeries {
     /// # Errors
     /// As [`AngleSeries::read`], of what a slice may lack.
     pub fn checked(self) -> Result<Self> {
-        self.check(&Table { path: &self.path })?;
+        self.check(&Table { path: &self.path }, Measured::Angles)?;
         Ok(self)
     }
 
@@ -313,14 +348,19 @@ struct Columns {
     t: usize,
     theta: Vec<usize>,
     sd: Vec<Option<usize>>,
+    measured: Measured,
 }
 
 impl Columns {
-    fn of(header: &csv::StringRecord, table: &Table) -> Result<Self> {
+    fn of(header: &csv::StringRecord, table: &Table, may_be_displacement: bool) -> Result<Self> {
         let names: Vec<&str> = header.iter().collect();
         let position = |name: &str| names.iter().position(|n| *n == name);
         let need = |name: &str| position(name).ok_or_else(|| table.refuse(Some(1), &missing(name, &names)));
         let t = need("t_s")?;
+        if let Some(column) = position(DISPLACEMENT).filter(|_| may_be_displacement) {
+            let (theta, sd) = (vec![column], vec![position("displacement_sd_px")]);
+            return Ok(Self { t, theta, sd, measured: Measured::Displacement });
+        }
         let highest = names.iter().filter_map(|n| n.strip_prefix("theta")?.strip_suffix("_rad")?.parse::<usize>().ok());
         let links = highest.filter(|link| (1..=99).contains(link)).max().unwrap_or(1);
         let theta = (1..=links).map(|link| need(&format!("theta{link}_rad"))).collect::<Result<Vec<_>>>()?;
@@ -331,7 +371,7 @@ impl Columns {
                 return Err(table.refuse(Some(1), &format!("two columns are called `{name}`; rename one")));
             }
         }
-        Ok(Self { t, theta, sd })
+        Ok(Self { t, theta, sd, measured: Measured::Angles })
     }
 }
 
@@ -370,8 +410,8 @@ fn missing(name: &str, names: &[&str]) -> String {
     if names.iter().all(|n| n.parse::<f64>().is_ok()) {
         return format!("no header, the first row is {list}; put t_s,theta1_rad,theta2_rad above it");
     }
-    if names.contains(&"displacement_px") {
-        return "holds the displacement of one mark and no angle; say where the mark hangs, with --pivot or pivot_px in [rig], and track again".to_owned();
+    if names.contains(&DISPLACEMENT) {
+        return "holds the displacement of one mark and no angle, of which only `identify` can tell something; say where the mark hangs, with --pivot or pivot_px in [rig], and track again".to_owned();
     }
     let degrees = name.replace("_rad", "_deg");
     if degrees != name && names.contains(&degrees.as_str()) {

@@ -57,6 +57,37 @@ impl Bench {
 }
 
 #[test]
+fn a_displacement_has_a_frequency_and_a_damping_and_sizes_in_pixels() {
+    let mut text = "t_s,m1_x_px,displacement_px,displacement_sd_px\n".to_owned();
+    for row in 0..750 {
+        let t = f64::from(row) / 30.0;
+        // a ball on a spring, 60 px, 1.4 Hz, ξ = 0.01
+        let d = 60.0 * (-0.01 * 8.8 * t).exp() * (8.8 * t).cos() + 0.05 * (1000.0 * t * t).sin();
+        let _ = writeln!(text, "{t:.6},{:.4},{d:.4},0.05", 300.0 + d);
+    }
+    let bench = Bench::with(&text);
+    let output = bench.run(&["a.csv", "--json", "out.json"]);
+    let printed = String::from_utf8(output.stdout).unwrap();
+    assert!(output.status.success() && output.stderr.is_empty(), "{}", String::from_utf8_lossy(&output.stderr));
+    assert!(printed.contains("the displacement of one mark") && printed.contains(" px"), "{printed}");
+    assert!(!printed.contains('°') && !printed.contains('θ') && !printed.contains("rad"), "{printed}");
+    let json = std::fs::read_to_string(bench.folder.path().join("out.json")).unwrap();
+    let json: serde_json::Value = serde_json::from_str(&json).unwrap();
+    let mode = &json["modes"][0];
+    let holds = |value: &serde_json::Value, truth: f64| {
+        let [low, high] = ["low", "high"].map(|end| value[end].as_f64().unwrap());
+        assert!(low <= truth && truth <= high && high - low < 0.2 * truth, "{truth}: {value}");
+    };
+    holds(&mode["frequency_hz"], 8.8 * (1.0f64 - 1e-4).sqrt() / std::f64::consts::TAU);
+    holds(&mode["damping"]["identified"], 0.01);
+    let amplitude_px = mode["shape"][0]["amplitude_px"].as_f64().unwrap();
+    assert!((10.0..=61.0).contains(&amplitude_px), "{amplitude_px}");
+    let noise_px = json["record"]["noise_px"][0].as_f64().unwrap();
+    assert!((0.02..0.06).contains(&noise_px), "{noise_px}");
+    assert!(json["record"].get("noise_rad").is_none());
+}
+
+#[test]
 fn the_table_and_the_json_tell_the_same() {
     let bench = Bench::with(&good());
     let config = "[specimen]\nmass_kg = 0.3606e-3\nlink_lengths_m = [0.10, 0.10]\n[rig]\ngravity_m_s2 = 9.80665\n";

@@ -6,9 +6,9 @@ use super::table::number;
 use super::{Console, Target};
 use crate::error::{Error, Result};
 use crate::experiment::Experiment;
-use crate::identify::identify;
+use crate::identify::{identify, identify_displacement};
 use crate::output::OutputFile;
-use crate::series::AngleSeries;
+use crate::series::{AngleSeries, Measured};
 
 /// Find frequencies, damping and mode shapes in a table of angles, every estimator side by side.
 #[derive(Debug, clap::Args)]
@@ -20,8 +20,9 @@ Examples:
   track swing.mp4 --out - | freeswing identify -
 
 The first line is the answer: frequency and damping ratio of each mode, the strongest first, or why there is none. What
-drifts or turns over is no mode. The table needs t_s and theta1_rad, theta2_rad, …; other columns are ignored, an empty
-field is a missing value. With --config come the frequency floor of the specimen and K_eq, C_eq. All intervals are 95 %.
+drifts or turns over is no mode. The table needs t_s and theta1_rad, theta2_rad, …, or displacement_px, which `track`
+writes of one mark of which nobody knows where it hangs: then amplitudes are in pixels. Other columns are ignored, an
+empty field is a missing value. With --config come the frequency floor of the specimen and K_eq, C_eq. All intervals are 95 %.
 Exit code 0: done, also when something is not identifiable, which a warning says; 2: bad input, nothing written.")]
 pub struct IdentifyArgs {
     /// The table of angles; `-` for standard input.
@@ -52,14 +53,19 @@ impl IdentifyArgs {
         let experiment = self.config.as_deref().map(Experiment::read).transpose()?;
         let experiment = experiment.filter(|experiment| describes_specimen(experiment, console));
         let json = self.json.as_deref().map(OutputFile::create).transpose()?;
-        let series = self.stretch(super::read_angles(&self.angles, console)?)?;
-        let found = identify(&series, experiment.as_ref())?;
+        let (series, measured) = AngleSeries::read_motion(&self.angles)?;
+        series.warnings.iter().for_each(|warning| console.warning(warning));
+        let series = self.stretch(series)?;
+        let found = match measured {
+            Measured::Angles => identify(&series, experiment.as_ref())?,
+            Measured::Displacement => identify_displacement(&series),
+        };
         // where the first line of the report is not read, an answer without a mode must not pass for one
         if found.modes.is_empty() && !self.quiet {
             console.warning(format!("{}: {}", series.path.display(), found.summary));
         }
         let text = if self.quiet { String::new() } else { found.to_string() };
-        super::deliver(&text, &found, json, console)
+        super::deliver(&text, &found.to_json(), json, console)
     }
 
     /// The wanted stretch of time.

@@ -120,7 +120,7 @@ fn hinge_in_words(finding: &Finding) -> String {
             )
         }
         None if finding.marks.len() == 1 => {
-            "its path does not show where it hangs: its displacement is measured, no angle".to_owned()
+            "its path does not show where it hangs: its displacement is measured, no angle; `identify` tells frequency and damping of that, too".to_owned()
         }
         None => {
             "the path of the first mark does not show where it hangs: angles are measured between the marks".to_owned()

@@ -59,6 +59,10 @@ impl Samples {
 
 /// Codes of luma, and of a colour difference, by which a sample must differ from what usually is there.
 const LEAST_CHANGE: [u8; 3] = [14, 7, 7];
+/// Codes of luma above black from which a sample tells the light of a picture; a code's rounding is a fiftieth of it.
+const LEAST_LIGHT: f64 = 25.0;
+/// The code of a colour difference without colour.
+const NO_CHROMA: f64 = 128.0;
 /// Pictures below which nothing is known about what moves.
 const LEAST_PICTURES: usize = 3;
 
@@ -101,7 +105,7 @@ impl Album {
         self.allowed.as_ref().is_none_or(|a| a[at])
     }
 
-    /// Finds what moves, once all pictures are there.
+    /// Finds what moves, once all pictures are there: what differs from what usually is there in the light of the picture.
     pub fn compare(&mut self) {
         self.moved.clear();
         if self.pictures.len() < LEAST_PICTURES {
@@ -109,14 +113,35 @@ impl Album {
         }
         let usual = self.usual();
         for picture in &self.pictures {
+            let light = self.light(picture, &usual[0]);
             let mut moved = vec![false; usual[0].len()];
-            for ((codes, usual), least) in picture.channels().iter().zip(&usual).zip(LEAST_CHANGE) {
+            for (channel, ((codes, usual), least)) in
+                picture.channels().iter().zip(&usual).zip(LEAST_CHANGE).enumerate()
+            {
+                let zero = if channel == 0 { self.black() } else { NO_CHROMA };
+                let lit: [u8; 256] = std::array::from_fn(|code| (zero + light * (code as f64 - zero)).round() as u8);
                 for ((moved, code), usual) in moved.iter_mut().zip(*codes).zip(usual) {
-                    *moved |= code.abs_diff(*usual) > least;
+                    *moved |= code.abs_diff(lit[usize::from(*usual)]) > least;
                 }
             }
             self.moved.push(moved);
         }
+    }
+
+    /// The light of a picture over that of the usual one: the median ratio of luma. A camera that sets its exposure anew, and a lamp on the mains, change all
+    /// samples alike, and no mark covers half of them.
+    fn light(&self, picture: &Samples, usual: &[u8]) -> f64 {
+        let ratio = |(code, usual): (&u8, &u8)| {
+            let [code, usual] = [code, usual].map(|code| f64::from(*code) - self.black());
+            (usual >= LEAST_LIGHT).then(|| code / usual)
+        };
+        let mut ratios: Vec<f64> = picture.luma.iter().zip(usual).filter_map(ratio).collect();
+        median(&mut ratios).unwrap_or(1.0)
+    }
+
+    /// The code of luma without any light.
+    const fn black(&self) -> f64 {
+        if self.full_range { 0.0 } else { 16.0 }
     }
 
     /// The median picture: luma, C_b, C_r; of an even number of pictures the upper one of the two in the middle.
@@ -234,8 +259,8 @@ impl Album {
     }
 
     fn rgb_of(&self, [y, cb, cr]: [f64; 3]) -> [u8; 3] {
-        let (black, luma_span, chroma_span) = if self.full_range { (0.0, 255.0, 255.0) } else { (16.0, 219.0, 224.0) };
-        let ycbcr = [(y - black) / luma_span, (cb - 128.0) / chroma_span, (cr - 128.0) / chroma_span];
+        let (luma_span, chroma_span) = if self.full_range { (255.0, 255.0) } else { (219.0, 224.0) };
+        let ycbcr = [(y - self.black()) / luma_span, (cb - NO_CHROMA) / chroma_span, (cr - NO_CHROMA) / chroma_span];
         self.matrix.rgb(ycbcr).map(|c| (255.0 * c).round().clamp(0.0, 255.0) as u8)
     }
 }
@@ -277,6 +302,23 @@ mod tests {
         let moving = 65.0f64.atan2(-60.0);
         let peaks = album.hues(moving, 0.35);
         assert!(turn(peaks[0].angle_rad - moving).abs() < 0.01, "{peaks:?}");
+    }
+
+    #[test]
+    fn light_that_changes_moves_nothing() {
+        let mut pictures: Vec<Samples> = (0..5).map(|i| picture(6 * i, 68, 193)).collect();
+        for (n, picture) in pictures.iter_mut().enumerate() {
+            let light = 0.8 + 0.1 * n as f64;
+            let lit = |code: &mut u8, zero: f64| *code = (zero + light * (f64::from(*code) - zero)).round() as u8;
+            picture.luma.iter_mut().for_each(|code| lit(code, 16.0));
+            picture.cb.iter_mut().chain(&mut picture.cr).for_each(|code| lit(code, NO_CHROMA));
+        }
+        let mut album = Album { pictures, ..Album::default() };
+        album.compare();
+        for (n, moved) in album.moved.iter().enumerate() {
+            let own = |at: usize| (6 * n..6 * n + 6).contains(&(at % 40)) && (10..16).contains(&(at / 40));
+            assert!(moved.iter().enumerate().all(|(at, moved)| *moved == own(at)), "{n}");
+        }
     }
 
     #[test]

@@ -11,6 +11,7 @@ use super::half_power::HalfPower;
 use super::signal::Signal;
 use super::sinusoids::SinusoidFit;
 use super::spectrum::Spectrum;
+use super::unit::Unit;
 use super::windows::Windows;
 
 /// A way to a frequency or a damping ratio.
@@ -65,6 +66,7 @@ pub(super) struct Whole<'a> {
     pub fit: &'a SinusoidFit,
     pub windows: &'a Result<Windows, String>,
     pub noise_rad: &'a [f64],
+    pub unit: Unit,
 }
 
 /// What every method says about one mode.
@@ -100,7 +102,7 @@ impl Estimators {
             half_power(whole, &filled, mode),
             decrement(whole, &alone, mode),
             sinusoids(raw, excess[mode], envelope.as_ref().ok()),
-            windowed(envelope),
+            windowed(envelope, whole.unit),
         ];
         let nyquist_hz = 0.5 / whole.signal.step_s;
         let each = each.map(|e| e.resolved(nyquist_hz)).into();
@@ -249,7 +251,7 @@ fn decrement(whole: &Whole, alone: &Signal, mode: usize) -> Estimator {
         frequency_hz: found.as_ref().ok().map(|d| d.frequency_hz),
         damping_ratio: found.as_ref().ok().map(|d| d.damping_ratio),
         note: Some(match found {
-            Ok(d) => format!("θ{}, {} peaks, δ = {:.5}", link + 1, d.peaks, d.decrement.value),
+            Ok(d) => format!("{}, {} peaks, δ = {:.5}", whole.unit.name(link), d.peaks, d.decrement.value),
             Err(reason) => reason,
         }),
     }
@@ -280,7 +282,7 @@ fn sinusoids([f, xi]: [Estimate; 2], excess: f64, envelope: Option<&Envelope>) -
     Estimator { method: Method::Sinusoids, frequency_hz: Some(f), damping_ratio: Some(xi), note }
 }
 
-fn windowed(envelope: &Result<Envelope, String>) -> Estimator {
+fn windowed(envelope: &Result<Envelope, String>, unit: Unit) -> Estimator {
     let law = envelope.as_ref().ok().and_then(|e| e.frequency);
     let damping = envelope.as_ref().ok().and_then(|e| e.damping);
     Estimator {
@@ -290,8 +292,9 @@ fn windowed(envelope: &Result<Envelope, String>) -> Estimator {
         note: Some(match envelope {
             Ok(e) => match law {
                 Some(l) => format!(
-                    "{} windows; at small amplitude, κ = {:.4} ± {:.4} /rad²",
-                    e.windows, l.kappa_per_rad2.value, l.kappa_per_rad2.sd
+                    "{} windows; at small amplitude, κ = {}",
+                    e.windows,
+                    unit.per_square(l.kappa_per_rad2.value, l.kappa_per_rad2.sd)
                 ),
                 None => format!("{} windows do not tell f against amplitude", e.windows),
             },

@@ -33,6 +33,7 @@ pub mod spectrum;
 mod summary;
 mod table;
 pub mod tumbling;
+mod unit;
 pub mod windows;
 
 use serde::Serialize;
@@ -41,6 +42,7 @@ pub use damping::{Damping, Trend};
 pub use estimate::Estimate;
 pub use estimators::{Estimator, Method};
 pub use mode::{LinkMotion, Mode};
+pub use unit::Unit;
 
 use crate::error::Result;
 use crate::experiment::{Experiment, Rig};
@@ -74,6 +76,9 @@ pub struct Record {
     pub noise_rad: Vec<f64>,
     /// Whether the times are 0, 1, 2, … or go on so from another number.
     pub counts: bool,
+    /// Angles, or a displacement.
+    #[serde(skip)]
+    pub unit: Unit,
 }
 
 impl Record {
@@ -118,17 +123,27 @@ pub struct Identification {
 pub fn identify(series: &AngleSeries, experiment: Option<&Experiment>) -> Result<Identification> {
     let body = experiment.map(|e| Ok(Body { experiment: e, chain: Chain::of(&e.specimen)? })).transpose()?;
     let (signal, wrapped) = Signal::of(series).unwrapped();
-    let mut found = Identification::of_record(series, &signal);
+    let mut found = Identification::of_record(series, &signal, Unit::Angle);
     for link in wrapped {
         found.notes.push(format!("θ{} jumps by full turns, as wrapped angles do: taken out", link + 1));
     }
     found.tumbling = Tumbling::of(&signal);
-    match found.swing_of(signal) {
-        Ok((signal, chosen)) => found.add_modes(&signal, chosen, body.as_ref()),
-        Err(reason) => found.notes.push(format!("{}{reason}", summary::NOTHING)),
+    Ok(found.with_modes(signal, body.as_ref()))
+}
+
+/// Identifies the displacement of one mark, over [`crate::series::PX_PER_RAD`].
+pub fn identify_displacement(series: &AngleSeries) -> Identification {
+    let signal = Signal::of(series);
+    Identification::of_record(series, &signal, Unit::Displacement).with_modes(signal, None)
+}
+
+impl Identification {
+    /// As JSON; of a displacement, keys that end in `_rad` end in `_px`.
+    pub fn to_json(&self) -> serde_json::Value {
+        // numbers, strings and lists of them cannot fail to serialise
+        let json = serde_json::to_value(self).unwrap_or_default();
+        self.record.unit.of_json(json)
     }
-    found.summary = summary::summary(&found);
-    Ok(found)
 }
 
 /// What swings, where the experiment file tells it.
@@ -139,7 +154,7 @@ struct Body<'a> {
 
 impl Identification {
     /// What can be said before anything is fitted.
-    fn of_record(series: &AngleSeries, signal: &Signal) -> Self {
+    fn of_record(series: &AngleSeries, signal: &Signal, unit: Unit) -> Self {
         let record = Record {
             source: series.path.display().to_string(),
             rows: series.len(),
@@ -150,6 +165,7 @@ impl Identification {
             noise_rad: Vec::new(),
             counts: series.t_s.windows(2).all(|pair| pair[1] - pair[0] == 1.0)
                 && series.t_s.first().is_some_and(|t| t.fract() == 0.0),
+            unit,
         };
         let spectrum = Spectrum::of(&signal.levelled(), record.irregular_share);
         Self {
@@ -166,6 +182,15 @@ impl Identification {
             floor: None,
             equivalents: None,
         }
+    }
+
+    fn with_modes(mut self, signal: Signal, body: Option<&Body>) -> Self {
+        match self.swing_of(signal) {
+            Ok((signal, chosen)) => self.add_modes(&signal, chosen, body),
+            Err(reason) => self.notes.push(format!("{}{reason}", summary::NOTHING)),
+        }
+        self.summary = summary::summary(&self);
+        self
     }
 
     /// The part of the record that is a swing, with its modes; or why there is none.
@@ -194,7 +219,8 @@ impl Identification {
             Err(_) => fit.links.iter().map(|l| l.noise_rad).collect(),
         };
         let noise_rad = &self.record.noise_rad;
-        let whole = Whole { signal, spectrum: &self.spectrum, fit: &fit, windows: &windows, noise_rad };
+        let unit = self.record.unit;
+        let whole = Whole { signal, spectrum: &self.spectrum, fit: &fit, windows: &windows, noise_rad, unit };
         let gravity_m_s2 = body.map_or(Rig::default().gravity_m_s2, |b| b.experiment.rig.gravity_m_s2);
         let same_links = body.map(|b| &b.chain).filter(|chain| chain.count() == signal.links.len());
         let mut modes: Vec<Mode> =

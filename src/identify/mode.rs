@@ -9,6 +9,7 @@ use super::envelope::{Envelope, FrequencyLaw};
 use super::estimate::{Estimate, probability};
 use super::estimators::{Estimator, Estimators, Whole};
 use super::floor::amplitude_dependence;
+use super::unit::Unit;
 use super::windows::Windows;
 use crate::model::chain::Chain;
 
@@ -62,6 +63,9 @@ pub struct Mode {
     pub expected_kappa_per_rad2: Option<f64>,
     /// What the reader should know.
     pub notes: Vec<String>,
+    /// In what its sizes are told.
+    #[serde(skip)]
+    pub unit: Unit,
 }
 
 impl Mode {
@@ -81,7 +85,12 @@ impl Mode {
             number: mode + 1,
             rms_rad: whole.fit.strength(mode, duration_s).sqrt(),
             damping_trend: envelope.as_ref().filter(changes).map(Trend::of),
-            expected_kappa_per_rad2: expected_kappa(&shape, whole.fit.poles[mode].frequency_hz(), chain, gravity_m_s2),
+            expected_kappa_per_rad2: match whole.unit {
+                Unit::Angle => expected_kappa(&shape, whole.fit.poles[mode].frequency_hz(), chain, gravity_m_s2),
+                // nobody knows what angle it is of
+                Unit::Displacement => None,
+            },
+            unit: whole.unit,
             frequency_hz: choice.frequency_hz,
             damping: Damping::of(choice.damping_ratio, &raw[1], duration_s),
             basis: choice.basis,
@@ -177,7 +186,7 @@ impl Mode {
                 "a pendulum of {f_hz:.2e} Hz would be {pendulum_m:.0} m long: is t_s in milliseconds, or a frame number?"
             ));
         }
-        if f_hz > FASTEST_SWING_HZ && amplitude_rad > 0.1 {
+        if self.unit == Unit::Angle && f_hz > FASTEST_SWING_HZ && amplitude_rad > 0.1 {
             return Some(format!(
                 "a pendulum of {f_hz:.0} Hz would be {:.2} mm long: is t_s in minutes?",
                 1e3 * pendulum_m

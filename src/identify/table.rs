@@ -13,7 +13,7 @@ impl Display for Identification {
         writeln!(f, "{}", self.summary)?;
         self.record.fmt(f)?;
         if self.drift_rad.iter().any(|d| *d > 0.0) {
-            let each: Vec<String> = self.drift_rad.iter().map(|d| format!("{:.3}°", d.to_degrees())).collect();
+            let each: Vec<String> = self.drift_rad.iter().map(|d| self.record.unit.show(*d, 3)).collect();
             writeln!(f, "  drift over the record {}, no part of any mode", each.join(", "))?;
         }
         if let Some(count) = &self.mode_count {
@@ -62,21 +62,21 @@ impl Display for Record {
     fn fmt(&self, f: &mut Formatter<'_>) -> fmt::Result {
         writeln!(
             f,
-            "{}: {} rows, {:.2} s, {:.3} Hz, {} angle{}",
+            "{}: {} rows, {:.2} s, {:.3} Hz, {}",
             self.source,
             self.rows,
             self.duration_s,
             1.0 / self.step_s,
-            self.values.len(),
-            if self.values.len() == 1 { "" } else { "s" }
+            self.unit.columns(self.values.len())
         )?;
-        let noise: Vec<String> = self.noise_rad.iter().map(|n| format!("{:.4}°", n.to_degrees())).collect();
+        let noise: Vec<String> = self.noise_rad.iter().map(|n| self.unit.show(*n, 4)).collect();
         if noise.is_empty() { Ok(()) } else { writeln!(f, "  noise {}", noise.join(", ")) }
     }
 }
 
 impl Display for Mode {
     fn fmt(&self, f: &mut Formatter<'_>) -> fmt::Result {
+        let unit = self.unit;
         writeln!(f, "  f = {} Hz", interval(&self.frequency_hz, 5))?;
         match &self.damping {
             Damping::Identified(xi) => writeln!(f, "  ξ = {}", interval(xi, 6))?,
@@ -84,7 +84,7 @@ impl Display for Mode {
         }
         writeln!(f, "  from: {}", self.basis)?;
         for (link, motion) in self.shape.iter().enumerate() {
-            write!(f, "  θ{} amplitude {:.2}°", link + 1, motion.amplitude_rad.to_degrees())?;
+            write!(f, "  {} amplitude {}", unit.name(link), unit.show(motion.amplitude_rad, 2))?;
             if link > 0 {
                 let (ratio, phase) =
                     (&motion.ratio_to_first, motion.phase_to_first_rad.times(180.0 / std::f64::consts::PI));
@@ -135,8 +135,9 @@ impl Display for Mode {
 impl Mode {
     /// Frequency and damping from window to window, a dozen lines at most.
     fn against_amplitude(&self, f: &mut Formatter<'_>) -> fmt::Result {
+        let unit = self.unit;
         let Some(envelope) = &self.envelope else { return Ok(()) };
-        writeln!(f, "  {:>8}{:>12}{:>26}{:>28}", "t (s)", "A (°)", "f (Hz)", "ξ")?;
+        writeln!(f, "  {:>8}{:>12}{:>26}{:>28}", "t (s)", format!("A ({})", unit.symbol()), "f (Hz)", "ξ")?;
         let every = envelope.steps.len().div_ceil(12).max(1);
         for step in envelope.steps.iter().step_by(every) {
             let (frequency, damping) = (&step.frequency_hz, &step.damping_ratio);
@@ -144,7 +145,7 @@ impl Mode {
                 f,
                 "  {:8.2}{:12.3}{:>26}{:>28}",
                 step.t_s,
-                step.amplitude_rad.to_degrees(),
+                unit.shown(step.amplitude_rad),
                 format!("{:.5} ± {:.5}", frequency.value, frequency.half()),
                 format!("{:.6} ± {:.6}", damping.value, damping.half())
             )?;
@@ -154,19 +155,20 @@ impl Mode {
                 self.expected_kappa_per_rad2.map(|k| format!("; a pendulum of this shape {k:.4}")).unwrap_or_default();
             writeln!(
                 f,
-                "  f = f₀(1 − κA²): f₀ = {} Hz, κ = {} /rad²{expected}",
+                "  f = f₀(1 − κA²): f₀ = {} Hz, κ = {}{expected}",
                 interval(&law.f0_hz, 5),
-                interval(&law.kappa_per_rad2, 4)
+                unit.interval_per_square(&law.kappa_per_rad2)
             )?;
         }
         if let Some(law) = envelope.decay {
             writeln!(
                 f,
-                "  dA/dt = −(b₀ + b₁A + b₂A²): b₀ = {} rad/s, b₁ = {} /s, b₂ = {} /(rad s); viscous alone {} (a picture, no verdict)",
-                scientific(&law.b0_rad_per_s),
+                "  dA/dt = −(b₀ + b₁A + b₂A²): b₀ = {} {own}/s, b₁ = {} /s, b₂ = {} /({own} s); viscous alone {} (a picture, no verdict)",
+                scientific(&law.b0_rad_per_s.times(unit.own_per_rad())),
                 scientific(&law.b1_per_s),
-                scientific(&law.b2_per_rad_s),
-                probability(law.p_viscous)
+                scientific(&law.b2_per_rad_s.times(1.0 / unit.own_per_rad())),
+                probability(law.p_viscous),
+                own = unit.own()
             )?;
         }
         Ok(())
@@ -174,7 +176,7 @@ impl Mode {
 }
 
 /// `value [low, high]`.
-fn interval(e: &Estimate, digits: usize) -> String {
+pub(super) fn interval(e: &Estimate, digits: usize) -> String {
     format!("{:.digits$} [{:.digits$}, {:.digits$}]", e.value, e.low, e.high)
 }
 

@@ -71,13 +71,7 @@ impl Formula {
     }
 
     /// The formula at every place of the chain where it acts.
-    fn visit<N>(
-        &self,
-        evaluate: Evaluate<N>,
-        chain: &Chain,
-        motion: &Motion,
-        mut each: impl FnMut(&Acts<'_>, N),
-    ) {
+    fn visit<N>(&self, evaluate: Evaluate<N>, chain: &Chain, motion: &Motion, mut each: impl FnMut(&Acts<'_>, N)) {
         let (theta, rate, t_s) = (&motion.theta_rad, &motion.rate, motion.t_s);
         let at = |state: &[f64]| self.at(evaluate, state, motion.hinge.sign());
         match self.place {
