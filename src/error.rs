@@ -53,7 +53,7 @@ pub enum Error {
     NoMarks { path: PathBuf, colour: String, frames: u64, found: String, remedy: String },
 
     /// A recording in which nothing looks like marks that swing.
-    #[error("{}: nothing in {frames} frames swings like marks: {found}; put round marks of one clear colour on what swings, or name what is there with `track --color`", path.display())]
+    #[error("{}: nothing in {frames} frames swings like marks: {found}; leave out a hand at the beginning with --from, put round marks of one clear colour on what swings, or name what is there with `track --color`", path.display())]
     NothingSwings { path: PathBuf, frames: usize, found: String },
 
     /// Fewer marks than asked for.

@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
-use freeswing::video::{Container, Decoded, Frame, Recording, StillTimes, decode_in_order, decode_one_by_one};
+use freeswing::video::{Container, Decoded, Frame, Recording, StillTimes, WHOLE_S, decode_in_order, decode_one_by_one};
 
 /// A moving test picture of 150 frames, coded by the `ffmpeg` program with `options`.
 fn clip(folder: &Path, name: &str, options: &[&str]) -> PathBuf {
@@ -132,7 +132,7 @@ fn sampled_pictures_are_those_of_the_whole_recording_one_key_frame_or_many() {
         let whole = decode_whole(&path);
         let mut sampled = Vec::new();
         let recording = Recording::open(&path, &StillTimes::Beside).unwrap();
-        recording.sample(8, &mut |frame| sampled.push(fingerprint(*frame))).unwrap();
+        recording.sample(8, WHOLE_S, &mut |frame| sampled.push(fingerprint(*frame))).unwrap();
         let places: Vec<usize> =
             sampled.iter().map(|seen| whole.iter().position(|frame| frame == seen).expect(name)).collect();
         assert_eq!(places.len(), 8, "{name}");
@@ -201,4 +201,21 @@ fn the_real_recording_has_the_stamps_that_ffprobe_reports() {
     .unwrap();
     assert_eq!((ours.len(), stamps.len()), (2054, 2054));
     assert!(ours.iter().zip(&stamps).all(|(a, b)| (a - b).abs() <= 1e-6));
+}
+
+#[test]
+fn pictures_of_a_part_come_from_that_part() {
+    let folder = tempfile::tempdir().unwrap();
+    let many_key_frames = clip(folder.path(), "often.mp4", &["-c:v", "libx264", "-g", "25"]);
+    let one_key_frame = clip(folder.path(), "once.mp4", &["-c:v", "libx264", "-g", "1000"]);
+    for (path, least) in [(many_key_frames, 6), (one_key_frame, 2)] {
+        let recording = Recording::open(&path, &StillTimes::Beside).unwrap();
+        let mut seen = Vec::new();
+        recording.sample(8, [2.0, 4.0], &mut |frame| seen.push(frame.t_s)).unwrap();
+        assert!(
+            seen.len() >= least && seen.iter().all(|t_s| (2.0..=4.0).contains(t_s)),
+            "{}: {seen:?}",
+            path.display()
+        );
+    }
 }

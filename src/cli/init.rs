@@ -2,8 +2,10 @@
 
 use std::path::{Path, PathBuf};
 
+use super::track::rectangle;
 use super::{Console, Target};
 use crate::error::{Error, Result};
+use crate::experiment::Rig;
 use crate::look::{Finding, look, preview, to_toml};
 use crate::measure::Options;
 use crate::output::OutputFile;
@@ -14,6 +16,7 @@ use crate::output::OutputFile;
 Examples:
   freeswing init swing.mp4
   freeswing init swing.mp4 --out rig/experiment.toml --preview seen.png
+  freeswing init swing.mp4 --from 2.5
   track swing.mp4 --config experiment.toml --out angles.csv
 
 The file names the marks in order from the hinge down, their colours, the hinge or the point they swing about, their
@@ -29,6 +32,15 @@ pub struct InitArgs {
     /// A picture of what was found.
     #[arg(long, value_name = "PNG")]
     preview: Option<Target>,
+    /// Look only at this part of the picture: left, top, width, height, displayed pixels.
+    #[arg(long, value_name = "X,Y,W,H", value_parser = rectangle, allow_hyphen_values = true)]
+    roi: Option<[f64; 4]>,
+    /// Leave out what comes before, seconds of the file: a hand that lets go.
+    #[arg(long, value_name = "S")]
+    from: Option<f64>,
+    /// Leave out what comes from this time on.
+    #[arg(long, value_name = "S")]
+    until: Option<f64>,
     /// Replace an existing experiment file.
     #[arg(long)]
     force: bool,
@@ -51,17 +63,31 @@ impl InitArgs {
         let bar = console.bar_of_frames(self.quiet);
         let out = OutputFile::create(&self.out)?;
         let picture = self.preview.as_deref().map(OutputFile::create).transpose()?;
-        let finding = look(&self.video, &Options::default(), Path::new(""), &bar)?;
+        let options = Options { rig: self.part()?, ..Options::default() };
+        let finding = look(&self.video, &options, Path::new(""), &bar)?;
         drop(bar);
         if let Some(picture) = picture {
             picture.commit(&preview(&finding)?)?;
         }
         let name = self.video.file_name().map_or_else(String::new, |n| n.to_string_lossy().into_owned());
-        out.commit(to_toml(&finding, &name).as_bytes())?;
+        out.commit(to_toml(&finding, &name, &options.rig).as_bytes())?;
         if !self.quiet {
             self.report(&finding, console);
         }
         Ok(())
+    }
+
+    /// The part that is looked at.
+    fn part(&self) -> Result<Rig> {
+        let part = Rig { roi_px: self.roi, from_s: self.from, until_s: self.until, ..Rig::default() };
+        part.validate().map_err(|message| {
+            let named = [("rig.roi_px", "--roi"), ("rig.from_s", "--from"), ("rig.until_s", "--until")]
+                .into_iter()
+                .fold(message, |text, (key, option)| text.replace(key, option));
+            let (option, message) = named.split_once(": ").unwrap_or(("options", &named));
+            Error::Option { option: option.to_owned(), message: message.to_owned() }
+        })?;
+        Ok(part)
     }
 
     /// The preview is a PNG.

@@ -131,7 +131,7 @@ enum Steady {
     Never,
 }
 
-fn rectangle(text: &str) -> std::result::Result<[f64; 4], String> {
+pub(super) fn rectangle(text: &str) -> std::result::Result<[f64; 4], String> {
     let numbers: Vec<f64> = text.split(',').filter_map(|n| n.trim().parse().ok()).collect();
     match numbers[..] {
         [x, y, width, height] if numbers.iter().all(|v| v.is_finite()) => Ok([x, y, width, height]),
@@ -316,8 +316,10 @@ impl TrackArgs {
         }
         let links = &measurement.angles.links;
         let measured = (0..measurement.timing.frames).filter(|f| links.iter().all(|l| l[*f].is_some())).count();
+        let what =
+            if links.is_empty() { "a displacement, no angle".to_owned() } else { format!("all angles in {measured}") };
         console.remark(format!(
-            "{}: {} frame{}, all angles in {measured}, written to {}",
+            "{}: {} frame{}, {what}, written to {}",
             self.video.display(),
             measurement.timing.frames,
             if measurement.timing.frames == 1 { "" } else { "s" },

@@ -78,7 +78,8 @@ pub enum Trend {
 }
 
 impl Trend {
-    /// Of the steps from window to window: means over fifths of them by amplitude, three standard deviations apart.
+    /// Of the steps from window to window: means over fifths of them by amplitude, three standard deviations apart. Every law goes with a power of the amplitude
+    /// between that of dry friction, −1, and that of drag, 1: where ξ changes by more than the amplitude does, it is something else, as another mode.
     pub(super) fn of(envelope: &Envelope) -> Self {
         let mut steps: Vec<_> = envelope.steps.iter().collect();
         steps.sort_by(|a, b| b.amplitude_rad.total_cmp(&a.amplitude_rad));
@@ -93,6 +94,12 @@ impl Trend {
         let means: Vec<[f64; 2]> = steps.chunks(fifth).map(mean).collect();
         let above = |a: &[f64; 2], b: &[f64; 2]| a[0] - b[0] > 3.0 * a[1].hypot(b[1]);
         let [large, between @ .., small] = &means[..] else { return Self::Uneven };
+        let amplitudes = steps.first().zip(steps.last()).map(|(a, b)| a.amplitude_rad / b.amplitude_rad);
+        let most = means.iter().map(|m| m[0] - 2.0 * m[1]).fold(0.0, f64::max);
+        let least = means.iter().map(|m| m[0] + 2.0 * m[1]).fold(f64::INFINITY, f64::min);
+        if amplitudes.is_none_or(|ratio| most > ratio * least) {
+            return Self::Uneven;
+        }
         match between.iter().min_by(|a, b| a[0].total_cmp(&b[0])) {
             Some(least) if above(large, least) && above(small, least) => Self::LeastBetween,
             _ if above(large, small) => Self::GrowsWithAmplitude,

@@ -171,14 +171,16 @@ fn decide(signal: &Signal, spectrum: &Spectrum, one: SinusoidFit, two: SinusoidF
     let p_value = improvement.p_value(&two);
     let times = two.poles[weak].frequency_hz() / two.poles[strong].frequency_hz();
     let (large, small) = (two.amplitude_rad(strong), two.amplitude_rad(weak));
-    // sin θ gives a third harmonic of A³/192, a chain a few times that
-    let harmonic = (times - times.round()).abs() < 0.03 && times.round() >= 2.0 && small < 0.05 * large.powi(3);
+    // sin θ gives a third harmonic of A³/192, a chain a few times that; an error that goes with the place in the picture gives others, no larger than what a value errs
+    let noise_rad = two.links.iter().map(|link| link.noise_rad).fold(0.0, f64::max);
+    let most = noise_rad.max(0.05 * large.powi(3));
+    let harmonic = (times - times.round()).abs() < 0.03 && times.round() >= 2.0 && small < most;
     let modes = if p_value < LEAST_P && bic_gain > 10.0 && !harmonic { 2 } else { 1 };
     let statement = if harmonic {
         format!(
-            "one mode; the line at {:.4} Hz is its harmonic number {:.0} ({small:.1e} rad)",
+            "one mode; the line at {:.4} Hz is its harmonic number {times:.0}, {:.1e} of its amplitude",
             two.poles[weak].frequency_hz(),
-            times
+            small / large
         )
     } else if modes == 2 {
         format!("two modes: the second lowers the information criterion by {bic_gain:.0} ({})", probability(p_value))

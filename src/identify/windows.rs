@@ -64,7 +64,7 @@ impl Windows {
         let count = (cycles / WINDOW_CYCLES).floor();
         if count < 3.0 {
             return Err(format!(
-                "{cycles:.1} cycles are too few to see an amplitude change; record at least {:.0}",
+                "{cycles:.1} cycles are too few to see an amplitude change; record at least {:.0} cycles",
                 3.0 * WINDOW_CYCLES
             ));
         }

@@ -4,6 +4,7 @@ use std::fmt::Write as _;
 
 use super::Finding;
 use crate::caution::MOST_LENGTH_SPREAD;
+use crate::experiment::Rig;
 use crate::statistics::median;
 use crate::track::Thing;
 
@@ -36,8 +37,8 @@ impl Finding {
     }
 }
 
-/// The text of the file for a recording named `video`.
-pub fn to_toml(finding: &Finding, video: &str) -> String {
+/// The text of the file for a recording named `video`, of which this part was looked at.
+pub fn to_toml(finding: &Finding, video: &str, part: &Rig) -> String {
     let mut text = format!(
         "# Written by `freeswing init {video}` from what the recording shows. Every line can be changed by hand.\n\
          # Next: track {video} --config THIS_FILE --out angles.csv\n\
@@ -47,11 +48,29 @@ pub fn to_toml(finding: &Finding, video: &str) -> String {
     );
     specimen(&mut text, finding);
     rig(&mut text, finding);
+    looked_at(&mut text, part);
     text
 }
 
+/// The part of the pictures and of the recording that was looked at.
+fn looked_at(text: &mut String, part: &Rig) {
+    let _ = match part.roi_px {
+        Some([x, y, w, h]) => writeln!(text, "roi_px = [{x}, {y}, {w}, {h}]"),
+        None => writeln!(text, "# roi_px = [x, y, w, h]       # seek marks only in this part of the picture"),
+    };
+    if part.from_s.is_none() && part.until_s.is_none() {
+        text.push_str("# from_s = 0.0                # leave out what comes before, until_s what comes after\n");
+    }
+    for (key, value) in [("from_s", part.from_s), ("until_s", part.until_s)] {
+        if let Some(value) = value {
+            let _ = writeln!(text, "{key} = {value:?}");
+        }
+    }
+}
+
 fn specimen(text: &mut String, finding: &Finding) {
-    let links = finding.links();
+    // of one mark of which nobody knows where it hangs, too
+    let links = finding.links().max(1);
     text.push_str("[specimen]\n");
     text.push_str("name = \"unnamed\"              # for reports\n");
     let _ = writeln!(
@@ -99,8 +118,6 @@ fn rig(text: &mut String, finding: &Finding) {
     text.push_str(
         "# plumb_px = [[x, y], [x, y]] # two points of a plumb line, upper first, if the camera hangs askew\n",
     );
-    text.push_str("# roi_px = [x, y, w, h]       # seek marks only in this part of the picture\n");
-    text.push_str("# from_s = 0.0                # leave out what comes before, until_s what comes after\n");
 }
 
 /// Where the first of some things are; `None` of none.

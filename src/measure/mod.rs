@@ -154,7 +154,7 @@ impl<'a> Session<'a> {
         let calibration = Calibration::new(&options.rig, stream.pixel_aspect, folder)?;
         let area = Area::new(&options.rig, folder, stream.orientation.size(stream.stored_size_px))?;
         let (mut hues, slots) = hues_of(&options.marks);
-        let pictures = survey::pictures(&recording)?;
+        let pictures = survey::pictures(&recording, &options.rig)?;
         let album = survey::album(&pictures, &area, stream.orientation);
         let marks = || {
             album.calibrate(&mut hues, options.threshold)?;

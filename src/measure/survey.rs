@@ -7,8 +7,9 @@ use super::{Camera, Options, Steadying};
 use crate::area::Area;
 use crate::detect::{Album, Detector, Hue, Siting, SitingSurvey};
 use crate::error::Result;
+use crate::experiment::Rig;
 use crate::steady::Background;
-use crate::video::{Orientation, OwnedPicture, Recording, StreamInfo};
+use crate::video::{Orientation, OwnedPicture, Recording, StreamInfo, WHOLE_S};
 
 /// Pictures from which hue, scale, threshold and siting are learnt.
 const SAMPLE_PICTURES: usize = 8;
@@ -18,10 +19,15 @@ const CAMERA_MOVES_PX: f64 = 0.3;
 const SURE_SHIFT: f64 = 5.0;
 const FEWEST_PICTURES: usize = 3;
 
-/// The pictures.
-pub fn pictures(recording: &Recording) -> Result<Vec<OwnedPicture>> {
+/// The pictures, of the part of the recording that is measured.
+pub fn pictures(recording: &Recording, rig: &Rig) -> Result<Vec<OwnedPicture>> {
     let mut pictures = Vec::new();
-    recording.sample(SAMPLE_PICTURES, &mut |frame| pictures.push(frame.picture.to_owned()))?;
+    let span_s = [rig.from_s.unwrap_or(WHOLE_S[0]), rig.until_s.unwrap_or(WHOLE_S[1])];
+    recording.sample(SAMPLE_PICTURES, span_s, &mut |frame| pictures.push(frame.picture.to_owned()))?;
+    if pictures.is_empty() {
+        // whether there is such a part turns out when the frames are read
+        recording.sample(SAMPLE_PICTURES, WHOLE_S, &mut |frame| pictures.push(frame.picture.to_owned()))?;
+    }
     Ok(pictures)
 }
 

@@ -263,13 +263,11 @@ fn score(kept: &[&Candidate], assignment: &[Option<usize>]) -> f64 {
     let chosen: Vec<&Candidate> = assignment.iter().flatten().map(|i| kept[*i]).collect();
     // of two halves of a track, before a gap and after it, the first: what follows it will be found again
     let presence: f64 = chosen.iter().map(|c| c.presence - c.lateness).sum();
-    // what swings first below the pivot keeps its distance from it: of two like pendulums, the one that swings about it
-    let from_pivot = assignment
-        .first()
-        .copied()
-        .flatten()
-        .filter(|first| kept[*first].moves)
-        .map_or(0.0, |first| kept[first].pivot_stretch);
+    // a mark by itself has no distance to another that tells it: of two like pendulums, the one that swings about the pivot
+    let from_pivot = match assignment {
+        [only] => only.map_or(0.0, |only| kept[only].pivot_stretch),
+        _ => 0.0,
+    };
     let stretch = chosen.windows(2).map(|w| stretch(w[0], w[1])).fold(from_pivot, f64::max);
     let mean = chosen.iter().map(|c| c.ln_area).sum::<f64>() / chosen.len().max(1) as f64;
     let unlike = (chosen.iter().map(|c| (c.ln_area - mean).powi(2)).sum::<f64>() / chosen.len().max(1) as f64).sqrt();

@@ -22,7 +22,7 @@ pub use encode::{TICKS_PER_SECOND, VideoWriter};
 pub use frame::Frame;
 pub use orientation::Orientation;
 pub use picture::{Layout, Matrix, OwnedPicture, Picture, Plane};
-pub use recording::Recording;
+pub use recording::{Recording, WHOLE_S};
 pub use still_times::StillTimes;
 pub use stills::{Stills, stills_in};
 pub use timing::{Gap, Timing};

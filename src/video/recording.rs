@@ -10,6 +10,9 @@ use super::still_times::StillTimes;
 use super::stills::Stills;
 use crate::error::{Error, Result};
 
+/// A span of time from the beginning of a recording to its end.
+pub const WHOLE_S: [f64; 2] = [f64::NEG_INFINITY, f64::INFINITY];
+
 /// A recording, opened.
 pub enum Recording {
     /// One file.
@@ -93,18 +96,19 @@ impl Recording {
         }
     }
 
-    /// Shows `count` pictures at even distances; where seeking fails, fewer of them.
+    /// Shows `count` pictures at even distances between two time stamps; where seeking fails, fewer of them.
     ///
     /// # Errors
     /// As [`Container::open`]; [`Error::NotAVideo`] where no decoder can be opened.
-    pub fn sample(&self, count: usize, see: &mut dyn FnMut(&Frame<'_>)) -> Result<()> {
+    pub fn sample(&self, count: usize, span_s: [f64; 2], see: &mut dyn FnMut(&Frame<'_>)) -> Result<()> {
         match self {
-            Self::Container(container) => sample_container(container.path(), count, see),
+            Self::Container(container) => sample_container(container.path(), count, span_s, see),
             Self::Stills(stills) => {
-                let stills_count = stills.files().len();
-                let mut indices: Vec<usize> = (0..count).map(|i| i * stills_count / count).collect();
-                indices.dedup();
-                indices.into_iter().for_each(|i| stills.show(i, see));
+                let within = |i: &usize| (span_s[0]..=span_s[1]).contains(&stills.stamps_s()[*i]);
+                let shown: Vec<usize> = (0..stills.files().len()).filter(within).collect();
+                let mut places: Vec<usize> = (0..count).map(|i| i * shown.len() / count).collect();
+                places.dedup();
+                places.into_iter().filter_map(|place| shown.get(place)).for_each(|i| stills.show(*i, see));
                 Ok(())
             }
         }
@@ -163,14 +167,21 @@ fn opened(path: &Path, threads: usize) -> Result<(Container, StreamDecoder)> {
     Ok((container, decoder))
 }
 
-fn sample_container(path: &Path, count: usize, see: &mut dyn FnMut(&Frame<'_>)) -> Result<()> {
+fn sample_container(
+    path: &Path,
+    count: usize,
+    [from_s, until_s]: [f64; 2],
+    see: &mut dyn FnMut(&Frame<'_>),
+) -> Result<()> {
     let (mut container, mut decoder) = opened(path, 1)?;
-    let duration_s = container.stated_duration_s().unwrap_or(0.0);
+    let begin_s = from_s.max(0.0);
+    let duration_s = container.stated_duration_s().unwrap_or(0.0).min(until_s) - begin_s;
     let mut last_s = f64::NEG_INFINITY;
     // the packet that the decoder began with, and how many it has had
     let (mut began, mut sent) = (None, 0);
     for sample in 0..count {
-        if sample > 0 && (duration_s <= 0.0 || container.seek(duration_s * sample as f64 / count as f64).is_err()) {
+        let at_s = begin_s + duration_s * sample as f64 / count as f64;
+        if at_s > 0.0 && (duration_s <= 0.0 || container.seek(at_s).is_err()) {
             break;
         }
         let mut next = || container.next_packet().ok().flatten();
@@ -194,6 +205,12 @@ fn sample_container(path: &Path, count: usize, see: &mut dyn FnMut(&Frame<'_>)) 
         let _ = decoder.go_on(&mut packets, &mut |frame| {
             later += usize::from(frame.t_s > last_s);
             repeated |= last_s > 0.0 && later == 0;
+            if frame.t_s < from_s {
+                return ControlFlow::Continue(());
+            }
+            if frame.t_s > until_s {
+                return ControlFlow::Break(());
+            }
             if later < if repeated { FRAMES_BETWEEN } else { SAMPLE_FRAMES } {
                 return ControlFlow::Continue(());
             }
