@@ -32,6 +32,11 @@ impl Console {
         self.log(&line);
     }
 
+    /// Everything that a person should know of one thing.
+    pub fn warnings(&self, texts: &[impl Display]) {
+        texts.iter().for_each(|text| self.warning(text));
+    }
+
     /// What was done, beside the result.
     pub fn remark(&self, line: impl Display) {
         match &self.run {

@@ -54,7 +54,7 @@ impl IdentifyArgs {
         let experiment = experiment.filter(|experiment| describes_specimen(experiment, console));
         let json = self.json.as_deref().map(OutputFile::create).transpose()?;
         let (series, measured) = AngleSeries::read_motion(&self.angles)?;
-        series.warnings.iter().for_each(|warning| console.warning(warning));
+        console.warnings(&series.warnings);
         let series = self.stretch(series)?;
         let found = match measured {
             Measured::Angles => identify(&series, experiment.as_ref())?,
@@ -65,7 +65,10 @@ impl IdentifyArgs {
             console.warning(format!("{}: {}", series.path.display(), found.summary));
         }
         let text = if self.quiet { String::new() } else { found.to_string() };
-        super::deliver(&text, &found.to_json(), json, console)
+        match measured {
+            Measured::Angles => super::deliver(&text, &found, json, console),
+            Measured::Displacement => super::deliver(&text, &found.json_in_px(), json, console),
+        }
     }
 
     /// The wanted stretch of time.
@@ -98,7 +101,7 @@ impl IdentifyArgs {
 
 /// Whether a file describes a specimen; what is missing or odd is said on standard error.
 fn describes_specimen(experiment: &Experiment, console: &Console) -> bool {
-    experiment.warnings.iter().for_each(|warning| console.warning(warning));
+    console.warnings(&experiment.warnings);
     if let Some(missing) = &experiment.missing {
         console.warning(format!("{missing}; going on without the specimen"));
     }

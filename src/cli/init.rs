@@ -80,13 +80,8 @@ impl InitArgs {
     /// The part that is looked at.
     fn part(&self) -> Result<Rig> {
         let part = Rig { roi_px: self.roi, from_s: self.from, until_s: self.until, ..Rig::default() };
-        part.validate().map_err(|message| {
-            let named = [("rig.roi_px", "--roi"), ("rig.from_s", "--from"), ("rig.until_s", "--until")]
-                .into_iter()
-                .fold(message, |text, (key, option)| text.replace(key, option));
-            let (option, message) = named.split_once(": ").unwrap_or(("options", &named));
-            Error::Option { option: option.to_owned(), message: message.to_owned() }
-        })?;
+        let given = [("rig.roi_px", "--roi"), ("rig.from_s", "--from"), ("rig.until_s", "--until")];
+        part.validate().map_err(|message| super::by_option(&message, &given))?;
         Ok(part)
     }
 

@@ -45,9 +45,7 @@ impl LaserArgs {
     pub fn run(&self, console: &Console) -> Result<()> {
         let experiment = super::read_strip(&self.config, console)?;
         let record = LaserRecord::read(&self.record, &experiment.laser.clone().unwrap_or_default())?;
-        for warning in &record.warnings {
-            console.warning(warning);
-        }
+        console.warnings(&record.warnings);
         let json = self.json.as_deref().map(OutputFile::create).transpose()?;
         let drawing = self.figure.as_deref().map(OutputFile::create).transpose()?;
         let analysis = analyse(&record, &experiment)?;

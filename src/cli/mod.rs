@@ -132,9 +132,7 @@ fn exit(outcome: crate::Result<ExitCode>) -> ExitCode {
 /// A table of angles; what of it is passed over is said on standard error.
 fn read_angles(path: &Path, console: &Console) -> crate::Result<AngleSeries> {
     let series = AngleSeries::read(path)?;
-    for warning in &series.warnings {
-        console.warning(warning);
-    }
+    console.warnings(&series.warnings);
     Ok(series)
 }
 
@@ -149,9 +147,7 @@ fn read_strip(path: &Path, console: &Console) -> crate::Result<Experiment> {
 }
 
 fn heard(experiment: Experiment, console: &Console) -> crate::Result<Experiment> {
-    for warning in &experiment.warnings {
-        console.warning(warning);
-    }
+    console.warnings(&experiment.warnings);
     Ok(experiment)
 }
 
@@ -174,6 +170,13 @@ fn recordings(
         Record::of(&kept, marks)
     };
     all.iter().map(record).collect()
+}
+
+/// What is wrong with a key of the experiment file, told by the options that gave it: `(key, option)`.
+fn by_option(message: &str, given: &[(&str, &str)]) -> crate::Error {
+    let named = given.iter().fold(message.to_owned(), |text, (key, option)| text.replace(key, option));
+    let (option, message) = named.split_once(": ").unwrap_or(("options", &named));
+    crate::Error::Option { option: option.to_owned(), message: message.to_owned() }
 }
 
 /// `--from` comes before `--until`.

@@ -243,18 +243,16 @@ impl TrackArgs {
 
     /// What is wrong with a key, by the name of the option that gave it: the file by itself was sound.
     fn by_option(&self, message: &str) -> Error {
-        let given = [
-            (self.pivot.is_some(), "rig.pivot_px", "--pivot"),
-            (self.roi.is_some(), "rig.roi_px", "--roi"),
-            (self.from.is_some(), "rig.from_s", "--from"),
-            (self.until.is_some(), "rig.until_s", "--until"),
-            (self.true_rate.is_some(), "rig.true_rate_hz", "--true-rate"),
-            (!self.reference.is_empty(), "rig.reference_marks", "--reference"),
+        let options = [
+            (self.pivot.is_some(), ("rig.pivot_px", "--pivot")),
+            (self.roi.is_some(), ("rig.roi_px", "--roi")),
+            (self.from.is_some(), ("rig.from_s", "--from")),
+            (self.until.is_some(), ("rig.until_s", "--until")),
+            (self.true_rate.is_some(), ("rig.true_rate_hz", "--true-rate")),
+            (!self.reference.is_empty(), ("rig.reference_marks", "--reference")),
         ];
-        let given = given.into_iter().filter(|(is_given, ..)| *is_given);
-        let named = given.fold(message.to_owned(), |text, (_, key, option)| text.replace(key, option));
-        let (what, why) = named.split_once(": ").unwrap_or(("options", &named));
-        option(what, why)
+        let given: Vec<_> = options.into_iter().filter_map(|(is_given, names)| is_given.then_some(names)).collect();
+        super::by_option(message, &given)
     }
 
     /// One colour a mark: the command line before the file before the paper's three red ones.
@@ -311,9 +309,7 @@ impl TrackArgs {
     }
 
     fn report(&self, measurement: &Measurement, sidecar: &Sidecar, console: &Console) {
-        for warning in &sidecar.warnings {
-            console.warning(warning);
-        }
+        console.warnings(&sidecar.warnings);
         let links = &measurement.angles.links;
         let measured = (0..measurement.timing.frames).filter(|f| links.iter().all(|l| l[*f].is_some())).count();
         let what =

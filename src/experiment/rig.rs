@@ -169,6 +169,11 @@ impl Default for Rig {
 }
 
 impl Rig {
+    /// The part of the recording that is used, from one time of the file to another.
+    pub fn span_s(&self) -> [f64; 2] {
+        [self.from_s.unwrap_or(f64::NEG_INFINITY), self.until_s.unwrap_or(f64::INFINITY)]
+    }
+
     /// The numbers make sense.
     ///
     /// # Errors

@@ -11,8 +11,8 @@ use super::half_power::HalfPower;
 use super::signal::Signal;
 use super::sinusoids::SinusoidFit;
 use super::spectrum::Spectrum;
-use super::unit::Unit;
 use super::windows::Windows;
+use crate::series::Measured;
 
 /// A way to a frequency or a damping ratio.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
@@ -66,7 +66,7 @@ pub(super) struct Whole<'a> {
     pub fit: &'a SinusoidFit,
     pub windows: &'a Result<Windows, String>,
     pub noise_rad: &'a [f64],
-    pub unit: Unit,
+    pub measured: Measured,
 }
 
 /// What every method says about one mode.
@@ -102,7 +102,7 @@ impl Estimators {
             half_power(whole, &filled, mode),
             decrement(whole, &alone, mode),
             sinusoids(raw, excess[mode], envelope.as_ref().ok()),
-            windowed(envelope, whole.unit),
+            windowed(envelope, whole.measured),
         ];
         let nyquist_hz = 0.5 / whole.signal.step_s;
         let each = each.map(|e| e.resolved(nyquist_hz)).into();
@@ -251,7 +251,7 @@ fn decrement(whole: &Whole, alone: &Signal, mode: usize) -> Estimator {
         frequency_hz: found.as_ref().ok().map(|d| d.frequency_hz),
         damping_ratio: found.as_ref().ok().map(|d| d.damping_ratio),
         note: Some(match found {
-            Ok(d) => format!("{}, {} peaks, δ = {:.5}", whole.unit.name(link), d.peaks, d.decrement.value),
+            Ok(d) => format!("{}, {} peaks, δ = {:.5}", whole.measured.name(link), d.peaks, d.decrement.value),
             Err(reason) => reason,
         }),
     }
@@ -282,7 +282,7 @@ fn sinusoids([f, xi]: [Estimate; 2], excess: f64, envelope: Option<&Envelope>) -
     Estimator { method: Method::Sinusoids, frequency_hz: Some(f), damping_ratio: Some(xi), note }
 }
 
-fn windowed(envelope: &Result<Envelope, String>, unit: Unit) -> Estimator {
+fn windowed(envelope: &Result<Envelope, String>, measured: Measured) -> Estimator {
     let law = envelope.as_ref().ok().and_then(|e| e.frequency);
     let damping = envelope.as_ref().ok().and_then(|e| e.damping);
     Estimator {
@@ -294,7 +294,7 @@ fn windowed(envelope: &Result<Envelope, String>, unit: Unit) -> Estimator {
                 Some(l) => format!(
                     "{} windows; at small amplitude, κ = {}",
                     e.windows,
-                    unit.per_square(l.kappa_per_rad2.value, l.kappa_per_rad2.sd)
+                    measured.per_square(l.kappa_per_rad2.value, l.kappa_per_rad2.sd)
                 ),
                 None => format!("{} windows do not tell f against amplitude", e.windows),
             },

@@ -42,12 +42,11 @@ pub use damping::{Damping, Trend};
 pub use estimate::Estimate;
 pub use estimators::{Estimator, Method};
 pub use mode::{LinkMotion, Mode};
-pub use unit::Unit;
 
 use crate::error::Result;
 use crate::experiment::{Experiment, Rig};
 use crate::model::chain::Chain;
-use crate::series::AngleSeries;
+use crate::series::{AngleSeries, Measured};
 use equivalents::Equivalents;
 use estimators::Whole;
 use floor::Floor;
@@ -78,7 +77,7 @@ pub struct Record {
     pub counts: bool,
     /// Angles, or a displacement.
     #[serde(skip)]
-    pub unit: Unit,
+    pub measured: Measured,
 }
 
 impl Record {
@@ -123,7 +122,7 @@ pub struct Identification {
 pub fn identify(series: &AngleSeries, experiment: Option<&Experiment>) -> Result<Identification> {
     let body = experiment.map(|e| Ok(Body { experiment: e, chain: Chain::of(&e.specimen)? })).transpose()?;
     let (signal, wrapped) = Signal::of(series).unwrapped();
-    let mut found = Identification::of_record(series, &signal, Unit::Angle);
+    let mut found = Identification::of_record(series, &signal, Measured::Angles);
     for link in wrapped {
         found.notes.push(format!("θ{} jumps by full turns, as wrapped angles do: taken out", link + 1));
     }
@@ -134,15 +133,14 @@ pub fn identify(series: &AngleSeries, experiment: Option<&Experiment>) -> Result
 /// Identifies the displacement of one mark, over [`crate::series::PX_PER_RAD`].
 pub fn identify_displacement(series: &AngleSeries) -> Identification {
     let signal = Signal::of(series);
-    Identification::of_record(series, &signal, Unit::Displacement).with_modes(signal, None)
+    Identification::of_record(series, &signal, Measured::Displacement).with_modes(signal, None)
 }
 
 impl Identification {
-    /// As JSON; of a displacement, keys that end in `_rad` end in `_px`.
-    pub fn to_json(&self) -> serde_json::Value {
+    /// As JSON where a displacement was measured: keys that end in `_rad` end in `_px`.
+    pub fn json_in_px(&self) -> serde_json::Value {
         // numbers, strings and lists of them cannot fail to serialise
-        let json = serde_json::to_value(self).unwrap_or_default();
-        self.record.unit.of_json(json)
+        unit::in_px(serde_json::to_value(self).unwrap_or_default())
     }
 }
 
@@ -154,7 +152,7 @@ struct Body<'a> {
 
 impl Identification {
     /// What can be said before anything is fitted.
-    fn of_record(series: &AngleSeries, signal: &Signal, unit: Unit) -> Self {
+    fn of_record(series: &AngleSeries, signal: &Signal, measured: Measured) -> Self {
         let record = Record {
             source: series.path.display().to_string(),
             rows: series.len(),
@@ -165,7 +163,7 @@ impl Identification {
             noise_rad: Vec::new(),
             counts: series.t_s.windows(2).all(|pair| pair[1] - pair[0] == 1.0)
                 && series.t_s.first().is_some_and(|t| t.fract() == 0.0),
-            unit,
+            measured,
         };
         let spectrum = Spectrum::of(&signal.levelled(), record.irregular_share);
         Self {
@@ -219,8 +217,14 @@ impl Identification {
             Err(_) => fit.links.iter().map(|l| l.noise_rad).collect(),
         };
         let noise_rad = &self.record.noise_rad;
-        let unit = self.record.unit;
-        let whole = Whole { signal, spectrum: &self.spectrum, fit: &fit, windows: &windows, noise_rad, unit };
+        let whole = Whole {
+            signal,
+            spectrum: &self.spectrum,
+            fit: &fit,
+            windows: &windows,
+            noise_rad,
+            measured: self.record.measured,
+        };
         let gravity_m_s2 = body.map_or(Rig::default().gravity_m_s2, |b| b.experiment.rig.gravity_m_s2);
         let same_links = body.map(|b| &b.chain).filter(|chain| chain.count() == signal.links.len());
         let mut modes: Vec<Mode> =

@@ -9,9 +9,9 @@ use super::envelope::{Envelope, FrequencyLaw};
 use super::estimate::{Estimate, probability};
 use super::estimators::{Estimator, Estimators, Whole};
 use super::floor::amplitude_dependence;
-use super::unit::Unit;
 use super::windows::Windows;
 use crate::model::chain::Chain;
+use crate::series::Measured;
 
 /// By how much the theory of κ may be off: it is the first term in A², for a shape that does not change with amplitude.
 const THEORY_TOLERANCE: f64 = 0.15;
@@ -65,7 +65,7 @@ pub struct Mode {
     pub notes: Vec<String>,
     /// In what its sizes are told.
     #[serde(skip)]
-    pub unit: Unit,
+    pub measured: Measured,
 }
 
 impl Mode {
@@ -85,12 +85,12 @@ impl Mode {
             number: mode + 1,
             rms_rad: whole.fit.strength(mode, duration_s).sqrt(),
             damping_trend: envelope.as_ref().filter(changes).map(Trend::of),
-            expected_kappa_per_rad2: match whole.unit {
-                Unit::Angle => expected_kappa(&shape, whole.fit.poles[mode].frequency_hz(), chain, gravity_m_s2),
+            expected_kappa_per_rad2: match whole.measured {
+                Measured::Angles => expected_kappa(&shape, whole.fit.poles[mode].frequency_hz(), chain, gravity_m_s2),
                 // nobody knows what angle it is of
-                Unit::Displacement => None,
+                Measured::Displacement => None,
             },
-            unit: whole.unit,
+            measured: whole.measured,
             frequency_hz: choice.frequency_hz,
             damping: Damping::of(choice.damping_ratio, &raw[1], duration_s),
             basis: choice.basis,
@@ -186,7 +186,7 @@ impl Mode {
                 "a pendulum of {f_hz:.2e} Hz would be {pendulum_m:.0} m long: is t_s in milliseconds, or a frame number?"
             ));
         }
-        if self.unit == Unit::Angle && f_hz > FASTEST_SWING_HZ && amplitude_rad > 0.1 {
+        if self.measured == Measured::Angles && f_hz > FASTEST_SWING_HZ && amplitude_rad > 0.1 {
             return Some(format!(
                 "a pendulum of {f_hz:.0} Hz would be {:.2} mm long: is t_s in minutes?",
                 1e3 * pendulum_m

@@ -13,7 +13,7 @@ impl Display for Identification {
         writeln!(f, "{}", self.summary)?;
         self.record.fmt(f)?;
         if self.drift_rad.iter().any(|d| *d > 0.0) {
-            let each: Vec<String> = self.drift_rad.iter().map(|d| self.record.unit.show(*d, 3)).collect();
+            let each: Vec<String> = self.drift_rad.iter().map(|d| self.record.measured.show(*d, 3)).collect();
             writeln!(f, "  drift over the record {}, no part of any mode", each.join(", "))?;
         }
         if let Some(count) = &self.mode_count {
@@ -67,16 +67,16 @@ impl Display for Record {
             self.rows,
             self.duration_s,
             1.0 / self.step_s,
-            self.unit.columns(self.values.len())
+            self.measured.columns(self.values.len())
         )?;
-        let noise: Vec<String> = self.noise_rad.iter().map(|n| self.unit.show(*n, 4)).collect();
+        let noise: Vec<String> = self.noise_rad.iter().map(|n| self.measured.show(*n, 4)).collect();
         if noise.is_empty() { Ok(()) } else { writeln!(f, "  noise {}", noise.join(", ")) }
     }
 }
 
 impl Display for Mode {
     fn fmt(&self, f: &mut Formatter<'_>) -> fmt::Result {
-        let unit = self.unit;
+        let measured = self.measured;
         writeln!(f, "  f = {} Hz", interval(&self.frequency_hz, 5))?;
         match &self.damping {
             Damping::Identified(xi) => writeln!(f, "  ξ = {}", interval(xi, 6))?,
@@ -84,7 +84,7 @@ impl Display for Mode {
         }
         writeln!(f, "  from: {}", self.basis)?;
         for (link, motion) in self.shape.iter().enumerate() {
-            write!(f, "  {} amplitude {}", unit.name(link), unit.show(motion.amplitude_rad, 2))?;
+            write!(f, "  {} amplitude {}", measured.name(link), measured.show(motion.amplitude_rad, 2))?;
             if link > 0 {
                 let (ratio, phase) =
                     (&motion.ratio_to_first, motion.phase_to_first_rad.times(180.0 / std::f64::consts::PI));
@@ -135,9 +135,9 @@ impl Display for Mode {
 impl Mode {
     /// Frequency and damping from window to window, a dozen lines at most.
     fn against_amplitude(&self, f: &mut Formatter<'_>) -> fmt::Result {
-        let unit = self.unit;
+        let measured = self.measured;
         let Some(envelope) = &self.envelope else { return Ok(()) };
-        writeln!(f, "  {:>8}{:>12}{:>26}{:>28}", "t (s)", format!("A ({})", unit.symbol()), "f (Hz)", "ξ")?;
+        writeln!(f, "  {:>8}{:>12}{:>26}{:>28}", "t (s)", format!("A ({})", measured.symbol()), "f (Hz)", "ξ")?;
         let every = envelope.steps.len().div_ceil(12).max(1);
         for step in envelope.steps.iter().step_by(every) {
             let (frequency, damping) = (&step.frequency_hz, &step.damping_ratio);
@@ -145,7 +145,7 @@ impl Mode {
                 f,
                 "  {:8.2}{:12.3}{:>26}{:>28}",
                 step.t_s,
-                unit.shown(step.amplitude_rad),
+                measured.shown(step.amplitude_rad),
                 format!("{:.5} ± {:.5}", frequency.value, frequency.half()),
                 format!("{:.6} ± {:.6}", damping.value, damping.half())
             )?;
@@ -157,18 +157,18 @@ impl Mode {
                 f,
                 "  f = f₀(1 − κA²): f₀ = {} Hz, κ = {}{expected}",
                 interval(&law.f0_hz, 5),
-                unit.interval_per_square(&law.kappa_per_rad2)
+                measured.interval_per_square(&law.kappa_per_rad2)
             )?;
         }
         if let Some(law) = envelope.decay {
             writeln!(
                 f,
                 "  dA/dt = −(b₀ + b₁A + b₂A²): b₀ = {} {own}/s, b₁ = {} /s, b₂ = {} /({own} s); viscous alone {} (a picture, no verdict)",
-                scientific(&law.b0_rad_per_s.times(unit.own_per_rad())),
+                scientific(&law.b0_rad_per_s.times(measured.own_per_rad())),
                 scientific(&law.b1_per_s),
-                scientific(&law.b2_per_rad_s.times(1.0 / unit.own_per_rad())),
+                scientific(&law.b2_per_rad_s.times(1.0 / measured.own_per_rad())),
                 probability(law.p_viscous),
-                own = unit.own()
+                own = measured.own()
             )?;
         }
         Ok(())

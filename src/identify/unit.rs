@@ -4,28 +4,19 @@ use serde_json::Value;
 
 use super::estimate::Estimate;
 use super::table::interval;
-use crate::series::PX_PER_RAD;
+use crate::series::{Measured, PX_PER_RAD};
 
-/// What was measured.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Unit {
-    /// Angles, rad.
-    Angle,
-    /// A displacement over [`PX_PER_RAD`].
-    Displacement,
-}
-
-impl Unit {
+impl Measured {
     /// A size with its unit, to so many digits.
     pub(super) fn show(self, size_rad: f64, digits: usize) -> String {
-        let space = if self == Self::Angle { "" } else { " " };
+        let space = if self == Self::Angles { "" } else { " " };
         format!("{:.digits$}{space}{}", self.shown(size_rad), self.symbol())
     }
 
     /// A size as it is printed.
     pub(super) fn shown(self, size_rad: f64) -> f64 {
         match self {
-            Self::Angle => size_rad.to_degrees(),
+            Self::Angles => size_rad.to_degrees(),
             Self::Displacement => PX_PER_RAD * size_rad,
         }
     }
@@ -33,7 +24,7 @@ impl Unit {
     /// Its unit.
     pub(super) const fn symbol(self) -> &'static str {
         match self {
-            Self::Angle => "°",
+            Self::Angles => "°",
             Self::Displacement => "px",
         }
     }
@@ -41,7 +32,7 @@ impl Unit {
     /// The unit of coefficients.
     pub(super) const fn own(self) -> &'static str {
         match self {
-            Self::Angle => "rad",
+            Self::Angles => "rad",
             Self::Displacement => "px",
         }
     }
@@ -49,7 +40,7 @@ impl Unit {
     /// So many of it are a radian.
     pub(super) const fn own_per_rad(self) -> f64 {
         match self {
-            Self::Angle => 1.0,
+            Self::Angles => 1.0,
             Self::Displacement => PX_PER_RAD,
         }
     }
@@ -57,7 +48,7 @@ impl Unit {
     /// What a link's column is called.
     pub(super) fn name(self, link: usize) -> String {
         match self {
-            Self::Angle => format!("θ{}", link + 1),
+            Self::Angles => format!("θ{}", link + 1),
             Self::Displacement => "displacement".to_owned(),
         }
     }
@@ -65,7 +56,7 @@ impl Unit {
     /// So many columns in words.
     pub(super) fn columns(self, count: usize) -> String {
         match self {
-            Self::Angle => format!("{count} angle{}", if count == 1 { "" } else { "s" }),
+            Self::Angles => format!("{count} angle{}", if count == 1 { "" } else { "s" }),
             Self::Displacement => "the displacement of one mark".to_owned(),
         }
     }
@@ -73,7 +64,7 @@ impl Unit {
     /// A coefficient of the square of an amplitude, with its interval.
     pub(super) fn interval_per_square(self, coefficient: &Estimate) -> String {
         match self {
-            Self::Angle => format!("{} /rad²", interval(coefficient, 4)),
+            Self::Angles => format!("{} /rad²", interval(coefficient, 4)),
             Self::Displacement => {
                 let own = coefficient.times(self.own_per_rad().powi(-2));
                 format!("{:.3e} [{:.3e}, {:.3e}] /px²", own.value, own.low, own.high)
@@ -85,16 +76,8 @@ impl Unit {
     pub(super) fn per_square(self, value_per_rad2: f64, sd_per_rad2: f64) -> String {
         let [value, sd] = [value_per_rad2, sd_per_rad2].map(|own| own * self.own_per_rad().powi(-2));
         match self {
-            Self::Angle => format!("{value:.4} ± {sd:.4} /rad²"),
+            Self::Angles => format!("{value:.4} ± {sd:.4} /rad²"),
             Self::Displacement => format!("{value:.1e} ± {sd:.0e} /px²"),
-        }
-    }
-
-    /// A report's JSON; of a displacement, what holds radians holds pixels, and is called so.
-    pub(super) fn of_json(self, json: Value) -> Value {
-        match self {
-            Self::Angle => json,
-            Self::Displacement => in_px(json),
         }
     }
 }
@@ -103,7 +86,8 @@ impl Unit {
 const KEYS: [(&str, &str, i32); 4] =
     [("per_rad2", "per_px2", -2), ("per_rad_s", "per_px_s", -1), ("rad_per_s", "px_per_s", 1), ("_rad", "_px", 1)];
 
-fn in_px(json: Value) -> Value {
+/// A report's JSON of a displacement: what holds radians holds pixels, and is called so.
+pub(super) fn in_px(json: Value) -> Value {
     match json {
         Value::Array(items) => items.into_iter().map(in_px).collect(),
         Value::Object(entries) => {
@@ -143,7 +127,6 @@ mod tests {
         let px = of(
             r#"{"modes": [{"amplitude_px": 50.0, "phase_to_first_rad": 1.0, "kappa_per_px2": {"value": 2e-6}, "b2_per_px_s": 1e-3}], "noise_px": [0.1]}"#,
         );
-        assert_eq!(Unit::Displacement.of_json(own.clone()), px);
-        assert_eq!(Unit::Angle.of_json(own.clone()), own);
+        assert_eq!(in_px(own), px);
     }
 }

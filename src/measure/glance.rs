@@ -78,7 +78,7 @@ impl Session<'_> {
             Recording::Stills(stills) => stills.stamps_s().last().map(|last| last - stills.stamps_s()[0]),
         };
         let end_s = length_s.map(|length| first_s + length).or(rig.until_s)?;
-        Some([first_s, end_s.min(rig.until_s.unwrap_or(f64::INFINITY))])
+        Some([first_s, end_s.min(rig.span_s()[1])])
     }
 }
 

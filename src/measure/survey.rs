@@ -22,7 +22,7 @@ const FEWEST_PICTURES: usize = 3;
 /// The pictures, of the part of the recording that is measured.
 pub fn pictures(recording: &Recording, rig: &Rig) -> Result<Vec<OwnedPicture>> {
     let mut pictures = Vec::new();
-    let span_s = [rig.from_s.unwrap_or(WHOLE_S[0]), rig.until_s.unwrap_or(WHOLE_S[1])];
+    let span_s = rig.span_s();
     recording.sample(SAMPLE_PICTURES, span_s, &mut |frame| pictures.push(frame.picture.to_owned()))?;
     if pictures.is_empty() {
         // whether there is such a part turns out when the frames are read

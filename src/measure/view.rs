@@ -40,7 +40,7 @@ impl<'a> View<'a> {
             glance: false,
             area,
             background,
-            span_s: [rig.from_s.unwrap_or(f64::NEG_INFINITY), rig.until_s.unwrap_or(f64::INFINITY)],
+            span_s: rig.span_s(),
         }
     }
 

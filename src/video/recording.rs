@@ -181,7 +181,9 @@ fn sample_container(
     let (mut began, mut sent) = (None, 0);
     for sample in 0..count {
         let at_s = begin_s + duration_s * sample as f64 / count as f64;
-        if at_s > 0.0 && (duration_s <= 0.0 || container.seek(at_s).is_err()) {
+        let sought = at_s <= 0.0 || container.seek(at_s).is_ok();
+        // where there is nothing to seek by, what comes first is all that is seen
+        if sample > 0 && !(sought && duration_s > 0.0) {
             break;
         }
         let mut next = || container.next_packet().ok().flatten();
