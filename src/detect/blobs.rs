@@ -2,7 +2,7 @@
 
 use std::rc::Rc;
 
-use super::centroid::{self, Centroid, Channels, Silhouette};
+use super::centroid::{self, Centroid, Channels, Shading, Silhouette};
 use super::component::{BLOCK, HueAxis};
 use super::mask::{Mask, Part};
 use super::plane::Plane;
@@ -44,6 +44,8 @@ pub(super) struct Target {
     pub round: bool,
     /// Least and greatest number of samples.
     pub samples: [usize; 2],
+    /// How its levels differ around its edge.
+    pub shading: Shading,
 }
 
 impl Target {
@@ -87,11 +89,22 @@ pub(super) fn find(
             _ if part.is_target() => centroid::of_target(picture, &silhouette),
             _ => None,
         };
-        if let Some(centroid) = centroid.or_else(|| centroid::measure(picture, target.axis, &silhouette, channels)) {
+        let measure = || centroid::measure(picture, target.axis, &silhouette, channels, target.shading);
+        if let Some(centroid) = centroid.or_else(measure) {
             blobs.push(Blob { hue: target.hue, centroid, binary_px, samples });
         }
     }
     Ok(())
+}
+
+/// How the levels of the round spots of one hue differ around their edges.
+pub(super) fn limbs(picture: &Picture<'_>, target: &Target, planes: &mut Planes) -> Result<Vec<Shading>> {
+    let (parts, plane) = parts(picture, target, planes)?;
+    let is_disc = |part: &&Part| part.shape() >= LEAST_ROUNDNESS && !part.is_target();
+    let discs = parts.iter().filter(is_disc);
+    let limb =
+        |part: &Part| centroid::limb::of(picture, target.axis, &silhouette(picture, target, part, plane.as_deref()));
+    Ok(discs.filter_map(limb).collect())
 }
 
 /// Finds the spots of one hue; their places come from the mask's samples alone.

@@ -10,14 +10,16 @@ mod mask;
 mod morphology;
 mod plane;
 mod samples;
+mod shading;
 mod siting;
 mod threshold;
 
 pub use blobs::Blob;
 pub use calibration::{Spot, Trial};
-pub use centroid::{Centroid, Channels};
+pub use centroid::{Centroid, Channels, Shading};
 pub use mask::Part;
 pub use samples::{Album, HuePeak};
+pub use shading::ShadingSurvey;
 pub use siting::{Siting, SitingSurvey};
 pub use threshold::LEAST_COMPONENT;
 
@@ -47,6 +49,8 @@ pub struct Hue {
     pub area_px2: Option<f64>,
     /// Only round spots count, and of that area: what the marks stand on may have their hue.
     pub round: bool,
+    /// How a mark's levels differ around its edge, where it is lit from one side.
+    pub shading: Shading,
 }
 
 impl Default for Hue {
@@ -60,6 +64,7 @@ impl Default for Hue {
             level: 0,
             area_px2: None,
             round: false,
+            shading: Shading::default(),
         }
     }
 }
@@ -132,6 +137,13 @@ impl Detector {
         Ok(blobs)
     }
 
+    /// How the marks' levels differ around their edges, by hue.
+    fn limbs(&self, picture: &Picture<'_>) -> Result<Vec<Vec<Shading>>> {
+        let mut planes = Planes::default();
+        let limbs = |(index, hue)| blobs::limbs(picture, &self.target(index, hue, picture), &mut planes);
+        self.hues.iter().enumerate().map(limbs).collect()
+    }
+
     /// All blobs, to some tenths of a chroma sample and many times as fast: enough to see what moves and how.
     ///
     /// # Errors
@@ -159,6 +171,7 @@ impl Detector {
             level: hue.level,
             round,
             samples: [samples(least).max(3), hue.area_px2.map_or(usize::MAX, |a| samples(larger * a))],
+            shading: hue.shading,
         }
     }
 }

@@ -129,13 +129,13 @@ impl Album {
     }
 
     /// The light of a picture over that of the usual one: the median ratio of luma. A camera that sets its exposure anew, and a lamp on the mains, change all
-    /// samples alike, and no mark covers half of them.
+    /// samples alike, and nothing that swings covers half of them. Samples too dark to tell count as unchanged: before a dark wall all that is bright may swing.
     fn light(&self, picture: &Samples, usual: &[u8]) -> f64 {
         let ratio = |(code, usual): (&u8, &u8)| {
             let [code, usual] = [code, usual].map(|code| f64::from(*code) - self.black());
-            (usual >= LEAST_LIGHT).then(|| code / usual)
+            if usual >= LEAST_LIGHT { code / usual } else { 1.0 }
         };
-        let mut ratios: Vec<f64> = picture.luma.iter().zip(usual).filter_map(ratio).collect();
+        let mut ratios: Vec<f64> = picture.luma.iter().zip(usual).map(ratio).collect();
         median(&mut ratios).unwrap_or(1.0)
     }
 

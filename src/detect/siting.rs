@@ -72,8 +72,9 @@ impl SitingSurvey {
         self
     }
 
-    /// What the pictures show; `None` where there were none.
-    pub fn conclude(self) -> Option<Siting> {
+    /// What the pictures show; `None` where there were none. `unshaded` is the same survey with the marks taken for evenly lit:
+    /// by as much as their shading changes the differences they may be wrong still.
+    pub fn conclude(self, unshaded: &Self) -> Option<Siting> {
         let layout = self.layout?;
         let mut siting = Siting {
             stated_px: layout.chroma_site_px,
@@ -85,7 +86,11 @@ impl SitingSurvey {
             if shift == 0 {
                 continue;
             }
-            let seen = robust_mean(&self.differences[axis]).map(|[d, sd]| [siting.stated_px[axis] + d, sd]);
+            let flat = robust_mean(&unshaded.differences[axis]);
+            let seen = robust_mean(&self.differences[axis]).map(|[d, sd]| {
+                let of_shading = flat.map_or(0.0, |[flat, _]| d - flat);
+                [siting.stated_px[axis] + d, sd.hypot(of_shading)]
+            });
             siting.seen_px[axis] = seen;
             [siting.used_px[axis], siting.sd_px[axis]] = posterior(siting.stated_px[axis], shift, seen);
         }
@@ -148,6 +153,10 @@ mod tests {
     use super::*;
 
     fn survey(differences: [&[f64]; 2], stated_px: [f64; 2]) -> Siting {
+        shaded_survey(differences, differences, stated_px)
+    }
+
+    fn shaded_survey(differences: [&[f64]; 2], unshaded: [&[f64]; 2], stated_px: [f64; 2]) -> Siting {
         let layout = Layout {
             width_px: 64,
             height_px: 64,
@@ -160,7 +169,9 @@ mod tests {
             matrix: crate::video::Matrix::Bt709,
         };
         let with_variance = |d: &[f64]| d.iter().map(|d| [*d, 0.05f64.powi(2)]).collect();
-        SitingSurvey { layout: Some(layout), differences: differences.map(with_variance) }.conclude().unwrap()
+        let survey = SitingSurvey { layout: Some(layout), differences: differences.map(with_variance) };
+        let unshaded = SitingSurvey { layout: Some(layout), differences: unshaded.map(with_variance) };
+        survey.conclude(&unshaded).unwrap()
     }
 
     #[test]
@@ -171,6 +182,14 @@ mod tests {
         for axis in 0..2 {
             assert!((siting.used_px[axis] - 0.5).abs() < 1e-3 && siting.sd_px[axis] < 0.01, "{siting:?}");
         }
+    }
+
+    #[test]
+    fn what_may_be_shading_is_no_site() {
+        let x = [0.47, 0.55, 0.52, 0.44, 0.58, 0.49];
+        let flat = x.map(|x| x + 0.6);
+        let siting = shaded_survey([&x, &[]], [&flat, &[]], [0.0, 0.5]);
+        assert!(siting.used_px[0] < 0.4 && siting.sd_px[0] > 0.2, "{siting:?}");
     }
 
     #[test]

@@ -158,6 +158,7 @@ impl<'a> Session<'a> {
         let album = survey::album(&pictures, &area, stream.orientation);
         let marks = || {
             album.calibrate(&mut hues, options.threshold)?;
+            survey::shade(&pictures, &mut hues)?;
             survey::siting(&pictures, &hues)
         };
         let (siting, (background, camera)) = rayon::join(marks, || survey::camera(&pictures, options, &stream));
@@ -224,12 +225,13 @@ impl<'a> Session<'a> {
     ///
     /// # Errors
     /// As [`measure`].
-    pub fn gather(&mut self, hues: Vec<Hue>, progress: &dyn Progress) -> Result<Vec<FrameBlobs>> {
+    pub fn gather(&mut self, mut hues: Vec<Hue>, progress: &dyn Progress) -> Result<Vec<FrameBlobs>> {
         if !self.stamps_s.is_empty() {
             self.recording = Recording::open(&self.path, &self.options.still_times)?;
             self.stamps_s.clear();
             self.camera = self.first_camera;
         }
+        survey::shade(&self.pictures, &mut hues)?;
         let siting = survey::siting(&self.pictures, &hues)?;
         let detector = Detector::new(hues).with_siting(siting);
         let mut frames = Vec::new();

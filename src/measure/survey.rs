@@ -5,7 +5,7 @@ use rayon::iter::{IntoParallelRefIterator, ParallelIterator};
 
 use super::{Camera, Options, Steadying};
 use crate::area::Area;
-use crate::detect::{Album, Detector, Hue, Siting, SitingSurvey};
+use crate::detect::{Album, Detector, Hue, Shading, ShadingSurvey, Siting, SitingSurvey};
 use crate::error::Result;
 use crate::experiment::Rig;
 use crate::steady::Background;
@@ -42,15 +42,30 @@ pub fn album(pictures: &[OwnedPicture], area: &Area, orientation: Orientation) -
     album
 }
 
+/// From which side the marks are lit, learnt by every hue.
+pub fn shade(pictures: &[OwnedPicture], hues: &mut [Hue]) -> Result<()> {
+    let detector = Detector::new(hues.to_vec());
+    let see = |picture: &OwnedPicture| ShadingSurvey::see(&picture.view(), &detector);
+    let surveys = pictures.par_iter().map(see).collect::<Result<Vec<_>>>()?;
+    let shadings = surveys.into_iter().reduce(ShadingSurvey::with).unwrap_or_default().conclude();
+    hues.iter_mut().zip(shadings).for_each(|(hue, shading)| hue.shading = shading);
+    Ok(())
+}
+
 /// Where the chroma samples lie, from the marks.
 pub fn siting(pictures: &[OwnedPicture], hues: &[Hue]) -> Result<Option<Siting>> {
-    let detector = Detector::new(hues.to_vec());
+    let flat = hues.iter().map(|hue| Hue { shading: Shading::default(), ..hue.clone() });
+    let [shaded, flat] = [hues.to_vec(), flat.collect()].map(|hues| siting_survey(pictures, &Detector::new(hues)));
+    Ok(shaded?.conclude(&flat?))
+}
+
+fn siting_survey(pictures: &[OwnedPicture], detector: &Detector) -> Result<SitingSurvey> {
     let see = |picture: &OwnedPicture| {
         let mut survey = SitingSurvey::default();
-        survey.see(&picture.view(), &detector).map(|()| survey)
+        survey.see(&picture.view(), detector).map(|()| survey)
     };
     let surveys = pictures.par_iter().map(see).collect::<Result<Vec<_>>>()?;
-    Ok(surveys.into_iter().reduce(SitingSurvey::with).and_then(SitingSurvey::conclude))
+    Ok(surveys.into_iter().reduce(SitingSurvey::with).unwrap_or_default())
 }
 
 /// How far the camera moves, and against what it is taken out, where it is.

@@ -2,8 +2,8 @@
 //!
 //! The mask only says where to look. Around the mark's rough centre the picture is read in polar sectors. In each
 //! sector the ring outside the mark gives the background there (a strip, its edge, the dark chamber), the core
-//! gives the mark, and every pixel of the boundary band its [share of mark](share) α, from luma and both colour
-//! differences, so that what scatters in the surroundings does not count.
+//! gives the mark, lit as its [limb] shows, and every pixel of the boundary band its [share of mark](share) α, from luma
+//! and both colour differences, so that what scatters in the surroundings does not count.
 //!
 //! 1. The moments of α give a first centre, the radius and the sweep.
 //! 2. A [swept disc](disc) is [fitted](fit) to α. All its other parameters act alike on opposite sides, so they
@@ -22,6 +22,7 @@
 mod disc;
 mod extrusion;
 mod fit;
+pub mod limb;
 mod outline;
 mod patch;
 mod profile;
@@ -35,6 +36,7 @@ use super::component::HueAxis;
 use crate::video::Picture;
 use disc::Disc;
 use fit::{Band, Fit};
+pub use limb::Shading;
 use outline::Outline;
 use patch::Patch;
 use profile::Profile;
@@ -93,11 +95,17 @@ const ROUGHLY_PX: f64 = 0.05;
 const EXACTLY_PX: f64 = 2e-3;
 
 /// Measures the mark under `silhouette`. `None` where the mark has no contrast or fills the picture.
-pub fn measure(picture: &Picture<'_>, axis: HueAxis, silhouette: &Silhouette, channels: Channels) -> Option<Centroid> {
+pub fn measure(
+    picture: &Picture<'_>,
+    axis: HueAxis,
+    silhouette: &Silhouette,
+    channels: Channels,
+    shading: Shading,
+) -> Option<Centroid> {
     let mut outline = Outline::of(picture, axis, silhouette);
     let patch = Patch::read(picture, &outline);
     let zones = Zones::of(&patch, &outline);
-    let surroundings = Surroundings::survey(&zones, &outline, channels)?;
+    let surroundings = Surroundings::survey(&zones, &outline, channels, shading)?;
     let shares = surroundings.shares(&outline)?;
     // the mask's outline is a staircase of chroma samples: the shares of mark give a finer one
     outline.refine(&sector_areas(&zones, &outline, &surroundings, &shares));
@@ -119,7 +127,7 @@ pub fn measure(picture: &Picture<'_>, axis: HueAxis, silhouette: &Silhouette, ch
         outline = outline.of_disc(&first.disc);
         reread = Zones::of(&patch, &outline);
         last = &reread;
-        if let Some((band, again)) = resurvey(&patch, &reread, &outline, &first.disc, channels) {
+        if let Some((band, again)) = resurvey(&patch, &reread, &outline, &first.disc, &surroundings) {
             fitted = fit::fit(first.disc, &band, EXACTLY_PX).or(fitted);
             shares = again;
         }
@@ -144,9 +152,9 @@ fn resurvey(
     zones: &Zones<'_>,
     outline: &Outline,
     disc: &Disc,
-    channels: Channels,
+    before: &Surroundings,
 ) -> Option<(Band, Vec<Share>)> {
-    let mut surroundings = Surroundings::survey(zones, outline, channels)?;
+    let mut surroundings = before.anew(zones, outline)?;
     let rim = Rim { samples: &zones.band };
     let of_disc = rim.of_disc(disc);
     let mut backgrounds = rim.backgrounds(&surroundings);

@@ -5,6 +5,7 @@ use nalgebra::{Matrix3, Vector3};
 use super::Channels;
 use super::disc::Disc;
 use super::extrusion::Extrusion;
+use super::limb::Shading;
 use super::outline::{Outline, RING_PX};
 use super::patch::{CHANNELS, Levels, Patch, Sample};
 use super::share::Share;
@@ -33,6 +34,8 @@ pub struct Surroundings {
     sectors: Vec<Sector>,
     /// The mark's own codes.
     mark: Levels,
+    /// How they differ around its edge.
+    shading: Shading,
     /// Standard deviation of the channels' noise.
     noise: Levels,
     /// How the background changes across the mark, codes per pixel: ∂/∂x, ∂/∂y of every channel.
@@ -52,7 +55,7 @@ const UNUSED: f32 = 1e6;
 
 impl Surroundings {
     /// Reads ring and core. `None` where most of the ring lies outside the picture.
-    pub fn survey(zones: &Zones<'_>, outline: &Outline, channels: Channels) -> Option<Self> {
+    pub fn survey(zones: &Zones<'_>, outline: &Outline, channels: Channels, shading: Shading) -> Option<Self> {
         // a mark narrower than its band has no core: its deepest pixel stands for it
         let mark = if zones.core.len() >= 4 {
             [0, 1, 2].map(|k| median(&mut zones.core.iter().map(|s| s.levels[k]).collect::<Vec<_>>()).unwrap_or(0.0))
@@ -64,6 +67,7 @@ impl Surroundings {
         let mut surroundings = Self {
             sectors: vec![Sector::default(); outline.count()],
             mark,
+            shading,
             noise: Levels::default(),
             slope: Default::default(),
             scatter,
@@ -73,6 +77,11 @@ impl Surroundings {
         surroundings.read_ring(&zones.ring, outline)?;
         surroundings.slope = [0, 1, 2].map(|k| background_slope(&surroundings.sectors, k, surroundings.noise[k]));
         Some(surroundings)
+    }
+
+    /// The same by another outline.
+    pub fn anew(&self, zones: &Zones<'_>, outline: &Outline) -> Option<Self> {
+        Self::survey(zones, outline, self.channels, self.shading)
     }
 
     fn read_ring(&mut self, ring: &[&Sample], outline: &Outline) -> Option<()> {
@@ -139,7 +148,10 @@ impl Surroundings {
             let [x, y] = sector.ring_px.map(|p| inward * p);
             let extruded = self.extrusion.as_ref().and_then(|(e, disc)| e.under(disc, x, y));
             let background = extruded.unwrap_or_else(|| self.continued(sector, x, y));
-            let variance = |k: usize| self.noise[k].powi(2) + (EDGE_ERROR[k] * (self.mark[k] - background[k])).powi(2);
+            let reach_px = x.hypot(y).max(1e-3);
+            let mark: Levels =
+                [0, 1, 2].map(|k| self.mark[k] + (self.shading[k][0] * x + self.shading[k][1] * y) / reach_px);
+            let variance = |k: usize| self.noise[k].powi(2) + (EDGE_ERROR[k] * (mark[k] - background[k])).powi(2);
             let [luma, chroma] = match self.channels {
                 Channels::All => [0.0, 0.0],
                 Channels::Luma => [0.0, UNUSED],
@@ -147,7 +159,7 @@ impl Surroundings {
             };
             let variances = Vector3::new(variance(0) + luma, variance(1) + chroma, variance(2) + chroma);
             let noise = Matrix3::from_diagonal(&variances);
-            Share::new(self.mark, background, &(noise + scatter))
+            Share::new(mark, background, &(noise + scatter))
         };
         let shares: Vec<Share> = self.sectors.iter().zip(&outline.radii_px).zip(&self.scatter).map(share).collect();
         shares.iter().any(|s| s.variance.is_finite()).then_some(shares)

@@ -1,4 +1,4 @@
-use super::super::{Detector, Hue};
+use super::super::{Detector, Hue, ShadingSurvey};
 use crate::experiment::MarkColour;
 use crate::video::{Layout, Matrix, OwnedPicture};
 
@@ -92,4 +92,35 @@ fn a_dark_line_through_the_mark_and_a_distant_object_do_not_move_it() {
         if on_line || x > t[0] + 24.0 { [0.05, 0.05, 0.4] } else { [0.85, 0.85, 0.85] }
     });
     assert!(worst < 0.1 && mean[0].abs() < 0.04, "{worst} {mean:?}");
+}
+
+/// A green ball of 40 px, lit from the upper left, before a beige wall.
+fn ball(truth: [f64; 2]) -> OwnedPicture {
+    paint(84, 80, |x, y| {
+        let [u, v] = [(x - truth[0]) / 20.0, (y - truth[1]) / 20.0];
+        let depth = (1.0 - u * u - v * v).max(0.0).sqrt();
+        let light = (0.45 + 0.55 * (-0.45 * u - 0.6 * v + 0.66 * depth).max(0.0)).powf(1.0 / 2.2);
+        if u.hypot(v) <= 1.0 { [0.18, 0.6, 0.24].map(|colour| colour * light) } else { [0.78, 0.73, 0.63] }
+    })
+}
+
+#[test]
+fn a_ball_lit_from_one_side_is_not_drawn_to_the_light() {
+    let place = |k: u32| [40.0 + f64::from(k) * 0.137, 38.0 + f64::from(k * 5 % 16) * 0.131];
+    let hue = Hue { colour: "green".parse().unwrap(), marks: 1, threshold: 40.0, ..Hue::default() };
+    let mean_error = |hue: &Hue| {
+        let detector = Detector::new(vec![hue.clone()]);
+        let mut mean = [0.0; 2];
+        for truth in (0..16).map(place) {
+            let blobs = detector.detect(&ball(truth).view()).unwrap();
+            let c = blobs[0].centroid;
+            mean = [mean[0] + (c.x_px - truth[0]) / 16.0, mean[1] + (c.y_px - truth[1]) / 16.0];
+        }
+        mean[0].hypot(mean[1])
+    };
+    let detector = Detector::new(vec![hue.clone()]);
+    let surveys = (0..16).map(|k| ShadingSurvey::see(&ball(place(k)).view(), &detector).unwrap());
+    let shading = surveys.reduce(ShadingSurvey::with).unwrap().conclude()[0];
+    let (even, lit) = (mean_error(&hue), mean_error(&Hue { shading, ..hue.clone() }));
+    assert!(even > 0.05 && lit < 0.2 * even, "{even} {lit} {shading:?}");
 }
