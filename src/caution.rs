@@ -3,6 +3,7 @@
 use crate::experiment::Experiment;
 use crate::measure::{Measurement, Options, Steadying};
 use crate::statistics::median;
+use crate::track::hanging::LEAST_TURN;
 use crate::track::{Point, Spare};
 
 /// A link whose length scatters by more than this share is no rigid link in the plane of the picture: lenses bend by
@@ -21,8 +22,7 @@ const NOISE_OF_WIDTH: f64 = 0.005;
 const LEAST_TRAVEL: f64 = 0.05;
 /// Change of the distance from a still thing, over the motion, up to which that is the hinge.
 const HINGE_STRETCH: f64 = 0.1;
-/// Share of the largest angle, and standard deviations of a link's own, below which it does not turn.
-pub const LEAST_TURN: f64 = 0.02;
+/// Standard deviations of a link's own angle below which it does not turn.
 const STILL_DEVIATIONS: f64 = 4.0;
 /// Things that are listed one by one.
 const LISTED: usize = 4;

@@ -169,3 +169,47 @@ fn one_mark_alone_gives_its_displacement() {
     let table = bench.table();
     assert!(!column(&table, "displacement_px").is_empty() && !table.contains("theta1_rad"));
 }
+
+/// Dark red things behind the strip, which covers and bares them.
+fn books() -> String {
+    let spines = [
+        (70, 60, 18, 150, "781c1c"),
+        (92, 50, 16, 160, "6c1a1a"),
+        (112, 70, 18, 140, "802020"),
+        (134, 55, 14, 120, "701c1c"),
+        (152, 80, 15, 140, "7a2020"),
+        (171, 60, 16, 150, "6e1818"),
+        (190, 40, 18, 170, "7c1e1e"),
+        (211, 60, 20, 140, "741c1c"),
+        (236, 50, 14, 150, "6a1a1a"),
+    ];
+    let spine = |(x, y, w, h, rgb)| format!(",drawbox=x={x}:y={y}:w={w}:h={h}:color=0x{rgb}:t=fill");
+    spines.into_iter().map(spine).collect()
+}
+
+#[test]
+fn marks_before_a_shelf_of_books_of_their_colour_are_found() {
+    let bench = Bench::of(&scene());
+    let filters = format!(
+        "[1]format=gbrp{}[b];[0]format=gbrp[a];[a][b]blend=all_mode=lighten:shortest=1,format=yuv420p",
+        books()
+    );
+    let shelf = ["-f", "lavfi", "-i", "color=black:s=320x240:r=30", "-filter_complex", &filters];
+    let made = Command::new("ffmpeg")
+        .args(["-loglevel", "error", "-y", "-i", "swing.mp4"])
+        .args(shelf)
+        .args(["-c:v", "libx264", "-crf", "18", "shelf.mp4"])
+        .current_dir(bench.folder.path())
+        .status();
+    assert!(made.unwrap().success());
+    done(&bench.track(&[]));
+    let alone = bench.table();
+    std::fs::rename(bench.path("shelf.mp4"), bench.path("swing.mp4")).unwrap();
+    let words = done(&bench.track(&[]));
+    assert!(!words.contains("warning"), "{words}");
+    for mark in ["m1_x_px", "m2_x_px", "m3_x_px"] {
+        let [with, without] = [bench.table(), alone.clone()].map(|table| column(&table, mark));
+        assert_eq!(with.len(), without.len());
+        assert!(with.iter().zip(&without).all(|(a, b)| (a - b).abs() < 1.5), "{mark}");
+    }
+}

@@ -164,7 +164,7 @@ impl TrackArgs {
         let most_bytes = self.most_bytes()?;
         self.overlay.as_deref().map(overlay::check_target).transpose()?;
         let debug = self.debug_frames.as_deref().map(DebugFolder::create).transpose()?;
-        let mut session = Session::open(&self.video, &options, &folder)?;
+        let mut session = Session::open(&self.video, &options, &folder, &bar)?;
         let outcome = session.run(&bar);
         // what was seen is wanted most where nothing came of it
         if let Some(debug) = debug.filter(|_| !matches!(outcome, Err(Error::Interrupted))) {

@@ -29,6 +29,10 @@ const WIDE_ENOUGH: f64 = 6.0;
 const LAST_LEVEL: u32 = 4;
 /// Contrast at which a spot counts half, 0 to 255.
 const HALF_CONTRAST: f64 = 40.0;
+/// Numbers of marks for which threshold and scale are chosen where it is not known what the pictures show.
+pub const COUNTS: [usize; 3] = [1, 2, 3];
+/// Where between a threshold and the tops of the marks higher ones are tried.
+const HIGHER: [f64; 3] = [0.25, 0.5, 0.75];
 /// What a spot that stands still counts where others move.
 const STILL_COUNTS: f64 = 0.3;
 
@@ -50,6 +54,8 @@ pub struct Spot {
 pub struct Trial {
     /// Hue, for marks that have one.
     pub angle_rad: Option<f64>,
+    /// Without a hue: dark, or light.
+    pub dark: bool,
     /// Scale.
     pub level: u32,
     /// 0 to 255.
@@ -109,6 +115,33 @@ impl Album {
         Ok(best.map(|(_, trial)| trial))
     }
 
+    /// Other ways to see what `trial` looks for, where its pictures show more than the marks: for other numbers of
+    /// spots, and above higher thresholds.
+    ///
+    /// # Errors
+    /// [`crate::Error::OpenCv`].
+    pub fn others(&self, trial: &Trial) -> Result<Vec<Trial>> {
+        let mut others: Vec<Trial> = Vec::new();
+        if !trial.is_crowded() {
+            return Ok(others);
+        }
+        let ways = |counts: &[usize], fixed: Option<f64>| match (trial.angle_rad, trial.dark) {
+            (Some(angle_rad), _) => self.try_hue(angle_rad, counts, fixed),
+            (None, dark) => self.try_luma(dark, counts, fixed),
+        };
+        let mut found = ways(&COUNTS, None)?;
+        for part in HIGHER {
+            found.extend(ways(&[trial.marks], Some(trial.threshold + part * (trial.usual_top() - trial.threshold)))?);
+        }
+        for way in found.into_iter().flatten() {
+            let way = Trial { marks: trial.marks, ..way };
+            if !others.iter().chain([trial]).any(|known| known.is_alike(&way)) {
+                others.push(way);
+            }
+        }
+        Ok(others)
+    }
+
     /// Tries a hue at the scale that its spots ask for, for every number of marks: the best trial of each.
     ///
     /// # Errors
@@ -141,7 +174,7 @@ impl Album {
             let scale = self.at_scale(HueAxis::of_luma_sign(dark), level)?;
             for (best, marks) in best.iter_mut().zip(counts) {
                 if let Some(trial) = scale.try_for(*marks, fixed) {
-                    keep_better(best, trial);
+                    keep_better(best, Trial { dark, ..trial });
                 }
             }
         }
@@ -275,7 +308,8 @@ impl Scale {
         };
         let spots: Vec<Vec<Spot>> = self.planes.par_iter().enumerate().map(of_picture).collect();
         let quality = quality(&spots, marks, self.moves, self.luma);
-        let mut trial = Trial { angle_rad: None, level: self.level, threshold, thin, marks, spots, quality };
+        let mut trial =
+            Trial { angle_rad: None, dark: false, level: self.level, threshold, thin, marks, spots, quality };
         // a spot of few samples is round by chance, and beside its surroundings by little
         let wide = trial.usual_samples().map_or(0.0, |n| (n * 4.0 / std::f64::consts::PI).sqrt());
         trial.quality *= (wide / WIDE_ENOUGH).min(1.0);
@@ -324,6 +358,31 @@ impl Trial {
     pub fn likely(&self) -> impl Iterator<Item = &Spot> {
         let moves = self.spots.iter().flatten().any(|s| s.moves);
         self.spots.iter().flatten().filter(move |s| s.roundness >= LEAST_ROUNDNESS && (s.moves || !moves))
+    }
+
+    /// Most pictures show more than the marks.
+    fn is_crowded(&self) -> bool {
+        let crowded = self.spots.iter().filter(|spots| spots.len() > self.marks).count();
+        2 * crowded > self.spots.len()
+    }
+
+    /// Usual top of what moves and stands out most, as many as there are marks.
+    fn usual_top(&self) -> f64 {
+        let lowest = |spots: &Vec<Spot>| {
+            let mut tops: Vec<f64> = spots.iter().filter(|s| s.moves).map(|s| s.top).collect();
+            tops.sort_by(|a, b| b.total_cmp(a));
+            tops.get(self.marks.min(tops.len()).checked_sub(1)?).copied()
+        };
+        median(&mut self.spots.iter().filter_map(lowest).collect::<Vec<_>>()).unwrap_or(self.threshold)
+    }
+
+    /// Two trials would find the same.
+    pub fn is_alike(&self, other: &Self) -> bool {
+        let sizes = self.usual_samples().zip(other.usual_samples());
+        self.angle_rad == other.angle_rad
+            && (self.level, self.thin) == (other.level, other.thin)
+            && (self.threshold / other.threshold).ln().abs() < 0.2
+            && sizes.is_none_or(|(a, b)| (a / b).ln().abs() < 0.4)
     }
 
     /// Usual number of samples of a mark, at the trial's level: of the clearest spots, as many as there are marks.

@@ -15,7 +15,7 @@ mod siting;
 mod threshold;
 
 pub use blobs::Blob;
-pub use calibration::{Spot, Trial};
+pub use calibration::{COUNTS, Spot, Trial};
 pub use centroid::{Centroid, Channels, Shading};
 pub use mask::Part;
 pub use samples::{Album, HuePeak};

@@ -36,6 +36,8 @@ pub struct SitingSurvey {
 const COMMON_ERROR_PX: f64 = 0.04;
 /// Prior weight of a site that is neither stated nor the middle of the pair that a converter averages.
 const RARE_SITE: f64 = 0.1;
+/// The same of one on the right, which no standard knows (ITU-T H.273, chroma sample locations 0 to 5): a picture was mirrored.
+const MIRRORED_SITE: f64 = 0.01;
 /// Fewest marks that tell a site.
 const LEAST_MARKS: usize = 4;
 
@@ -92,7 +94,7 @@ impl SitingSurvey {
                 [siting.stated_px[axis] + d, sd.hypot(of_shading)]
             });
             siting.seen_px[axis] = seen;
-            [siting.used_px[axis], siting.sd_px[axis]] = posterior(siting.stated_px[axis], shift, seen);
+            [siting.used_px[axis], siting.sd_px[axis]] = posterior(axis, siting.stated_px[axis], shift, seen);
         }
         Some(siting)
     }
@@ -100,20 +102,23 @@ impl SitingSurvey {
 
 /// Mean and standard deviation over the sites that a pair (or four, with 4:1:1) of luma samples allows, each with its
 /// probability after what was `seen`: position and standard deviation.
-fn posterior(stated_px: f64, shift: u32, seen: Option<[f64; 2]>) -> [f64; 2] {
+fn posterior(axis: usize, stated_px: f64, shift: u32, seen: Option<[f64; 2]>) -> [f64; 2] {
     let last = (1u32 << shift) - 1;
     let middle = 0.5 * f64::from(last);
+    let places = || (0..=2 * last).map(|k| 0.5 * f64::from(k));
+    // what lies far from every site is wrong by as much at least
+    let seen = seen.map(|[at, sd]| [at, places().map(|site| (site - at).abs()).fold(f64::INFINITY, f64::min).max(sd)]);
     let probable = |site: f64| {
-        let usual = (site - stated_px).abs() < 0.1 || (site - middle).abs() < 0.1;
+        let prior = match site {
+            _ if (site - stated_px).abs() < 0.1 || (site - middle).abs() < 0.1 => 1.0,
+            _ if axis == 0 && site > middle => MIRRORED_SITE,
+            _ => RARE_SITE,
+        };
         let misfit = seen.map_or(0.0, |[at, sd]| 0.5 * ((site - at) / sd).powi(2));
-        (if usual { 1.0 } else { RARE_SITE } * (-misfit).exp(), site)
+        (prior * (-misfit).exp(), site)
     };
-    let sites: Vec<(f64, f64)> = (0..=2 * last).map(|k| probable(0.5 * f64::from(k))).collect();
+    let sites: Vec<(f64, f64)> = places().map(probable).collect();
     let total: f64 = sites.iter().map(|(p, _)| p).sum();
-    if !(total > 1e-12) {
-        // what was seen lies far from every site: the marks do not tell
-        return posterior(stated_px, shift, None);
-    }
     let mean = sites.iter().map(|(p, site)| p * site).sum::<f64>() / total;
     let variance = sites.iter().map(|(p, site)| p * (site - mean).powi(2)).sum::<f64>() / total;
     [mean, variance.sqrt()]
@@ -182,6 +187,12 @@ mod tests {
         for axis in 0..2 {
             assert!((siting.used_px[axis] - 0.5).abs() < 1e-3 && siting.sd_px[axis] < 0.01, "{siting:?}");
         }
+    }
+
+    #[test]
+    fn what_lies_between_sites_leaves_them_open() {
+        let siting = survey([&[1.27, 1.25, 1.29, 1.26, 1.28], &[]], [0.0, 0.5]);
+        assert!(siting.used_px[0] < 0.8 && siting.sd_px[0] > 0.15, "{siting:?}");
     }
 
     #[test]

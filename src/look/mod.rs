@@ -5,35 +5,29 @@
 //! the marks. Only this look is then measured in every frame, and the chain with it. The hinge is a still thing of the
 //! marks' look at the centre of the first arc, or else that centre itself.
 
-mod arc;
-mod chain;
 mod file;
 mod preview;
 
-pub use arc::Arc;
 pub use file::to_toml;
 pub use preview::preview;
 
 use std::path::Path;
 
-use crate::detect::{Album, Hue, Trial};
+use crate::detect::{Album, COUNTS, Hue, Trial};
 use crate::error::{Error, Result};
 use crate::experiment::MarkColour;
 use crate::measure::{Camera, Options, Session};
 use crate::progress::Progress;
-use crate::track::{FrameBlobs, Thing, things};
+use crate::track::hanging::{self, MOST_MARKS};
+use crate::track::{Arc, FrameBlobs, Thing, things};
 use crate::video::{StreamInfo, Timing};
 
 /// Hues that are followed, strongest first.
 const MOST_HUES: usize = 6;
 /// Hues weaker than this share of the strongest are noise, or too small to be marks.
 const LEAST_WEIGHT: f64 = 2e-3;
-/// Numbers of marks for which threshold and scale are chosen: how many there are is not known yet.
-const COUNTS: [usize; 3] = [1, 2, 3];
 /// Stretches of the recording in which a chain is sought, one after the other.
 const STRETCHES: usize = 3;
-/// Marks that are looked for at most.
-pub const MOST_MARKS: usize = 12;
 
 /// One mark of the chain.
 #[derive(Debug, Clone, PartialEq)]
@@ -88,7 +82,7 @@ pub struct Background {
 /// Whatever makes the recording unusable, and [`Error::NothingSwings`].
 pub fn look(path: &Path, options: &Options, folder: &Path, progress: &dyn Progress) -> Result<Finding> {
     let options = Options { marks: Vec::new(), ..options.clone() };
-    let mut session = Session::open(path, &options, folder)?;
+    let mut session = Session::open(path, &options, folder, progress)?;
     let looks = looks(session.album())?;
     let (hues, names): (Vec<Hue>, Vec<String>) = looks.iter().cloned().unzip();
     let (mut seen, mut from_s, mut rest) = (Vec::new(), None, Vec::new());
@@ -98,7 +92,7 @@ pub fn look(path: &Path, options: &Options, folder: &Path, progress: &dyn Progre
             rest = further_stretches(&session, &frames);
         }
         let all = things(&frames);
-        if let Some(chain) = chain::longest(&all, &names) {
+        if let Some(chain) = hanging::longest(&all, &names) {
             let mut worn: Vec<u8> = chain.marks.iter().map(|i| all[*i].hue).collect();
             worn.sort_unstable();
             worn.dedup();
@@ -134,7 +128,7 @@ fn measured(session: &mut Session<'_>, looks: Vec<(Hue, String)>, progress: &dyn
     let (hues, names): (Vec<Hue>, Vec<String>) = looks.into_iter().unzip();
     let frames = session.gather(hues, progress)?;
     let all = things(&frames);
-    let Some(chain) = chain::longest(&all, &names) else { return Ok(None) };
+    let Some(chain) = hanging::longest(&all, &names) else { return Ok(None) };
     let t_s: Vec<f64> = frames.iter().map(|f| f.t_s).collect();
     let marks: Vec<Mark> = chain
         .marks
@@ -148,7 +142,8 @@ fn measured(session: &mut Session<'_>, looks: Vec<(Hue, String)>, progress: &dyn
     };
     let alike = |t: &&Thing| marks.iter().any(|m| m.thing.hue == t.hue) && marks.iter().all(|m| beside(t, m));
     let still = all.iter().filter(|t| !t.moves).filter(alike);
-    let swings_apart = |t: &&Thing| t.moves && chain::hangs_alone(t) && marks.iter().all(|m| m.thing.is_seen_beside(t));
+    let swings_apart =
+        |t: &&Thing| t.moves && hanging::hangs_alone(t) && marks.iter().all(|m| m.thing.is_seen_beside(t));
     let apart = all.iter().filter(swings_apart).filter(alike);
     Ok(Some(Finding {
         frequency_hz: marks.get(swinging).and_then(|m| turns_per_second(&m.thing, &t_s)),
@@ -174,7 +169,7 @@ fn looks(album: &Album) -> Result<Vec<(Hue, String)>> {
     let mut trials: Vec<(Trial, Option<&'static str>)> = Vec::new();
     let mut add = |found: Vec<Option<Trial>>, name: Option<&'static str>| {
         for trial in found.into_iter().flatten() {
-            if !trials.iter().any(|(known, n)| *n == name && is_alike(known, &trial)) {
+            if !trials.iter().any(|(known, n)| *n == name && known.is_alike(&trial)) {
                 trials.push((trial, name));
             }
         }
@@ -195,15 +190,6 @@ fn looks(album: &Album) -> Result<Vec<(Hue, String)>> {
         looks.push((hue, name));
     }
     Ok(looks)
-}
-
-/// Two trials would find the same.
-fn is_alike(a: &Trial, b: &Trial) -> bool {
-    let sizes = a.usual_samples().zip(b.usual_samples());
-    a.angle_rad == b.angle_rad
-        && (a.level, a.thin) == (b.level, b.thin)
-        && (a.threshold / b.threshold).ln().abs() < 0.2
-        && sizes.is_none_or(|(a, b)| (a / b).ln().abs() < 0.4)
 }
 
 /// `seen`: frames and things of every stretch. The stretch with most of them speaks.

@@ -2,6 +2,7 @@
 
 mod glance;
 mod survey;
+mod trials;
 mod view;
 
 use std::path::{Path, PathBuf};
@@ -119,7 +120,7 @@ impl Measurement {
 /// # Errors
 /// Whatever makes the recording unusable; see [`Error`].
 pub fn measure(path: &Path, options: &Options, folder: &Path, progress: &dyn Progress) -> Result<Measurement> {
-    Session::open(path, options, folder)?.run(progress)
+    Session::open(path, options, folder, progress)?.run(progress)
 }
 
 /// A recording that is about to be measured: what is sought is known.
@@ -148,7 +149,7 @@ impl<'a> Session<'a> {
     ///
     /// # Errors
     /// As [`measure`].
-    pub fn open(path: &Path, options: &'a Options, folder: &Path) -> Result<Self> {
+    pub fn open(path: &Path, options: &'a Options, folder: &Path, progress: &dyn Progress) -> Result<Self> {
         let recording = Recording::open(path, &options.still_times)?;
         let stream = recording.info().clone();
         let calibration = Calibration::new(&options.rig, stream.pixel_aspect, folder)?;
@@ -156,16 +157,11 @@ impl<'a> Session<'a> {
         let (mut hues, slots) = hues_of(&options.marks);
         let pictures = survey::pictures(&recording, &options.rig)?;
         let album = survey::album(&pictures, &area, stream.orientation);
-        let marks = || {
-            album.calibrate(&mut hues, options.threshold)?;
-            survey::shade(&pictures, &mut hues)?;
-            survey::siting(&pictures, &hues)
-        };
-        let (siting, (background, camera)) = rayon::join(marks, || survey::camera(&pictures, options, &stream));
-        let siting = siting?;
-        let pictures = if hues.is_empty() { pictures } else { Vec::new() };
+        let marks = || album.calibrate(&mut hues, options.threshold);
+        let (trials, (background, camera)) = rayon::join(marks, || survey::camera(&pictures, options, &stream));
+        let trials = trials?;
         let (path, stamps_s) = (path.to_owned(), Vec::new());
-        Ok(Self {
+        let mut session = Self {
             path,
             options,
             recording,
@@ -175,13 +171,23 @@ impl<'a> Session<'a> {
             album,
             pictures,
             hues,
-            siting,
+            siting: None,
             slots,
             background,
             first_camera: camera,
             camera,
             stamps_s,
-        })
+        };
+        if !session.hues.is_empty() {
+            if options.threshold.is_none() {
+                session.settle(&trials, progress)?;
+            }
+            survey::shade(&session.pictures, &mut session.hues)?;
+            session.siting = survey::siting(&session.pictures, &session.hues)?;
+            // nothing is learnt from them any more
+            session.pictures.clear();
+        }
+        Ok(session)
     }
 
     /// What is sought.

@@ -1,9 +1,11 @@
 //! Blobs → one track a mark (paper Section III.II).
 
+mod arc;
 mod assign;
 mod chain;
 mod choose;
 mod follower;
+pub mod hanging;
 mod identity;
 mod kalman;
 mod noise;
@@ -14,6 +16,7 @@ mod tracker;
 mod tracklet;
 mod tracks;
 
+pub use arc::Arc;
 pub use choose::Spare;
 pub use kalman::{Belief, Measurement, Motion};
 pub use noise::Scatter;

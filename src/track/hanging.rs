@@ -1,8 +1,8 @@
-//! Which of the things that last are the marks, and in which order.
+//! Which of the things that last hang together and swing, and in which order: the marks of a recording of which nothing is
+//! known, or the best of several ways to see those that are known.
 
+use super::Thing;
 use super::arc::Arc;
-use crate::caution::LEAST_TURN;
-use crate::track::Thing;
 
 /// Change of a distance over the motion beyond which two things are not on one link.
 const MOST_STRETCH: f64 = 0.15;
@@ -12,6 +12,8 @@ const MOST_OFF_ARC: f64 = 0.04;
 const MOST_UNLIKE: f64 = 1.0;
 /// What a thing of the marks' look that swings, and is none, takes from it.
 const STRAY: f64 = 0.2;
+/// Of two chains whose worths differ by less than half a stray, neither is the better.
+pub const CHANCE: f64 = 0.5 * STRAY;
 /// What a path that is hardly an arc takes from it, against one that is an arc exactly: of two looks that show as many
 /// marks, the clearer one counts.
 const BLURRED_ARC: f64 = 0.2;
@@ -26,6 +28,10 @@ const PARTS_TIMES: f64 = 2.0;
 const PARTS_REACH: f64 = 1.1;
 /// By how much of it their travel differs from its own at most.
 const PARTS_TRAVEL: f64 = 0.2;
+/// Motion of one thing against another, as a share of how far both move, below which they do not turn about each other.
+pub const LEAST_TURN: f64 = 0.02;
+/// Marks that are looked for at most.
+pub const MOST_MARKS: usize = 12;
 /// Share of the frames in which a mark is seen, at least.
 const LEAST_PRESENCE: f64 = 0.4;
 /// How much farther a lower mark swings than an upper one, from which on that decides which is which.
@@ -56,6 +62,12 @@ pub fn longest(things: &[Thing], names: &[String]) -> Option<Chain> {
     let coloured = of_look(things, &|t| hued(t.hue), true, &|_| false);
     let wins = |c: &Chain| (c.marks.len(), c.worth) > (best.marks.len(), best.worth);
     Some(coloured.filter(wins).unwrap_or(best))
+}
+
+/// How well what belongs together forms a chain of so many marks; `None` where it forms none.
+pub fn worth(things: &[Thing], belongs: &dyn Fn(&Thing) -> bool, marks: usize) -> Option<f64> {
+    let chain = of_look(things, belongs, true, &|_| false)?;
+    Some(chain.worth - chain.marks.len().abs_diff(marks) as f64)
 }
 
 fn of_look(
@@ -181,7 +193,7 @@ fn rigid_set(things: &[Thing], movers: &[usize], first: usize) -> Vec<usize> {
             .filter(|i| !set.contains(i) && like(*i))
             .find(|i| set.iter().any(|k| things[*i].stretch(&things[*k]) < MOST_STRETCH));
         match next {
-            Some(next) if set.len() < super::MOST_MARKS => set.push(next),
+            Some(next) if set.len() < MOST_MARKS => set.push(next),
             _ => return set,
         }
     }
