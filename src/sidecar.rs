@@ -167,7 +167,7 @@ impl Sidecar {
                 }),
             },
             time_stamps: m.timing.clone(),
-            marks: (0..options.marks.len()).map(|i| Mark::new(options, m, i)).collect(),
+            marks: (0..m.marks.len()).map(|i| Mark::new(m, i)).collect(),
             angles: m.angles.links.iter().map(|link| Link::new(link)).collect(),
             damage: Damage {
                 packets: m.decoded.packets,
@@ -264,7 +264,7 @@ impl Source {
 impl Settings {
     fn new(options: &Options, m: &Measurement) -> Self {
         Self {
-            marks: options.marks.iter().map(|c| c.name.clone()).collect(),
+            marks: m.marks.iter().map(|c| c.name.clone()).collect(),
             pivot_px: options.rig.pivot_px,
             mirrored: options.rig.mirrored,
             plumb_px: options.rig.plumb_px,
@@ -297,12 +297,12 @@ impl Settings {
 }
 
 impl Mark {
-    fn new(options: &Options, m: &Measurement, index: usize) -> Self {
+    fn new(m: &Measurement, index: usize) -> Self {
         let points = &m.tracks.marks[index];
         let measured: Vec<[f64; 3]> = points.iter().filter_map(|p| p.measured).map(|m| m.covariance_px2).collect();
         let rms = |axis: usize| (measured.iter().map(|c| c[axis]).sum::<f64>() / measured.len().max(1) as f64).sqrt();
         Self {
-            colour: options.marks[index].name.clone(),
+            colour: m.marks[index].name.clone(),
             frames_measured: measured.len(),
             share_measured: measured.len() as f64 / points.len().max(1) as f64,
             longest_gap_frames: longest_gap(points),

@@ -76,6 +76,16 @@ fn fewer_marks_than_swing_are_said_and_more_are_refused() {
 }
 
 #[test]
+fn with_one_colour_as_many_marks_count_as_hang_together() {
+    let bench = Bench::of(&scene());
+    assert!(done(&bench.track(&["--color", "red"])).contains(" frames, 3 marks, "));
+    assert_eq!(column(&bench.table(), "theta2_rad").len(), column(&bench.table(), "t_s").len());
+    // the lowest one alone, as a ball on a thread
+    assert!(done(&bench.track(&["--color", "red", "--roi", "60,150,200,90"])).contains(" frames, 1 mark, "));
+    assert!(!column(&bench.table(), "displacement_px").is_empty());
+}
+
+#[test]
 fn a_colour_that_is_not_there_is_answered_with_the_one_that_moves_and_with_pictures() {
     let mut plain = scene();
     plain.render.strip_rgb = Rgb([90, 90, 94]);

@@ -51,7 +51,7 @@ pub struct TrackArgs {
     /// Colour of the marks, a name or #rrggbb; once for all, or once a mark, top to bottom.
     #[arg(long, value_name = "COLOUR")]
     color: Vec<MarkColour>,
-    /// Number of marks.
+    /// Number of marks; without it the file's, with one --color as many as hang together, else 3, or 2 below a --pivot.
     #[arg(long, value_name = "N")]
     markers: Option<usize>,
     /// A fixed, unmarked pivot above the first mark, in displayed pixels.
@@ -219,6 +219,7 @@ impl TrackArgs {
         }
         let defaults = Options::default();
         Ok(Options {
+            count_marks: self.color.len() == 1 && self.markers.is_none() && rig.marks.is_empty(),
             marks: self.marks(&rig.marks, rig.pivot_px.is_some())?,
             rig,
             threshold,
@@ -312,10 +313,14 @@ impl TrackArgs {
         console.warnings(&sidecar.warnings);
         let links = &measurement.angles.links;
         let measured = (0..measurement.timing.frames).filter(|f| links.iter().all(|l| l[*f].is_some())).count();
+        let marks = match measurement.marks.len() {
+            1 => "1 mark".to_owned(),
+            several => format!("{several} marks"),
+        };
         let what =
             if links.is_empty() { "a displacement, no angle".to_owned() } else { format!("all angles in {measured}") };
         console.remark(format!(
-            "{}: {} frame{}, {what}, written to {}",
+            "{}: {} frame{}, {marks}, {what}, written to {}",
             self.video.display(),
             measurement.timing.frames,
             if measurement.timing.frames == 1 { "" } else { "s" },

@@ -115,16 +115,12 @@ impl Album {
         Ok(best.map(|(_, trial)| trial))
     }
 
-    /// Other ways to see what `trial` looks for, where its pictures show more than the marks: for other numbers of
-    /// spots, and above higher thresholds.
+    /// Other ways to see what `trial` looks for: for other numbers of spots, and above higher thresholds.
     ///
     /// # Errors
     /// [`crate::Error::OpenCv`].
     pub fn others(&self, trial: &Trial) -> Result<Vec<Trial>> {
         let mut others: Vec<Trial> = Vec::new();
-        if !trial.is_crowded() {
-            return Ok(others);
-        }
         let ways = |counts: &[usize], fixed: Option<f64>| match (trial.angle_rad, trial.dark) {
             (Some(angle_rad), _) => self.try_hue(angle_rad, counts, fixed),
             (None, dark) => self.try_luma(dark, counts, fixed),
@@ -361,7 +357,7 @@ impl Trial {
     }
 
     /// Most pictures show more than the marks.
-    fn is_crowded(&self) -> bool {
+    pub fn is_crowded(&self) -> bool {
         let crowded = self.spots.iter().filter(|spots| spots.len() > self.marks).count();
         2 * crowded > self.spots.len()
     }

@@ -31,7 +31,7 @@ pub struct MarkColour {
 }
 
 impl MarkColour {
-    const NAMES: [(&'static str, [u8; 3]); 12] = [
+    const NAMES: [(&'static str, [u8; 3]); 14] = [
         ("red", [255, 0, 0]),
         ("green", [0, 160, 0]),
         ("blue", [0, 0, 255]),
@@ -40,6 +40,8 @@ impl MarkColour {
         ("magenta", [255, 0, 255]),
         ("cyan", [0, 255, 255]),
         ("violet", [128, 0, 255]),
+        ("purple", [160, 0, 200]),
+        ("pink", [255, 80, 160]),
         ("dark", [0, 0, 0]),
         ("black", [0, 0, 0]),
         ("light", [255, 255, 255]),

@@ -37,6 +37,8 @@ pub enum Steadying {
 pub struct Options {
     /// One colour a mark, top to bottom.
     pub marks: Vec<MarkColour>,
+    /// There may be more or fewer, all of the first one's colour: as many as hang together and swing.
+    pub count_marks: bool,
     /// Mirror, pivot, plumb line, lens.
     pub rig: Rig,
     /// Threshold on the colour component, 0 to 255; chosen from the recording where absent.
@@ -57,6 +59,7 @@ impl Default for Options {
     fn default() -> Self {
         Self {
             marks: vec![MarkColour::red(); 3],
+            count_marks: false,
             rig: Rig::default(),
             threshold: None,
             angle_source: AngleSource::default(),
@@ -79,6 +82,8 @@ pub struct Measurement {
     pub timing: Timing,
     /// The hues with their thresholds.
     pub hues: Vec<Hue>,
+    /// One colour a mark, top to bottom.
+    pub marks: Vec<MarkColour>,
     /// One track a mark.
     pub tracks: Tracks,
     /// One angle a link.
@@ -179,7 +184,7 @@ impl<'a> Session<'a> {
             stamps_s,
         };
         if !session.hues.is_empty() {
-            if options.threshold.is_none() {
+            if options.threshold.is_none() || options.count_marks {
                 session.settle(&trials, progress)?;
             }
             survey::shade(&session.pictures, &mut session.hues)?;
@@ -302,7 +307,8 @@ impl<'a> Session<'a> {
         self.camera.finish(self.stamps_s.len());
         let (stream, hues, camera) = (self.stream.clone(), self.hues.clone(), self.camera);
         let siting = self.siting;
-        Ok(Measurement { stream, decoded, timing, hues, tracks, angles, file_t_s, time_scale, camera, siting })
+        let marks = self.slots.iter().map(|slot| hues[usize::from(slot.hue)].colour.clone()).collect();
+        Ok(Measurement { stream, decoded, timing, hues, marks, tracks, angles, file_t_s, time_scale, camera, siting })
     }
 }
 

@@ -9,42 +9,70 @@ use super::Session;
 use crate::detect::{Hue, Trial};
 use crate::error::Result;
 use crate::progress::Progress;
-use crate::track::{hanging, things};
+use crate::track::hanging::{self, Chain};
+use crate::track::{MarkSlot, things};
+
+/// One way to look for a hue, and what hangs together of what it sees.
+struct Way {
+    hue: Hue,
+    chain: Option<Chain>,
+}
 
 impl Session<'_> {
-    /// Settles on a way to look for every hue whose trial showed more than the marks.
+    /// Settles on a way to look for every hue whose trial showed more than the marks, and on the number of marks where nobody
+    /// said it.
     pub(super) fn settle(&mut self, trials: &[Option<Trial>], progress: &dyn Progress) -> Result<()> {
         for (index, trial) in trials.iter().enumerate() {
             let Some(trial) = trial else { continue };
-            let mut ways = self.hues.clone();
-            for other in self.album.others(trial)? {
-                let mut hue = self.hues[index].clone();
-                hue.adopt(&other, self.album.sample_px2());
-                ways.push(hue);
-            }
-            if ways.len() > self.hues.len() {
-                let best = self.best_way(index, &ways, progress)?;
-                self.hues[index] = ways.swap_remove(best);
+            if self.options.count_marks || trial.is_crowded() {
+                let ways = self.ways(index, trial, progress)?;
+                let best = best(ways, |chain| match self.options.count_marks {
+                    true => chain.worth,
+                    false => chain.worth - chain.marks.len().abs_diff(self.slots.len()) as f64,
+                });
+                let Some(Way { hue, chain: Some(chain) }) = best else { continue };
+                self.hues[index] = hue;
+                if self.options.count_marks {
+                    self.count(&chain);
+                }
             }
         }
         Ok(())
     }
 
-    /// The best way to look for hue `index`, of its own and those that follow the hues; the others as they are.
-    fn best_way(&mut self, index: usize, ways: &[Hue], progress: &dyn Progress) -> Result<usize> {
-        let things = things(&self.glance(ways, None, progress)?);
-        let worth = |way: usize| {
-            let belongs =
-                |hue: u8| usize::from(hue) == way || usize::from(hue) < self.hues.len() && usize::from(hue) != index;
-            hanging::worth(&things, &|thing| belongs(thing.hue), self.slots.len())
+    /// The way of a hue's trial, and others, above ever higher thresholds; the other hues as they are.
+    fn ways(&self, index: usize, trial: &Trial, progress: &dyn Progress) -> Result<Vec<Way>> {
+        let known = self.hues.len();
+        // a threshold that was given stays
+        let mut others = if self.options.threshold.is_none() { self.album.others(trial)? } else { Vec::new() };
+        others.sort_by(|a, b| a.threshold.total_cmp(&b.threshold));
+        let mut hues = self.hues.clone();
+        for other in &others {
+            let mut hue = self.hues[index].clone();
+            hue.adopt(other, self.album.sample_px2());
+            hues.push(hue);
+        }
+        let things = things(&self.glance(&hues, None, progress)?);
+        let way = |way: usize| {
+            let belongs = |hue: usize| hue == way || hue < known && hue != index;
+            let chain = hanging::of_hues(&things, &|thing| belongs(usize::from(thing.hue)));
+            Way { hue: hues[way].clone(), chain }
         };
-        let mut worths: Vec<(f64, usize)> =
-            (self.hues.len()..ways.len()).filter_map(|w| Some((worth(w)?, w))).collect();
-        worths.sort_by(|a, b| ways[a.1].threshold.total_cmp(&ways[b.1].threshold));
-        // its own way where that is as good, or the one that sees most of the marks
-        worths.splice(0..0, worth(index).map(|worth| (worth, index)));
-        let most = worths.iter().map(|(worth, _)| *worth).fold(f64::NEG_INFINITY, f64::max);
-        let as_good = worths.iter().find(|(worth, _)| *worth > most - hanging::CHANCE);
-        Ok(as_good.map_or(index, |(_, way)| *way))
+        Ok([index].into_iter().chain(known..hues.len()).map(way).collect())
     }
+
+    /// As many marks as hang together. A pivot that is known is none of them.
+    fn count(&mut self, chain: &Chain) {
+        let hinge = usize::from(chain.hinge_marked && self.options.rig.pivot_px.is_some());
+        let marks = chain.marks.len() - hinge;
+        self.hues[0].marks = marks;
+        self.slots.resize(marks, MarkSlot { hue: 0 });
+    }
+}
+
+/// The first of those that are as good as the best: its own, or the one that sees most of the marks.
+fn best(ways: Vec<Way>, worth: impl Fn(&Chain) -> f64) -> Option<Way> {
+    let worth = |way: &Way| way.chain.as_ref().map(&worth);
+    let most = ways.iter().filter_map(worth).fold(f64::NEG_INFINITY, f64::max);
+    ways.into_iter().find(|way| worth(way).is_some_and(|worth| worth > most - hanging::CHANCE))
 }

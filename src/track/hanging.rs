@@ -43,7 +43,8 @@ pub struct Chain {
     pub marks: Vec<usize>,
     pub arc: Option<Arc>,
     pub hinge_marked: bool,
-    worth: f64,
+    /// How clear it is: the marks that are seen, less what else of their look swings.
+    pub worth: f64,
 }
 
 /// The best chain that any look shows, filled up with what other looks add to it.
@@ -64,10 +65,9 @@ pub fn longest(things: &[Thing], names: &[String]) -> Option<Chain> {
     Some(coloured.filter(wins).unwrap_or(best))
 }
 
-/// How well what belongs together forms a chain of so many marks; `None` where it forms none.
-pub fn worth(things: &[Thing], belongs: &dyn Fn(&Thing) -> bool, marks: usize) -> Option<f64> {
-    let chain = of_look(things, belongs, true, &|_| false)?;
-    Some(chain.worth - chain.marks.len().abs_diff(marks) as f64)
+/// The chain that things of the marks' hues form.
+pub fn of_hues(things: &[Thing], belongs: &dyn Fn(&Thing) -> bool) -> Option<Chain> {
+    of_look(things, belongs, true, &|_| false)
 }
 
 fn of_look(
