@@ -22,6 +22,8 @@ const NOISE_OF_WIDTH: f64 = 0.005;
 const LEAST_TRAVEL: f64 = 0.05;
 /// Change of the distance from a still thing, over the motion, up to which that is the hinge.
 const HINGE_STRETCH: f64 = 0.1;
+/// Standard deviations of a row beyond which an error that all rows share is worth a word.
+const SHARED_DEVIATIONS: f64 = 3.0;
 /// Standard deviations of a link's own angle below which it does not turn.
 const STILL_DEVIATIONS: f64 = 4.0;
 /// Things that are listed one by one.
@@ -51,6 +53,7 @@ pub fn cautions(m: &Measurement, options: &Options) -> Vec<String> {
         cautions.extend(mark_noise(m, mark));
         cautions.extend(blur(m, mark));
     }
+    cautions.extend(pivot(m, options));
     cautions.extend(camera(m, options));
     cautions.extend(time(m, options));
     cautions
@@ -166,6 +169,32 @@ fn turns(m: &Measurement, options: &Options, link: usize) -> Option<String> {
             link + 1,
             own.to_degrees(),
             most.to_degrees()
+        )
+    })
+}
+
+/// A pivot that is known to some pixels makes the angles of the first link wrong all alike: across the link by a shift, along it
+/// by a factor.
+fn pivot(m: &Measurement, options: &Options) -> Option<String> {
+    let ([x, y], [sx, sy]) = (options.rig.pivot_px?, options.rig.pivot_sd_px?);
+    let place = |axis: usize| {
+        let mut at: Vec<f64> =
+            m.tracks.marks.first()?.iter().filter_map(|p| Some(p.measured?.position_px[axis])).collect();
+        median(&mut at)
+    };
+    let [dx, dy] = [place(0)? - x, place(1)? - y];
+    let length_px = dx.hypot(dy);
+    let (cos, sin) = (dx / length_px, dy / length_px);
+    let [factor, shift_rad] = [(cos * sx).hypot(sin * sy), (sin * sx).hypot(cos * sy)].map(|sd_px| sd_px / length_px);
+    let angles = m.angles.links.first()?.iter().flatten();
+    let theta_rad = angles.clone().map(|a| a.theta_rad);
+    let most_rad = 0.5 * (theta_rad.clone().fold(f64::MIN, f64::max) - theta_rad.fold(f64::MAX, f64::min));
+    let sd_rad = median(&mut angles.map(|a| a.sd_rad).collect::<Vec<_>>())?;
+    (shift_rad.max(factor * most_rad) > SHARED_DEVIATIONS * sd_rad).then(|| {
+        format!(
+            "the pivot is known to ± {sx:.1}, {sy:.1} px: all angles of link 1 may be too large or too small by {:.1} % and shifted by {:.2}°, beyond the standard deviations in the table (frequency and damping stay as they are); a mark on the hinge, or a wider swing, tells it better",
+            100.0 * factor,
+            shift_rad.to_degrees()
         )
     })
 }

@@ -44,6 +44,7 @@ struct Source {
 struct Settings {
     marks: Vec<String>,
     pivot_px: Option<[f64; 2]>,
+    pivot_sd_px: Option<[f64; 2]>,
     mirrored: bool,
     plumb_px: Option<[[f64; 2]; 2]>,
     lens_calibration: Option<String>,
@@ -266,6 +267,7 @@ impl Settings {
         Self {
             marks: m.marks.iter().map(|c| c.name.clone()).collect(),
             pivot_px: options.rig.pivot_px,
+            pivot_sd_px: options.rig.pivot_sd_px,
             mirrored: options.rig.mirrored,
             plumb_px: options.rig.plumb_px,
             lens_calibration: options.rig.lens_calibration.as_ref().map(|p| p.display().to_string()),

@@ -173,6 +173,24 @@ fn of_marks_that_are_alike_there_may_be_fewer_than_the_file_says() {
 }
 
 #[test]
+fn a_pivot_known_to_some_pixels_makes_all_angles_wrong_alike_and_that_is_said() {
+    let bench = Bench::of(&scene());
+    let said_of = |sd_px: &str| {
+        let rig = format!(
+            "[rig]\nmarks = [\"red\", \"red\"]\npivot_px = [160.0, 40.0]\nroi_px = [0.0, 70.0, 320.0, 170.0]\npivot_sd_px = {sd_px}\n"
+        );
+        std::fs::write(bench.path("rig.toml"), rig).unwrap();
+        done(&bench.track(&["--config", "rig.toml"]))
+    };
+    // 75 px from the pivot to the joint, on the average
+    let words = said_of("[0.4, 8.0]");
+    assert!(words.contains("the pivot is known to ± 0.4, 8.0 px") && words.contains("by 10."), "{words}");
+    assert!(!said_of("[0.01, 0.02]").contains("the pivot is known"));
+    std::fs::write(bench.path("rig.toml"), "[rig]\npivot_sd_px = [1.0, 1.0]\n").unwrap();
+    assert!(refused(&bench.track(&["--config", "rig.toml"])).contains("rig.pivot_px, which is not given"));
+}
+
+#[test]
 fn one_mark_alone_gives_its_displacement() {
     let bench = Bench::of(&scene());
     done(&bench.track(&["--markers", "1", "--overlay", "seen.mp4"]));

@@ -200,7 +200,9 @@ impl TrackArgs {
     fn options(&self, experiment: Experiment) -> Result<Options> {
         let mut rig = experiment.rig;
         rig.mirrored |= self.mirrored;
-        rig.pivot_px = self.pivot.or(rig.pivot_px);
+        if self.pivot.is_some() {
+            (rig.pivot_px, rig.pivot_sd_px) = (self.pivot, None);
+        }
         rig.roi_px = self.roi.or(rig.roi_px);
         rig.mask = self.mask_path()?.or(rig.mask);
         rig.from_s = self.from.or(rig.from_s);

@@ -126,6 +126,8 @@ pub struct Rig {
     pub mirrored: bool,
     /// A fixed, unmarked hinge; then the first mark is the joint.
     pub pivot_px: Option<[f64; 2]>,
+    /// Standard deviation of that along x and y.
+    pub pivot_sd_px: Option<[f64; 2]>,
     /// One colour a mark, top to bottom.
     pub marks: Vec<MarkColour>,
     /// Two points on a plumb line, upper first: the picture's true vertical.
@@ -156,6 +158,7 @@ impl Default for Rig {
             support_stiffness_n_m_per_rad: 0.0,
             mirrored: false,
             pivot_px: None,
+            pivot_sd_px: None,
             marks: Vec::new(),
             plumb_px: None,
             pixel_aspect: None,
@@ -210,6 +213,12 @@ impl Rig {
         }
         if self.pivot_px.is_some_and(|p| !p[0].is_finite() || !p[1].is_finite()) {
             return Err("rig.pivot_px: must be two finite numbers".to_owned());
+        }
+        if self.pivot_sd_px.is_some_and(|sd| !sd.iter().all(|sd| sd.is_finite() && *sd >= 0.0)) {
+            return Err("rig.pivot_sd_px: must be two numbers of at least 0".to_owned());
+        }
+        if self.pivot_sd_px.is_some() && self.pivot_px.is_none() {
+            return Err("rig.pivot_sd_px: is the standard deviation of rig.pivot_px, which is not given".to_owned());
         }
         Ok(())
     }

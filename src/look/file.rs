@@ -167,7 +167,8 @@ fn pivot(text: &mut String, finding: &Finding) {
     } else if finding.hinge_marked {
         let _ = writeln!(text, "# the first mark is the hinge: at {x:.1}, {y:.1} lies the {what}");
     } else if finding.states_pivot() {
-        let _ = writeln!(text, "pivot_px = [{x:.2}, {y:.2}]    # {what}");
+        let _ = writeln!(text, "pivot_px = [{x:.2}, {y:.2}]    # centre of the first arc{beside}");
+        let _ = writeln!(text, "pivot_sd_px = [{sx:.2}, {sy:.2}]      # its standard deviation");
         let _ = writeln!(text, "# the first mark is {:.1} px below it", arc.radius_px);
     } else {
         let _ = writeln!(
