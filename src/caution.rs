@@ -1,5 +1,6 @@
 //! What a careful colleague would say about a measurement: each with the number and what to do.
 
+use crate::angles::Angle;
 use crate::experiment::Experiment;
 use crate::measure::{Measurement, Options, Steadying};
 use crate::statistics::median;
@@ -145,14 +146,22 @@ fn hinge_among(m: &Measurement) -> Option<[f64; 2]> {
     m.tracks.spares.iter().filter(|s| !s.moves).find(keeps).map(|s| s.position_px)
 }
 
+/// Half the range of an angle.
+fn half_range_rad(angles: &[Option<Angle>]) -> f64 {
+    let theta_rad = angles.iter().flatten().map(|a| a.theta_rad);
+    0.5 * (theta_rad.clone().fold(f64::MIN, f64::max) - theta_rad.fold(f64::MAX, f64::min))
+}
+
+/// The usual standard deviation of its rows.
+fn usual_sd_rad(angles: &[Option<Angle>]) -> Option<f64> {
+    median(&mut angles.iter().flatten().map(|a| a.sd_rad).collect::<Vec<_>>())
+}
+
 /// A link between two things that stand still says nothing, and the marks were counted from the wrong one.
 fn turns(m: &Measurement, options: &Options, link: usize) -> Option<String> {
-    let half_range = |link: usize| {
-        let angles = m.angles.links[link].iter().flatten().map(|a| a.theta_rad);
-        0.5 * (angles.clone().fold(f64::MIN, f64::max) - angles.fold(f64::MAX, f64::min))
-    };
-    let sd_rad = median(&mut m.angles.links[link].iter().flatten().map(|a| a.sd_rad).collect::<Vec<_>>())?;
-    let (own, most) = (half_range(link), (0..m.angles.links.len()).map(half_range).fold(0.0, f64::max));
+    let sd_rad = usual_sd_rad(&m.angles.links[link])?;
+    let own = half_range_rad(&m.angles.links[link]);
+    let most = m.angles.links.iter().map(|angles| half_range_rad(angles)).fold(0.0, f64::max);
     let measured = m.angles.links[link].iter().flatten().count();
     let still = measured >= FEWEST_FRAMES && own < (LEAST_TURN * most).max(STILL_DEVIATIONS * sd_rad).min(0.2 * most);
     let remedy = if options.rig.pivot_px.is_some() && link == 0 {
@@ -186,11 +195,9 @@ fn pivot(m: &Measurement, options: &Options) -> Option<String> {
     let length_px = dx.hypot(dy);
     let (cos, sin) = (dx / length_px, dy / length_px);
     let [factor, shift_rad] = [(cos * sx).hypot(sin * sy), (sin * sx).hypot(cos * sy)].map(|sd_px| sd_px / length_px);
-    let angles = m.angles.links.first()?.iter().flatten();
-    let theta_rad = angles.clone().map(|a| a.theta_rad);
-    let most_rad = 0.5 * (theta_rad.clone().fold(f64::MIN, f64::max) - theta_rad.fold(f64::MAX, f64::min));
-    let sd_rad = median(&mut angles.map(|a| a.sd_rad).collect::<Vec<_>>())?;
-    (shift_rad.max(factor * most_rad) > SHARED_DEVIATIONS * sd_rad).then(|| {
+    let angles = m.angles.links.first()?;
+    let sd_rad = usual_sd_rad(angles)?;
+    (shift_rad.max(factor * half_range_rad(angles)) > SHARED_DEVIATIONS * sd_rad).then(|| {
         format!(
             "the pivot is known to ± {sx:.1}, {sy:.1} px: all angles of link 1 may be too large or too small by {:.1} % and shifted by {:.2}°, beyond the standard deviations in the table (frequency and damping stay as they are); a mark on the hinge, or a wider swing, tells it better",
             100.0 * factor,

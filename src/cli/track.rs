@@ -14,6 +14,7 @@ use crate::measure::{Measurement, Options, Session, Steadying};
 use crate::output::OutputFile;
 use crate::overlay::{self, Overlay};
 use crate::sidecar::Sidecar;
+use crate::track::hanging::MOST_MARKS;
 use crate::video::{Recording, StillTimes};
 
 /// Follow the marks of a recording and write their angles.
@@ -274,8 +275,8 @@ impl TrackArgs {
         if let Some(wanted) = self.markers.filter(|wanted| *wanted != count) {
             return Err(option("--markers", &format!("{wanted} marks asked for, {count} colours given")));
         }
-        if !(1..=12).contains(&count) {
-            return Err(option("--markers", "1 to 12 marks can be followed"));
+        if !(1..=MOST_MARKS).contains(&count) {
+            return Err(option("--markers", &format!("1 to {MOST_MARKS} marks can be followed")));
         }
         Ok(colour.map_or_else(|| given.to_vec(), |one| vec![one; count]))
     }

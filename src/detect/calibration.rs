@@ -121,9 +121,9 @@ impl Album {
     /// [`crate::Error::OpenCv`].
     pub fn others(&self, trial: &Trial) -> Result<Vec<Trial>> {
         let mut others: Vec<Trial> = Vec::new();
-        let ways = |counts: &[usize], fixed: Option<f64>| match (trial.angle_rad, trial.dark) {
-            (Some(angle_rad), _) => self.try_hue(angle_rad, counts, fixed),
-            (None, dark) => self.try_luma(dark, counts, fixed),
+        let ways = |counts: &[usize], fixed: Option<f64>| match trial.angle_rad {
+            Some(angle_rad) => self.try_hue(angle_rad, counts, fixed),
+            None => self.try_luma(trial.dark, counts, fixed),
         };
         let mut found = ways(&COUNTS, None)?;
         for part in HIGHER {

@@ -46,11 +46,11 @@ impl SitingSurvey {
     ///
     /// # Errors
     /// As [`Detector::detect`].
-    pub fn see(&mut self, picture: &Picture<'_>, detector: &Detector) -> Result<()> {
+    pub fn see(picture: &Picture<'_>, detector: &Detector) -> Result<Self> {
         let layout = picture.layout;
-        self.layout.get_or_insert(layout);
+        let mut survey = Self { layout: Some(layout), ..Self::default() };
         if layout.chroma_shift_x == 0 && layout.chroma_shift_y == 0 {
-            return Ok(());
+            return Ok(survey);
         }
         let luma = detector.detect_by(picture, Channels::Luma)?;
         let colour = detector.detect_by(picture, Channels::Chroma)?;
@@ -59,10 +59,10 @@ impl SitingSurvey {
             let same = |b: &&Blob| (a.hue, a.binary_px) == (b.hue, b.binary_px);
             let Some(b) = colour.iter().find(same) else { continue };
             let (p, q) = (&a.centroid, &b.centroid);
-            self.differences[0].push([p.x_px - q.x_px, p.variance_px2[0] + q.variance_px2[0]]);
-            self.differences[1].push([p.y_px - q.y_px, p.variance_px2[1] + q.variance_px2[1]]);
+            survey.differences[0].push([p.x_px - q.x_px, p.variance_px2[0] + q.variance_px2[0]]);
+            survey.differences[1].push([p.y_px - q.y_px, p.variance_px2[1] + q.variance_px2[1]]);
         }
-        Ok(())
+        Ok(survey)
     }
 
     /// Both together.
@@ -74,9 +74,9 @@ impl SitingSurvey {
         self
     }
 
-    /// What the pictures show; `None` where there were none. `unshaded` is the same survey with the marks taken for evenly lit:
-    /// by as much as their shading changes the differences they may be wrong still.
-    pub fn conclude(self, unshaded: &Self) -> Option<Siting> {
+    /// What the pictures show; `None` where there were none. `unshaded` is the same survey with the marks taken for evenly lit,
+    /// where they are not: by as much as their shading changes the differences they may be wrong still.
+    pub fn conclude(self, unshaded: Option<&Self>) -> Option<Siting> {
         let layout = self.layout?;
         let mut siting = Siting {
             stated_px: layout.chroma_site_px,
@@ -88,7 +88,7 @@ impl SitingSurvey {
             if shift == 0 {
                 continue;
             }
-            let flat = robust_mean(&unshaded.differences[axis]);
+            let flat = unshaded.and_then(|unshaded| robust_mean(&unshaded.differences[axis]));
             let seen = robust_mean(&self.differences[axis]).map(|[d, sd]| {
                 let of_shading = flat.map_or(0.0, |[flat, _]| d - flat);
                 [siting.stated_px[axis] + d, sd.hypot(of_shading)]
@@ -158,10 +158,10 @@ mod tests {
     use super::*;
 
     fn survey(differences: [&[f64]; 2], stated_px: [f64; 2]) -> Siting {
-        shaded_survey(differences, differences, stated_px)
+        surveyed(differences, stated_px).conclude(None).unwrap()
     }
 
-    fn shaded_survey(differences: [&[f64]; 2], unshaded: [&[f64]; 2], stated_px: [f64; 2]) -> Siting {
+    fn surveyed(differences: [&[f64]; 2], stated_px: [f64; 2]) -> SitingSurvey {
         let layout = Layout {
             width_px: 64,
             height_px: 64,
@@ -174,9 +174,7 @@ mod tests {
             matrix: crate::video::Matrix::Bt709,
         };
         let with_variance = |d: &[f64]| d.iter().map(|d| [*d, 0.05f64.powi(2)]).collect();
-        let survey = SitingSurvey { layout: Some(layout), differences: differences.map(with_variance) };
-        let unshaded = SitingSurvey { layout: Some(layout), differences: unshaded.map(with_variance) };
-        survey.conclude(&unshaded).unwrap()
+        SitingSurvey { layout: Some(layout), differences: differences.map(with_variance) }
     }
 
     #[test]
@@ -199,7 +197,8 @@ mod tests {
     fn what_may_be_shading_is_no_site() {
         let x = [0.47, 0.55, 0.52, 0.44, 0.58, 0.49];
         let flat = x.map(|x| x + 0.6);
-        let siting = shaded_survey([&x, &[]], [&flat, &[]], [0.0, 0.5]);
+        let [lit, even] = [x, flat].map(|x| surveyed([&x, &[]], [0.0, 0.5]));
+        let siting = lit.conclude(Some(&even)).unwrap();
         assert!(siting.used_px[0] < 0.4 && siting.sd_px[0] > 0.2, "{siting:?}");
     }
 

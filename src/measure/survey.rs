@@ -9,7 +9,7 @@ use crate::detect::{Album, Detector, Hue, Shading, ShadingSurvey, Siting, Siting
 use crate::error::Result;
 use crate::experiment::Rig;
 use crate::steady::Background;
-use crate::video::{Orientation, OwnedPicture, Recording, StreamInfo, WHOLE_S};
+use crate::video::{Orientation, OwnedPicture, Picture, Recording, StreamInfo, WHOLE_S};
 
 /// Pictures from which hue, scale, threshold and siting are learnt.
 const SAMPLE_PICTURES: usize = 8;
@@ -45,27 +45,32 @@ pub fn album(pictures: &[OwnedPicture], area: &Area, orientation: Orientation) -
 /// From which side the marks are lit, learnt by every hue.
 pub fn shade(pictures: &[OwnedPicture], hues: &mut [Hue]) -> Result<()> {
     let detector = Detector::new(hues.to_vec());
-    let see = |picture: &OwnedPicture| ShadingSurvey::see(&picture.view(), &detector);
-    let surveys = pictures.par_iter().map(see).collect::<Result<Vec<_>>>()?;
-    let shadings = surveys.into_iter().reduce(ShadingSurvey::with).unwrap_or_default().conclude();
+    let survey = over(pictures, |picture| ShadingSurvey::see(picture, &detector), ShadingSurvey::with)?;
+    let shadings = survey.unwrap_or_default().conclude();
     hues.iter_mut().zip(shadings).for_each(|(hue, shading)| hue.shading = shading);
     Ok(())
 }
 
 /// Where the chroma samples lie, from the marks.
 pub fn siting(pictures: &[OwnedPicture], hues: &[Hue]) -> Result<Option<Siting>> {
-    let flat = hues.iter().map(|hue| Hue { shading: Shading::default(), ..hue.clone() });
-    let [shaded, flat] = [hues.to_vec(), flat.collect()].map(|hues| siting_survey(pictures, &Detector::new(hues)));
-    Ok(shaded?.conclude(&flat?))
+    let survey = |hues: Vec<Hue>| {
+        let detector = Detector::new(hues);
+        over(pictures, |picture| SitingSurvey::see(picture, &detector), SitingSurvey::with)
+    };
+    let even = |hue: &Hue| Hue { shading: Shading::default(), ..hue.clone() };
+    let are_lit = hues.iter().any(|hue| hue.shading != Shading::default());
+    let unshaded = if are_lit { survey(hues.iter().map(even).collect())? } else { None };
+    Ok(survey(hues.to_vec())?.and_then(|survey| survey.conclude(unshaded.as_ref())))
 }
 
-fn siting_survey(pictures: &[OwnedPicture], detector: &Detector) -> Result<SitingSurvey> {
-    let see = |picture: &OwnedPicture| {
-        let mut survey = SitingSurvey::default();
-        survey.see(&picture.view(), detector).map(|()| survey)
-    };
-    let surveys = pictures.par_iter().map(see).collect::<Result<Vec<_>>>()?;
-    Ok(surveys.into_iter().reduce(SitingSurvey::with).unwrap_or_default())
+/// What all pictures show, put together; `None` where there is none.
+fn over<S: Send>(
+    pictures: &[OwnedPicture],
+    see: impl Fn(&Picture<'_>) -> Result<S> + Sync,
+    with: impl Fn(S, S) -> S,
+) -> Result<Option<S>> {
+    let seen = pictures.par_iter().map(|picture| see(&picture.view())).collect::<Result<Vec<_>>>()?;
+    Ok(seen.into_iter().reduce(with))
 }
 
 /// How far the camera moves, and against what it is taken out, where it is.

@@ -22,17 +22,17 @@ impl Session<'_> {
     /// Settles on a way to look for every hue whose trial showed more than the marks, and on the number of marks where nobody
     /// said it.
     pub(super) fn settle(&mut self, trials: &[Option<Trial>], progress: &dyn Progress) -> Result<()> {
+        // how many there are, where that is known
+        let wanted = (!self.options.count_marks).then_some(self.slots.len());
         for (index, trial) in trials.iter().enumerate() {
             let Some(trial) = trial else { continue };
-            if self.options.count_marks || trial.is_crowded() {
+            if wanted.is_none() || trial.is_crowded() {
                 let ways = self.ways(index, trial, progress)?;
-                let best = best(ways, |chain| match self.options.count_marks {
-                    true => chain.worth,
-                    false => chain.worth - chain.marks.len().abs_diff(self.slots.len()) as f64,
-                });
+                let lacking = |chain: &Chain| wanted.map_or(0, |wanted| chain.marks.len().abs_diff(wanted));
+                let best = best(ways, |chain| chain.worth - lacking(chain) as f64);
                 let Some(Way { hue, chain: Some(chain) }) = best else { continue };
                 self.hues[index] = hue;
-                if self.options.count_marks {
+                if wanted.is_none() {
                     self.count(&chain);
                 }
             }
