@@ -4,7 +4,7 @@ use crate::angles::Angle;
 use crate::experiment::Experiment;
 use crate::measure::{Measurement, Options, Steadying};
 use crate::statistics::median;
-use crate::track::hanging::LEAST_TURN;
+use crate::track::hanging::{LEAST_TURN, MOST_MARKS};
 use crate::track::{Point, Spare};
 
 /// A link whose length scatters by more than this share is no rigid link in the plane of the picture: lenses bend by
@@ -101,15 +101,21 @@ fn spares(m: &Measurement) -> Vec<String> {
     let marks = m.tracks.marks.len();
     let mut said = Vec::new();
     if !moving.is_empty() {
+        let (one, all) = (moving.len() == 1, marks + moving.len());
+        let remedy = match (all <= MOST_MARKS, one) {
+            (true, true) => format!("say --markers {all} if it is a mark, or leave it out with --roi"),
+            (true, false) => format!("say --markers {all} if they are marks, or leave them out with --roi"),
+            (false, _) => {
+                "leave them out with --roi or --mask, or name the marks' colour closer with --color".to_owned()
+            }
+        };
         said.push(format!(
-            "{} more thing{} of the marks' colour move{} about {} px and {} not used; say --markers {} if {} a mark, or leave it out with --roi",
+            "{} more thing{} of the marks' colour move{} about {} px and {} not used; {remedy}",
             moving.len(),
-            if moving.len() == 1 { "" } else { "s" },
-            if moving.len() == 1 { "s" } else { "" },
+            if one { "" } else { "s" },
+            if one { "s" } else { "" },
             places(&moving),
-            if moving.len() == 1 { "was" } else { "were" },
-            marks + moving.len(),
-            if moving.len() == 1 { "it is" } else { "they are" },
+            if one { "was" } else { "were" },
         ));
     }
     if !still.is_empty() {

@@ -306,6 +306,50 @@ fn one_link_lacks_a_damper_where_its_file_states_none() {
     assert_eq!(report["verdict"]["status"], "adequate", "{:#}", report["verdict"]);
 }
 
+/// Of two links that turn out to be a strip, what else is missing stands beside a strip that is right: beside a coarse one it would be told by what that gets wrong.
+#[test]
+fn what_a_bending_strip_lacks_is_told_beside_its_bending() {
+    let folder = Folder::new();
+    let hidden = "distributed_flexibility = 1.2e-5\nhinge_stiffness = 5e-6\n";
+    let angles = folder.simulated(BASE, hidden, &["--duration", "10", "--noise-rad", "1e-3", "--seed", "1"]);
+    let report = folder.diagnosis(&angles, BASE, &[]);
+    let verdict = &report["verdict"];
+    assert_eq!(names(&verdict["effects"]), ["hinge_stiffness", "distributed_flexibility"], "{verdict:#}");
+    let found = &report["candidates"][0]["parameters"];
+    for (key, hidden) in [("hinge_stiffness", 5e-6), ("distributed_flexibility", 1.2e-5)] {
+        let [value, sd] = ["value", "sd"].map(|part| found[key][part].as_f64().unwrap());
+        assert!((value - hidden).abs() < 4.0 * sd, "{found:#}");
+    }
+    // the file's own two links are what it is held against
+    let left = |of: &str| report["heldout"][of][0].as_f64().unwrap();
+    assert!(left("named_rmse_rad") < 0.5 * left("baseline_rmse_rad"), "{report:#}");
+}
+
+/// An encoder's steps are its noise, also where the swing has stopped.
+#[test]
+fn an_encoder_that_rests_half_the_time_has_no_exact_angles() {
+    let folder = Folder::new();
+    let options = ["--duration", "40", "--noise-rad", "0", "--seed", "1"];
+    let angles = folder.simulated(ONE_LINK, "hinge_coulomb = 3e-2\n", &options);
+    let table = fs::read_to_string(&angles).unwrap();
+    let column = table.lines().next().unwrap().split(',').position(|name| name == "theta1_rad").unwrap();
+    let stepped = |(row, line): (usize, &str)| {
+        let mut cells: Vec<String> = line.split(',').map(str::to_owned).collect();
+        if row > 0 {
+            let step_rad = std::f64::consts::TAU / 3600.0;
+            let angle_rad: f64 = cells[column].parse().unwrap();
+            cells[column] = format!("{:.7}", (angle_rad / step_rad).round() * step_rad);
+        }
+        cells.join(",") + "\n"
+    };
+    let angles = folder.write("steps.csv", &table.lines().enumerate().map(stepped).collect::<String>());
+    let report = folder.diagnosis(&angles, ONE_LINK, &[]);
+    let verdict = &report["verdict"];
+    assert_eq!(names(&verdict["effects"]), ["hinge_coulomb"], "{verdict:#}");
+    let friction = &report["candidates"][0]["parameters"]["hinge_coulomb"]["value"];
+    assert!((friction.as_f64().unwrap() / 3e-2 - 1.0).abs() < 0.02, "{friction}");
+}
+
 #[test]
 fn a_spring_at_the_hinge_is_not_taken_for_a_wrong_inertia() {
     let folder = Folder::new();

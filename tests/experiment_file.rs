@@ -60,6 +60,21 @@ fn warned(text: &str) -> String {
 }
 
 #[test]
+fn c_of_a_single_link_damps_its_hinge_and_it_is_released_at_one_angle() {
+    let arm = |model: &str| {
+        let text = format!(
+            "[[specimen.links]]\nlength_m = 0.6\nmass_kg = 0.5\ncom_m = 0.4\ninertia_kg_m2 = 0.01\n[model]\n{model}"
+        );
+        Experiment::parse(&text, "arm.toml".as_ref()).unwrap().model
+    };
+    let model = arm("c_eq_n_m_s_per_rad = 0.002\n");
+    assert_eq!((model.effects.hinge_viscous, model.release_rad.len()), (Some(0.002), 1));
+    assert_eq!(arm("").effects.hinge_viscous, None);
+    let both = arm("c_eq_n_m_s_per_rad = 0.002\n[model.effects]\nhinge_viscous = 0.003\n");
+    assert_eq!(both.effects.hinge_viscous, Some(0.003));
+}
+
+#[test]
 fn a_strip_whose_material_is_stated_bends_all_along() {
     let stiffness = |text: &str| parse(text).unwrap().bending_stiffness_n_m2;
     // E w t³/12

@@ -80,6 +80,12 @@ impl Hue {
         self.angle_rad = trial.angle_rad;
         self.area_px2 = trial.usual_samples().map(|n| n * sample_px2 * f64::from(1u32 << (2 * trial.level)));
     }
+
+    /// It is looked for in another way.
+    pub fn is_sought_otherwise(&self, other: &Self) -> bool {
+        (self.threshold, self.thin, self.level) != (other.threshold, other.thin, other.level)
+            || (self.angle_rad, self.area_px2) != (other.angle_rad, other.area_px2)
+    }
 }
 
 /// Finds marks in pictures.

@@ -2,7 +2,7 @@
 //!
 //! The noise is not among it. It is learnt from fits, and each fit owns the noise by which it was judged ([`super::refit::Refit`]).
 
-use super::effect::SetUp;
+use super::effect::{BendingStrip, SetUp};
 use super::hypothesis::Hypothesis;
 use super::settings::Settings;
 use crate::error::Result;
@@ -16,7 +16,7 @@ const YIELD: (f64, f64) = (0.2, 2.5);
 /// The same of a joint that has no spring: a bearing, whose friction is dry.
 const DRY_YIELD: (f64, f64) = (1e-3, 0.5);
 /// Rods between two marks while bending all along the strip is only a candidate.
-const CANDIDATE_RODS: usize = 3;
+const CANDIDATE: BendingStrip = BendingStrip { rods: 3, bending_n_m2: None };
 
 /// What every fit of one diagnosis shares.
 #[derive(Debug, Clone)]
@@ -35,9 +35,9 @@ pub struct FitContext<'a> {
     pub step_error_rad: f64,
     /// Where the base model's descent began: parameters and starts that short stretches led to. Empty where that is not known.
     pub begun: Vec<f64>,
-    /// Rods between two marks of a strip that bends everywhere, which may then start in as many shapes as one that is the base model: it is dear, and worth it
-    /// where such a strip is the answer. Few, and no further shapes, where it is only a candidate.
-    pub fine_strip: Option<usize>,
+    /// The strip that bends everywhere, where that is the answer: of as many rods, and with as many shapes at its start, as one that is the base model, which is dear.
+    /// Of few, and no further shapes, where it is only a candidate.
+    pub fine_strip: Option<BendingStrip>,
     /// Laws learnt from the recordings, beside those of the file; their coefficients stand among the base model's.
     pub laws: Vec<Law>,
     /// What the fits have cost.
@@ -60,7 +60,7 @@ impl<'a> FitContext<'a> {
             experiment: &mut experiment,
             yield_rad: self.yield_rad(),
             view: self.settings.prior.view,
-            rods: self.fine_strip.unwrap_or(CANDIDATE_RODS),
+            strip: self.fine_strip.unwrap_or(CANDIDATE),
         };
         hypothesis.effects.iter().for_each(|effect| effect.set_up(&mut set_up));
         let mut problem = Problem::new(self.records, &experiment, &free)?;

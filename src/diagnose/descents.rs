@@ -3,6 +3,7 @@
 use nalgebra::DVector;
 
 use super::context::FitContext;
+use super::effect::bending_n_m2;
 use super::hypothesis::Hypothesis;
 use super::refit::Refit;
 use crate::experiment::Experiment;
@@ -85,8 +86,7 @@ impl<'a> FitContext<'a> {
         let bending = problem.free.iter().position(|p| *p == Parameter::BendingStiffness);
         let begins = bending.filter(|_| near.value(Parameter::BendingStiffness).is_none());
         if let (Some(k), Some(place)) = (near.value(Parameter::JointStiffness), begins) {
-            let lengths_m = self.experiment.specimen.lengths_m();
-            x[place] = k * lengths_m.iter().sum::<f64>() / lengths_m.len() as f64;
+            x[place] = bending_n_m2(k, self.experiment);
         }
         let lower = problem.lower();
         x.iter_mut().zip(&lower).for_each(|(x, low)| *x = x.max(*low));
@@ -209,7 +209,7 @@ impl<'a> FitContext<'a> {
         problem: Problem<'a>,
         x: Vec<f64>,
     ) -> Option<Refit<'a>> {
-        let outcome = straight::descend(&problem, &descent, x)?;
+        let outcome = straight::descend(&problem, &descent, x).filter(|outcome| outcome.cost.is_finite())?;
         Some(Refit::of(hypothesis.clone(), problem, outcome))
     }
 

@@ -180,8 +180,23 @@ pub struct SetUp<'s> {
     pub yield_rad: (f64, f64),
     /// Standard deviation of the stretch and of the shear of a view to expect.
     pub view: f64,
-    /// Rods between two marks of a strip.
+    /// The strip that bends everywhere.
+    pub strip: BendingStrip,
+}
+
+/// A strip that bends everywhere, before it is fitted.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct BendingStrip {
+    /// Rods between two marks.
     pub rods: usize,
+    /// EI at which its shapes are taken; where it is not known, as stiff as the joint whose place it takes.
+    pub bending_n_m2: Option<f64>,
+}
+
+/// EI of a strip that is as stiff between two marks as a joint.
+pub fn bending_n_m2(joint_n_m_per_rad: f64, experiment: &Experiment) -> f64 {
+    let lengths_m = experiment.specimen.lengths_m();
+    joint_n_m_per_rad * lengths_m.iter().sum::<f64>() / lengths_m.len() as f64
 }
 
 impl SetUp<'_> {
@@ -189,10 +204,9 @@ impl SetUp<'_> {
     fn bend(&mut self) {
         self.free.retain(|p| *p != Parameter::JointStiffness);
         let model = &mut self.experiment.model;
-        model.pieces = self.rods;
-        let lengths_m = self.experiment.specimen.lengths_m();
-        let mark_m = lengths_m.iter().sum::<f64>() / lengths_m.len() as f64;
-        model.effects.distributed_flexibility = Some(model.k_eq_n_m_per_rad * mark_m);
+        model.pieces = self.strip.rods;
+        let as_stiff = bending_n_m2(model.k_eq_n_m_per_rad, self.experiment);
+        self.experiment.model.effects.distributed_flexibility = Some(self.strip.bending_n_m2.unwrap_or(as_stiff));
     }
 
     /// A hysteresis yields somewhere near a usual angle.

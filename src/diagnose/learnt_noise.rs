@@ -3,6 +3,7 @@
 use super::context::FitContext;
 use super::noise;
 use super::refit::Refit;
+use crate::fit::noise::least_noise_rad;
 use crate::fit::whitening::{Colour, RecordNoise};
 use crate::model::observe::chord_angles_rad;
 
@@ -43,8 +44,9 @@ pub fn learnt_noise(context: &FitContext<'_>, by: &Refit<'_>) -> Option<Vec<Reco
             };
             // where far more is left its colour is no weight for the rows
             let colour = if whole.sd > settings.beyond * noise.sd { Colour::default() } else { noise.colour };
-            changed |= (noise.sd / *known_rad - 1.0).abs() > settings.changes || colour.differs_from(*known_colour);
-            (*known_rad, *known_colour) = (noise.sd, colour);
+            let sd_rad = noise.sd.max(least_noise_rad(context.records, record, link));
+            changed |= (sd_rad / *known_rad - 1.0).abs() > settings.changes || colour.differs_from(*known_colour);
+            (*known_rad, *known_colour) = (sd_rad, colour);
         }
         if let [first, second] = &angles[..] {
             let across = noise::across([first, second].map(|(left, motion)| (&left[..], &motion[..])), settings);

@@ -5,7 +5,7 @@
 //! | 1 | the recordings are prepared: outliers, noise, where the base model's descent starts | [`preparation`] |
 //! | 2 | the base model is fitted | [`taken`], [`base`], [`context`], [`refit`], [`descents`], [`noise`], [`learnt_noise`] |
 //! | 3 | what it lacks is sought: effects are proposed, fitted, kept | [`mod@search`], [`screen`], [`stretches`], [`misfit`], [`laws`] |
-//! | 4 | a strip's rods are counted | [`rods`] |
+//! | 4 | a strip's rods are counted; where two links are found to be a strip, what it lacks is sought | [`rods`], [`mod@search`] |
 //! | 5 | the hypotheses are weighed, beside something that is not in the table | [`posterior`], [`evidence`], [`bag`], [`unknowns`], [`latent`], [`basis_law`] |
 //! | 6 | in doubt the search goes on, in pieces of the recordings where these are long enough, and they are weighed again | [`mod@search`], [`preparation`], [`search::horizon`] |
 //! | 7 | what was not fitted is predicted | [`heldout`] |
@@ -96,7 +96,7 @@ pub fn diagnose(
     options: &Options,
     progress: &dyn Progress,
 ) -> Result<Diagnosis> {
-    let (settings, counted, pieces) = (&options.settings, OnceLock::new(), OnceLock::new());
+    let (settings, counted, pieces, bending) = (&options.settings, OnceLock::new(), OnceLock::new(), OnceLock::new());
     // 1. the recordings
     progress.begin("preparation", None);
     let prepared = preparation::prepare(records, experiment, settings)?;
@@ -107,7 +107,20 @@ pub fn diagnose(
     // 3. what it lacks
     search.run();
     // 4. a strip's rods
-    let search = search.recounted(&counted)?;
+    let mut search = search.recounted(&counted)?;
+    let search = match search.of_bending_strip(records, &bending) {
+        Some(strip) => {
+            let mut strip = strip.counted(&counted)?;
+            strip.run();
+            if strip.is_behind() {
+                search
+            } else {
+                let (strip, _) = weighed(strip.recounted(&counted)?, &pieces, settings, progress);
+                search.beside_strip(strip)
+            }
+        }
+        None => search,
+    };
     // 5. how probable each hypothesis is, and 6. in doubt, further
     let (search, posterior) = weighed(search, &pieces, settings, progress);
     let Search { context, effects, fits, rounds, undecided, .. } = search;

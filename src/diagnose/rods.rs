@@ -14,6 +14,8 @@ use crate::experiment::{Experiment, Model};
 const TRIED: [usize; 2] = [4, 12];
 const FEWEST: usize = 3;
 const MOST: usize = 20;
+/// Fits that leave least, of which those with fewer effects are compared.
+const LEADERS: usize = 5;
 /// Links that are rigid between the marks: no parabola leads there.
 const RIGID: usize = 1;
 
@@ -29,7 +31,7 @@ impl<'s> Weights<'s> {
     }
 
     fn weight(&self, fit: &Refit<'_>) -> f64 {
-        fit.chi2 / self.scatter + self.settings.misfit.counts * fit.hypothesis.effects.len() as f64
+        fit.chi2 / self.scatter + self.settings.misfit.counts * fit.coefficients() as f64
     }
 
     fn best<'f, 'a>(&self, fits: &'f [Refit<'a>]) -> Option<&'f Refit<'a>> {
@@ -45,7 +47,11 @@ pub fn preferred(context: &FitContext<'_>, fits: &[Refit<'_>]) -> Option<usize> 
     }
     let weights = Weights::of(context, fits);
     let best = weights.best(fits)?;
-    let within = |fit: &Refit<'_>| fit.hypothesis.effects.iter().all(|c| best.hypothesis.effects.contains(c));
+    // one effect of a leader may only make up for the count, and be told from the others where that is right
+    let mut leaders: Vec<&Refit<'_>> = fits.iter().collect();
+    leaders.sort_by(|a, b| weights.weight(a).total_cmp(&weights.weight(b)));
+    leaders.truncate(LEADERS);
+    let within = |fit: &Refit<'_>| leaders.iter().any(|leader| fit.hypothesis.is_within(&leader.hypothesis));
     let simple = |fit: &Refit<'_>| fit.hypothesis.effects.len() < 2 && !fit.hypothesis.is_dear();
     let unexplained = weights.scatter > weights.settings.search.count_unexplained;
     let compared: Vec<&Refit<'_>> = fits.iter().filter(|fit| within(fit) || unexplained && simple(fit)).collect();
@@ -59,12 +65,12 @@ pub fn preferred(context: &FitContext<'_>, fits: &[Refit<'_>]) -> Option<usize> 
         for pieces in TRIED {
             points.push((pieces, left_with(fit, pieces)?));
         }
-        let (pieces, left) = likeliest_count(&points, FEWEST)?;
         // the parabola is only a guide
+        let (pieces, _) = likeliest_count(&points, FEWEST)?;
         let is_new = !points.iter().any(|(tried, _)| *tried == pieces);
-        let bent = (pieces, if is_new { left_with(fit, pieces)? } else { left });
-        let rigid = unexplained.then(|| left_with(fit, RIGID)).flatten().filter(|left| *left < bent.1);
-        Some(rigid.map_or(bent, |left| (RIGID, left)))
+        points.extend(is_new.then(|| left_with(fit, pieces)).flatten().map(|left| (pieces, left)));
+        points.extend(unexplained.then(|| left_with(fit, RIGID)).flatten().map(|left| (RIGID, left)));
+        points.into_iter().min_by(|a, b| a.1.total_cmp(&b.1))
     });
     let (pieces, value) = promised.min_by(|a, b| a.1.total_cmp(&b.1))?;
     (pieces != usual && value < weights.weight(best) - weights.settings.search.worth_a_count).then_some(pieces)
@@ -89,7 +95,7 @@ pub fn with(experiment: &Experiment, pieces: usize) -> Experiment {
 }
 
 /// The count, of at least `fewest`, at which what three counts leave promises to be least, and how much that is.
-pub fn likeliest_count(left: &[(usize, f64)], fewest: usize) -> Option<(usize, f64)> {
+fn likeliest_count(left: &[(usize, f64)], fewest: usize) -> Option<(usize, f64)> {
     let points: Vec<(f64, f64)> = left.iter().map(|(pieces, left)| (epsilon(*pieces), *left)).collect();
     let (lowest, left) = lowest_point(&points, epsilon(MOST)..=epsilon(fewest))?;
     Some(((1.0 / lowest.sqrt()).round() as usize, left))

@@ -121,6 +121,20 @@ impl Experiment {
         experiment.unless(missing, path)
     }
 
+    /// What the keys that are there say of those that are not: a release for as many links as there are, and of a single link, which has no joint, C at its
+    /// hinge.
+    fn complete_model(&mut self, keys: &toml::Table) {
+        let states = |key: &str| keys.get("model").is_some_and(|model| model.get(key).is_some());
+        let (links, model) = (self.specimen.lengths_m().len(), &mut self.model);
+        model.states_damping = states("c_eq_n_m_s_per_rad");
+        if !states("release_rad") {
+            model.release_rad = (0..links.max(1)).map(|link| 0.5 + 0.1 * link as f64).collect();
+        }
+        if links == 1 && model.states_damping && model.effects.hinge_viscous.is_none() {
+            model.effects.hinge_viscous = Some(model.c_eq_n_m_s_per_rad);
+        }
+    }
+
     fn unless(self, missing: Option<String>, path: &Path) -> Result<Self> {
         match missing {
             Some(message) => Err(Error::Config { path: path.to_owned(), line: None, message }),
@@ -141,10 +155,10 @@ impl Experiment {
         unmeasured::refuse(text, path)?;
         let mut experiment: Self = toml::from_str(text).map_err(wrong)?;
         let keys: toml::Table = toml::from_str(text).map_err(wrong)?;
-        experiment.model.states_damping = keys.get("model").is_some_and(|m| m.get("c_eq_n_m_s_per_rad").is_some());
         let invalid = |message: String| Error::Config { path: path.to_owned(), line: None, message };
         let name = path.file_stem().map_or_else(|| "specimen".into(), std::ffi::OsStr::to_string_lossy);
         consistency::complete(&mut experiment.specimen, &keys, &name);
+        experiment.complete_model(&keys);
         let (stiffness, stiffness_missing) = consistency::bending_stiffness_n_m2(&mut experiment, &keys);
         experiment.bending_stiffness_n_m2 = stiffness;
         experiment.missing = consistency::missing(&keys).or(stiffness_missing);

@@ -31,20 +31,44 @@ const APART: f64 = 6.0;
 const MOST_APART: f64 = 0.1;
 /// An exact table still has the digits it was written with.
 const LEAST_RAD: f64 = 1e-9;
+/// An angle is in steps where it has so many rows for every value that occurs…
+const ROWS_OF_A_VALUE: usize = 2;
+/// … and all but this part of its values are at least a step apart: an encoder that was set anew has values between.
+const BETWEEN_STEPS: f64 = 0.05;
 
 /// Standard deviation of each angle's noise.
 pub fn noise_rad(record: &Record) -> Vec<f64> {
     record.theta_rad.iter().map(|angles| of_angle(&record.t_s, angles)).collect()
 }
 
+/// The least that the noise of an angle can be, by all pieces of its recording: one of them may be at rest.
+pub fn least_noise_rad(records: &[Record], record: usize, link: usize) -> f64 {
+    let pieces = records.iter().filter(|piece| piece.path == records[record].path);
+    pieces.map(|piece| least_rad(&piece.theta_rad[link])).fold(LEAST_RAD, f64::max)
+}
+
+/// Of an angle that is known in steps of q, as an encoder's is, q/√12, however often it stays the same.
+fn least_rad(angles: &[Option<f64>]) -> f64 {
+    let mut values: Vec<f64> = angles.iter().flatten().copied().collect();
+    let rows = values.len();
+    values.sort_unstable_by(f64::total_cmp);
+    let mut gaps: Vec<f64> = values.windows(2).map(|pair| pair[1] - pair[0]).filter(|gap| *gap > LEAST_RAD).collect();
+    if rows < ROWS_OF_A_VALUE * (gaps.len() + 1) || gaps.is_empty() {
+        return LEAST_RAD;
+    }
+    gaps.sort_unstable_by(f64::total_cmp);
+    let step_rad = gaps[(BETWEEN_STEPS * gaps.len() as f64) as usize];
+    (step_rad / 12f64.sqrt()).max(LEAST_RAD)
+}
+
 fn of_angle(t_s: &[f64], angles: &[Option<f64>]) -> f64 {
     let step_s = median_step_s(t_s).unwrap_or(1.0);
     let differences = ORDERS.filter_map(|order| Differences::of(t_s, angles, step_s, order));
-    let Some(neighbours) = differences.min_by(|a, b| a.sd.total_cmp(&b.sd)) else { return LEAST_RAD };
+    let Some(neighbours) = differences.min_by(|a, b| a.sd.total_cmp(&b.sd)) else { return least_rad(angles) };
     let mut kept = angles.to_vec();
     neighbours.apart.iter().for_each(|rows| kept[rows.clone()].fill(None));
     let subspace = LENGTHS.iter().filter_map(|length| beside_the_motion(t_s, &kept, step_s, *length));
-    subspace.fold(neighbours.sd, f64::min).max(LEAST_RAD)
+    subspace.fold(neighbours.sd, f64::min).max(least_rad(angles))
 }
 
 /// Normalised divided differences of one order.
@@ -192,6 +216,16 @@ mod tests {
         let mut random = rand::rngs::StdRng::seed_from_u64(9);
         let t_s = (0..1200).map(|i| f64::from(i) / 120.0 + 0.003 * random.random_range(-1.0..1.0)).collect();
         is_noise(&record(t_s, 6), 0.15);
+    }
+
+    #[test]
+    fn an_encoder_that_rests_still_has_its_steps() {
+        let step_rad = 2e-3;
+        let stepped = |t: &f64| Some((swing(*t) * (1.0 - t / 10.0).max(0.0) / step_rad).round() * step_rad);
+        let mut record = record((0..1800).map(|i| f64::from(i) / 30.0).collect(), 0);
+        record.theta_rad[0] = record.t_s.iter().map(stepped).collect();
+        let found = noise_rad(&record)[0];
+        assert!((found / step_rad * 12f64.sqrt() - 1.0).abs() < 0.2, "{found}");
     }
 
     #[test]

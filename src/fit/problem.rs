@@ -3,6 +3,7 @@
 use nalgebra::{DMatrix, DVector};
 
 use super::descent::Block;
+use super::noise::least_noise_rad;
 use super::predict::{Request, Value, predict};
 use super::whitening::{RecordNoise, Whitening};
 use super::{Prediction, Record};
@@ -269,8 +270,8 @@ impl<'a> Problem<'a> {
                 let Some(median) = median(&mut sizes) else { continue };
                 let freedom = residuals.len().saturating_sub(variables).max(1) as f64 / residuals.len() as f64;
                 let factor = 1.4826 * median / freedom.sqrt();
-                // an exact table still has the digits it was written with
-                self.noise[record].sd_rad[link] = (self.noise[record].sd_rad[link] * factor).max(1e-9);
+                let least_rad = least_noise_rad(self.records, record, link);
+                self.noise[record].sd_rad[link] = (self.noise[record].sd_rad[link] * factor).max(least_rad);
             }
         }
     }

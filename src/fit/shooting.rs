@@ -10,6 +10,7 @@ use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
 use super::descent::{Block, Descent};
+use super::noise::least_noise_rad;
 use super::predict::{Request, predict};
 use super::whitening::RecordNoise;
 use super::{Problem, Record};
@@ -88,8 +89,11 @@ pub fn multiple_shooting(problem: &mut Problem<'_>) -> Result<Shot> {
         x.extend(near.iter().map(|n| n[1]));
         near.iter().enumerate().for_each(|(link, n)| left[stretch.record][link].push(n[2]));
     }
-    for (noise, left) in problem.noise.iter_mut().flat_map(|n| &mut n.sd_rad).zip(left.iter_mut().flatten()) {
-        *noise = median(left).unwrap_or(1e-3).clamp(1e-6, 0.05);
+    for (record, (noise, left)) in problem.noise.iter_mut().zip(&mut left).enumerate() {
+        for (link, (noise, left)) in noise.sd_rad.iter_mut().zip(left).enumerate() {
+            let least_rad = least_noise_rad(problem.records, record, link);
+            *noise = median(left).unwrap_or(1e-3).clamp(1e-6, 0.05).max(least_rad);
+        }
     }
     Ok(drawn_together(problem, &stretches, x, pace_rad_s, true))
 }

@@ -82,6 +82,8 @@ pub(super) struct Estimators {
 pub(super) struct Choice {
     pub frequency_hz: Estimate,
     pub damping_ratio: Estimate,
+    /// The amplitude at which the frequency is meant, where amplitude may change it and the data do not tell how.
+    pub frequency_at_rad: Option<f64>,
     pub basis: String,
 }
 
@@ -145,14 +147,21 @@ impl Estimators {
                 damping_ratio: envelope
                     .linear_damping()
                     .map_or_else(|| envelope.damping_over_the_record(), |xi| relatively_blurred(xi, omitted[1])),
+                frequency_at_rad: None,
                 basis: "windows: f and ξ at small amplitude".to_owned(),
             },
             None if felt || self.residual_excess > 1.0 => Choice {
                 frequency_hz: frequency_hz.blurred(changed_hz),
                 damping_ratio: damping_ratio.blurred(changed_xi),
+                frequency_at_rad: felt.then(|| amplitudes_rad[mode] * weighed(decays).sqrt()),
                 basis: "damped sinusoids over the whole record; widened for what amplitude may have changed".to_owned(),
             },
-            _ => Choice { frequency_hz, damping_ratio, basis: "damped sinusoids over the whole record".to_owned() },
+            _ => Choice {
+                frequency_hz,
+                damping_ratio,
+                frequency_at_rad: None,
+                basis: "damped sinusoids over the whole record".to_owned(),
+            },
         }
     }
 }
@@ -186,6 +195,7 @@ impl Choice {
         Self {
             frequency_hz: relatively_blurred(self.frequency_hz, HARMONIC_BAND * share.sqrt()),
             damping_ratio: damping_ratio.blurred(2.0 * share.sqrt() * damping_ratio.value.abs()),
+            frequency_at_rad: self.frequency_at_rad,
             basis: format!(
                 "{}; widened: it lies on the third harmonic of the slowest mode, which only a forward model separates",
                 self.basis
@@ -204,13 +214,18 @@ fn unfollowed(amplitudes_rad: &[f64], decays: f64, mode: usize) -> [f64; 2] {
     let rms = |[mean, sd]: [f64; 2]| mean.hypot(sd);
     let (mut f2, mut xi2) = (0.0, 0.0);
     for (other, amplitude_rad) in amplitudes_rad.iter().enumerate() {
-        // least squares sees A² weighed by A²: half of its own A₀² where it dies away, all of it where it hardly decays, and all of another mode's that outlives it
-        let own = 0.5 * (1.0 + (-2.0 * decays.max(0.0)).exp());
-        let (bounds, share) = if other == mode { (Bounds::of(mode == 0), own) } else { (Bounds::OTHER, 1.0) };
+        // all of another mode's that outlives it
+        let (bounds, share) =
+            if other == mode { (Bounds::of(mode == 0), weighed(decays)) } else { (Bounds::OTHER, 1.0) };
         f2 += (share * amplitude_rad.powi(2) * rms(bounds.kappa)).powi(2);
         xi2 += (share * amplitude_rad.powi(2) * rms(bounds.lambda)).powi(2);
     }
     [f2.sqrt(), xi2.sqrt()]
+}
+
+/// Least squares sees A² weighed by A²: half of A₀² where it dies away, all of it where it hardly decays.
+fn weighed(decays: f64) -> f64 {
+    0.5 * (1.0 + (-2.0 * decays.max(0.0)).exp())
 }
 
 fn spectral(whole: &Whole, alone: &Signal, mode: usize, xi: f64) -> Estimator {

@@ -41,6 +41,9 @@ pub struct Mode {
     pub rms_rad: f64,
     /// Undamped natural frequency to take.
     pub frequency_hz: Estimate,
+    /// The amplitude at which the frequency is meant, where amplitude may change it and the data do not tell how; its interval
+    /// holds that at small amplitude as well.
+    pub frequency_at_amplitude_rad: Option<f64>,
     /// ξ to take.
     pub damping: Damping,
     /// How ξ goes with amplitude, where it is no constant.
@@ -92,6 +95,7 @@ impl Mode {
             },
             measured: whole.measured,
             frequency_hz: choice.frequency_hz,
+            frequency_at_amplitude_rad: choice.frequency_at_rad,
             damping: Damping::of(choice.damping_ratio, &raw[1], duration_s),
             basis: choice.basis,
             shape,

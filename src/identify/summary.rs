@@ -46,7 +46,12 @@ fn of_mode(mode: &Mode) -> String {
         },
         Damping::NotIdentifiable { reason, .. } => format!("ξ{index} not identifiable ({reason})"),
     };
-    format!("f{index} = {f} Hz, {damping}")
+    let at = mode.frequency_at_amplitude_rad;
+    let at = at.map_or(String::new(), |rad| {
+        let digits = if mode.measured.shown(rad) < 1.0 { 2 } else { 0 };
+        format!(" at an amplitude of {}", mode.measured.show(rad, digits))
+    });
+    format!("f{index} = {f} Hz{at}, {damping}")
 }
 
 /// `value ± half` with two digits of the half width.

@@ -185,14 +185,19 @@ impl<'a> Session<'a> {
         };
         if !session.hues.is_empty() {
             if options.threshold.is_none() || options.count_marks {
-                session.settle(&trials, progress)?;
+                session.settle(&trials, false, progress)?;
             }
-            survey::shade(&session.pictures, &mut session.hues)?;
-            session.siting = survey::siting(&session.pictures, &session.hues)?;
-            // nothing is learnt from them any more
-            session.pictures.clear();
+            session.survey_light()?;
         }
         Ok(session)
+    }
+
+    /// Shading of the marks and siting of the chroma, from pictures that are not needed any more.
+    fn survey_light(&mut self) -> Result<()> {
+        survey::shade(&self.pictures, &mut self.hues)?;
+        self.siting = survey::siting(&self.pictures, &self.hues)?;
+        self.pictures.clear();
+        Ok(())
     }
 
     /// What is sought.
@@ -220,11 +225,22 @@ impl<'a> Session<'a> {
         self.camera
     }
 
-    /// Measures every frame.
+    /// Measures every frame. Where that shows no marks, it is done once more in the way that shows something that swings.
     ///
     /// # Errors
     /// As [`measure`].
     pub fn run(&mut self, progress: &dyn Progress) -> Result<Measurement> {
+        match self.attempt(progress) {
+            Err(refusal @ Error::NoMarks { .. }) if self.seek_otherwise(progress)? => match self.attempt(progress) {
+                Err(Error::NoMarks { .. }) => Err(refusal),
+                result => result,
+            },
+            result => result,
+        }
+    }
+
+    fn attempt(&mut self, progress: &dyn Progress) -> Result<Measurement> {
+        self.rewind()?;
         let mut tracker = Tracker::new(self.slots.clone(), self.options.rig.pivot_px);
         let detector = Detector::new(self.hues.clone()).with_siting(self.siting);
         let decoded = self.each_frame(&detector, progress, &mut |frame| tracker.push(frame))?;
@@ -237,11 +253,7 @@ impl<'a> Session<'a> {
     /// # Errors
     /// As [`measure`].
     pub fn gather(&mut self, mut hues: Vec<Hue>, progress: &dyn Progress) -> Result<Vec<FrameBlobs>> {
-        if !self.stamps_s.is_empty() {
-            self.recording = Recording::open(&self.path, &self.options.still_times)?;
-            self.stamps_s.clear();
-            self.camera = self.first_camera;
-        }
+        self.rewind()?;
         survey::shade(&self.pictures, &mut hues)?;
         let siting = survey::siting(&self.pictures, &hues)?;
         let detector = Detector::new(hues).with_siting(siting);
@@ -249,6 +261,16 @@ impl<'a> Session<'a> {
         self.each_frame(&detector, progress, &mut |frame| frames.push(frame))?;
         self.camera.finish(self.stamps_s.len());
         Ok(frames)
+    }
+
+    /// To the first frame again, if any was decoded.
+    fn rewind(&mut self) -> Result<()> {
+        if !self.stamps_s.is_empty() {
+            self.recording = Recording::open(&self.path, &self.options.still_times)?;
+            self.stamps_s.clear();
+            self.camera = self.first_camera;
+        }
+        Ok(())
     }
 
     fn each_frame(

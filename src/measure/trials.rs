@@ -5,7 +5,7 @@
 //! marks keep their distances and swing on an arc. So every way is tried on some hundred frames in a row, and what it finds is
 //! held against what hangs.
 
-use super::Session;
+use super::{Session, survey};
 use crate::detect::{Hue, Trial};
 use crate::error::Result;
 use crate::progress::Progress;
@@ -19,14 +19,14 @@ struct Way {
 }
 
 impl Session<'_> {
-    /// Settles on a way to look for every hue whose trial showed more than the marks, and on the number of marks where nobody
-    /// said it.
-    pub(super) fn settle(&mut self, trials: &[Option<Trial>], progress: &dyn Progress) -> Result<()> {
+    /// Settles on a way to look for every hue whose trial showed more than the marks, or for `all`, and on the number of marks
+    /// where nobody said it.
+    pub(super) fn settle(&mut self, trials: &[Option<Trial>], all: bool, progress: &dyn Progress) -> Result<()> {
         // how many there are, where that is known
         let wanted = (!self.options.count_marks).then_some(self.slots.len());
         for (index, trial) in trials.iter().enumerate() {
             let Some(trial) = trial else { continue };
-            if wanted.is_none() || trial.is_crowded() {
+            if all || wanted.is_none() || trial.is_crowded() {
                 let ways = self.ways(index, trial, progress)?;
                 let lacking = |chain: &Chain| wanted.map_or(0, |wanted| chain.marks.len().abs_diff(wanted));
                 let best = best(ways, |chain| chain.worth - lacking(chain) as f64);
@@ -38,6 +38,19 @@ impl Session<'_> {
             }
         }
         Ok(())
+    }
+
+    /// Settles on the ways anew where those of the trials showed no marks. Whether any is another now.
+    pub(super) fn seek_otherwise(&mut self, progress: &dyn Progress) -> Result<bool> {
+        if self.options.threshold.is_some() {
+            return Ok(false);
+        }
+        let before = self.hues.clone();
+        let trials = self.album.calibrate(&mut self.hues, None)?;
+        self.settle(&trials, true, progress)?;
+        self.pictures = survey::pictures(&self.recording, &self.options.rig)?;
+        self.survey_light()?;
+        Ok(self.hues.iter().zip(&before).any(|(now, before)| now.is_sought_otherwise(before)))
     }
 
     /// The way of a hue's trial, and others, above ever higher thresholds; the other hues as they are.

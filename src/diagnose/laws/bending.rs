@@ -1,24 +1,14 @@
 //! A strip that bends everywhere, as finely as it needs.
 //!
 //! While it is one candidate among many it is made of few rods and starts in the shape of the two it replaces, which is cheap and tells it from other
-//! effects. Where it then explains most, it is given as many rods as the recording asks for ([`super::super::rods`]) and the shapes
-//! that it has as a base model, and all beside it is sought anew.
+//! effects. Where it then explains most, the search begins anew with the strip as its base model (`search/strip.rs`).
 
-use rayon::prelude::*;
-
-use super::super::context::FitContext;
 use super::super::effect::Effect;
 use super::super::hypothesis::Hypothesis;
 use super::super::misfit::is_out_of_step;
 use super::super::refit::Refit;
-use super::super::rods;
 use super::super::settings::PriorSettings;
 use super::{Coefficients, Law, Sought};
-
-/// Counts of rods between two marks that are tried beside the usual one, and the least that they may lead to.
-const FEW: usize = 5;
-const MANY: usize = 12;
-const FEWEST: usize = 3;
 
 /// The law.
 pub struct Bending;
@@ -54,23 +44,4 @@ impl Law for Bending {
 /// The hypothesis of it alone.
 pub fn alone() -> Hypothesis {
     Hypothesis { effects: vec![Effect::DistributedFlexibility], dropped: None }
-}
-
-/// The fit of it alone with as many rods as the recording asks for, if that does better than a coarse one; and in which context.
-pub fn finer<'a>(context: &FitContext<'a>, coarse: &Refit<'a>) -> Option<(FitContext<'a>, Refit<'a>)> {
-    let with = |count: usize| FitContext { fine_strip: Some(count), ..context.clone() };
-    let of = |count: usize| Some((count, with(count).refit(&alone(), coarse, &[])?));
-    let usual = context.experiment.model.pieces;
-    let counts = [usual, FEW, MANY];
-    let mut finer: Vec<(usize, Refit<'a>)> = counts.into_par_iter().with_max_len(1).filter_map(of).collect();
-    let left: Vec<(usize, f64)> = finer.iter().map(|(count, fine)| (*count, fine.chi2)).collect();
-    let promised = rods::likeliest_count(&left, FEWEST).filter(|(count, _)| !counts.contains(count));
-    finer.extend(promised.and_then(|(count, _)| of(count)));
-    // as many as usual, unless the recording asks for another count
-    let left_by_usual = finer.iter().find(|f| f.0 == usual).map_or(coarse.chi2, |f| f.1.chi2);
-    let enough = left_by_usual - context.settings.search.worth_a_count;
-    let better = finer.iter().filter(|f| f.1.chi2 < enough).min_by(|a, b| a.1.chi2.total_cmp(&b.1.chi2));
-    let count = better.map_or(usual, |better| better.0);
-    let (_, fine) = finer.into_iter().find(|(own, fine)| *own == count && fine.chi2 < coarse.chi2)?;
-    Some((with(count), fine))
 }

@@ -27,13 +27,17 @@ impl<'a> Search<'a, '_> {
         let context = self.context.on(&records);
         let Some(base) = horizon::on_the_beginning(&self.context, &context, self.base()) else { return };
         let begun = Search::begun(self.prepared, context, base, self.begun_at, self.progress);
-        let mut early = Search { is_loose: self.is_loose, until: self.until, part, ..begun };
+        let mut early = Search { is_loose: self.is_loose, until: self.until, rival: self.rival, part, ..begun };
         early.usual();
+        if early.is_cut_short {
+            (self.is_cut_short, self.bending_n_m2) = (true, early.bending_n_m2);
+            self.rounds.extend(early.rounds);
+            return;
+        }
         early.restarts();
         early.allow(self.context.settings.search.shares.restarts);
         early.round(Round::OneMore, &mut Tried::default());
-        let Search { context, fits, rounds, undecided, .. } = early;
-        self.context.fine_strip = context.fine_strip;
+        let Search { fits, rounds, undecided, .. } = early;
         self.part = part;
         self.rounds.extend(rounds);
         self.undecided.extend(undecided);

@@ -11,6 +11,7 @@
 //! | `early` | the search of the first part, where the whole is dear |
 //! | [`horizon`] | horizon continuation: fits that follow a recording from its beginning |
 //! | `judged` | the noise by which all fits are judged |
+//! | `strip` | a strip that is found to bend everywhere |
 
 pub mod beside;
 mod early;
@@ -18,6 +19,7 @@ pub mod horizon;
 mod judged;
 pub mod proposal;
 pub mod rounds;
+mod strip;
 
 use std::sync::OnceLock;
 
@@ -27,7 +29,7 @@ use super::base;
 use super::context::{FitContext, without_errors_in_step};
 use super::effect::Effect;
 use super::hypothesis::Compared;
-use super::laws::{self, bending};
+use super::laws;
 use super::misfit::{Misfit, leaves_more_than_noise};
 use super::preparation::Prepared;
 use super::refit::{Refit, least, least_chi2, merged};
@@ -38,7 +40,6 @@ use super::taken::{Taken, lacks_a_damper};
 use crate::error::Result;
 use crate::experiment::Experiment;
 use crate::progress::Progress;
-use beside::Beside;
 use proposal::Proposal;
 use rounds::{Learns, Round, Tried};
 
@@ -79,6 +80,12 @@ pub struct Search<'a, 'p> {
     tied: Vec<Effect>,
     /// Whether the file is taken loosely.
     is_loose: bool,
+    /// How stiff the strip is if it bends everywhere, where that explains most of what the base model's joint leaves.
+    bending_n_m2: Option<f64>,
+    /// What another base model's best fit leaves of the swing: where the single effects leave more, this search is not worth its cost.
+    rival: Option<f64>,
+    /// It ended there, or where a strip was found to bend.
+    is_cut_short: bool,
     /// What searches that it goes on from have held against every other effect, and the hypotheses of which each effect was exchanged.
     compared: Compared,
     /// The work that had been done when it began, the base model's fit with it.
@@ -130,6 +137,9 @@ impl<'a, 'p> Search<'a, 'p> {
             scores,
             tied: Vec::new(),
             is_loose: false,
+            bending_n_m2: None,
+            rival: None,
+            is_cut_short: false,
             compared: Compared::default(),
             begun_at,
             until: begun_at,
@@ -139,13 +149,20 @@ impl<'a, 'p> Search<'a, 'p> {
     }
 
     /// Searches for what the base model lacks, the file taken at its word. Whole recordings of a rig that are dear and far from the model are left to their pieces:
-    /// of bearings and castings no model is right to the noise.
+    /// of bearings and castings no model is right to the noise. It ends where a strip is
+    /// found to bend everywhere: see [`Self::of_bending_strip`].
     pub fn run(&mut self) {
         let is_rig = !self.context.experiment.specimen.links.is_empty();
         if is_rig && self.prepared.part < 1.0 && self.leaves_more_than_noise() && self.pieces().is_some() {
             return;
         }
         self.begin();
+        if !self.is_cut_short {
+            self.end();
+        }
+    }
+
+    fn end(&mut self) {
         self.allow_errors_in_step();
         self.allow(self.context.settings.search.shares.certified);
         self.certify();
@@ -213,7 +230,8 @@ impl<'a, 'p> Search<'a, 'p> {
     fn pieces(&self) -> Option<Prepared> {
         let (model, _) = self.base().problem.model(0, &[]).ok()?;
         let cut = || self.prepared.in_pieces(self.context.settings, model.pace_rad_s());
-        (!self.context.is_strip() && !self.context.is_in_pieces()).then(cut).flatten()
+        let bends = self.context.is_strip() || self.bending_n_m2.is_some();
+        (!bends && !self.context.is_in_pieces()).then(cut).flatten()
     }
 
     /// A search of the recordings in pieces, each with a start of its own. Where every model leaves far more than noise, the sum of squares of a whole recording says
@@ -304,17 +322,23 @@ impl<'a, 'p> Search<'a, 'p> {
         least(&self.fits).is_some_and(|best| leaves_more_than_noise(best, &self.context.settings.noise))
     }
 
-    /// Singles and pairs, a strip as finely as it needs.
+    /// Singles and pairs, until a strip is found to bend everywhere.
     fn usual(&mut self) {
         self.allow(self.context.settings.search.shares.usual);
-        Round::USUAL.into_iter().for_each(|round| self.round(round, &mut Tried::default()));
-        self.refine_strip();
+        for round in Round::USUAL {
+            self.round(round, &mut Tried::default());
+            if round == Round::DearSingles && (self.bends() || self.is_behind()) {
+                self.is_cut_short = true;
+                return;
+            }
+        }
+        self.seek_bending();
     }
 
     /// Restarts where the best fit leaves more than noise. A strip's fits are too dear for it.
     fn restarts(&mut self) {
         self.allow(self.context.settings.search.shares.restarts);
-        if !self.context.is_strip() && self.misfit().is_some_and(|misfit| misfit.unexplained) {
+        if !self.is_cut_short && !self.context.is_strip() && self.misfit().is_some_and(|misfit| misfit.unexplained) {
             Round::RESTARTS.into_iter().for_each(|round| self.round(round, &mut Tried::default()));
         }
     }
@@ -426,29 +450,5 @@ impl<'a, 'p> Search<'a, 'p> {
 
     fn misfit(&self) -> Option<Misfit> {
         least(&self.fits).map(|best| Misfit::of(&self.context, best, &[]))
-    }
-
-    /// A strip that bends everywhere, where it explains most, with as many rods as the recording asks for; and everything beside it sought again, in that context.
-    fn refine_strip(&mut self) {
-        let bends = |fit: &Refit<'a>| fit.hypothesis.has(Effect::DistributedFlexibility);
-        let sought = self.effects.contains(&Effect::DistributedFlexibility) && !self.fits.iter().any(bends);
-        if sought && self.misfit().is_some_and(|misfit| misfit.unexplained) {
-            // from the base model's motion its own may not be found
-            let found = self.fitted(&[Proposal::Anew(bending::alone(), self.base())]);
-            self.keep(found);
-        }
-        let asked_for = least(&self.fits).is_some_and(bends);
-        let coarse = self.fits.iter().find(|fit| asked_for && fit.hypothesis == bending::alone());
-        let Some((context, fine)) = coarse.and_then(|coarse| bending::finer(&self.context, coarse)) else { return };
-        self.context = context;
-        self.progress.begin("strip", Some(self.effects.len() as u64));
-        let beside = Beside::every(&self.context, &fine, &self.effects);
-        let proposals: Vec<Proposal<'_, 'a>> = beside.into_iter().map(Proposal::Beside).collect();
-        let found = self.fitted(&proposals);
-        drop(proposals);
-        self.fits.retain(|fit| !bends(fit));
-        self.fits.push(fine);
-        self.keep(found);
-        self.learn_noise();
     }
 }
