@@ -15,7 +15,7 @@
 //! ```
 //! The first two give f₀ and ξ₀ at small amplitude. Where the windows are too few or too much alike to tell how amplitude acts, it is bounded by what
 //! hung bodies do: κ = 0.03 ± 0.03 for the slowest mode, 0.4 ± 0.5 for faster ones, κ' = 0 ± 0.1, λ = 0 ± 0.15 and 0 ± 0.5, λ' = 0 ± 0.3 /rad² (one standard deviation)
-//! enter as observations, so that the intervals of f₀ and ξ₀ hold what the data leave open. A fourth power of A is added where the second does not
+//! enter as observations, so that the intervals of f₀ and ξ₀ hold what the data leave open; of a displacement, whose angle nobody knows, κ is open. A fourth power of A is added where the second does not
 //! describe the windows, and half of what it changes is added to the standard deviation for the powers left out.
 //! The third law is for a picture and a first guess, never to decide: Coulomb friction and quadratic drag together imitate a viscous damper.
 
@@ -25,6 +25,7 @@ use serde::Serialize;
 use super::decay_law::{DecayFit, DecayLaw, Widening};
 use super::estimate::{Estimate, chi_squared_tail, f_tail};
 use super::windows::{Moment, Windows};
+use crate::series::Measured;
 
 /// From here on the frequency within a window is trusted to join it to the next.
 const CLEAR_OF_UNWRAPPING: f64 = 15.0;
@@ -88,11 +89,11 @@ pub struct Envelope {
 }
 
 impl Envelope {
-    /// Of one mode of the windows, which may be the slowest of the recording.
+    /// Of one mode of the windows, which has these bounds.
     ///
     /// # Errors
     /// In words, when the mode is clear of the noise in fewer than three windows.
-    pub fn of(windows: &Windows, mode: usize, slowest: bool) -> Result<Self, String> {
+    pub(super) fn of(windows: &Windows, mode: usize, bounds: Bounds) -> Result<Self, String> {
         let moments = &windows.moments[mode];
         if moments.len() < 3 {
             return Err(format!(
@@ -110,7 +111,7 @@ impl Envelope {
         let b1 = exponential.estimate(2);
         let omega = (phases[phases.len() - 1] - phases[0]) / (moments[moments.len() - 1].t_s - moments[0].t_s);
         let damping_ratio = b1.map(|s| s / s.hypot(omega), omega * omega / b1.value.hypot(omega).powi(3));
-        let regression = Regression::of(moments, &others, slowest);
+        let regression = Regression::of(moments, &others, bounds);
         let frequency = regression.frequency_law(&phases, damping_ratio.value);
         let natural_rad_s = omega.hypot(b1.value);
         let squares: f64 = moments.iter().map(|m| m.amplitude_rad().powi(2)).sum();
@@ -193,6 +194,9 @@ fn steps(moments: &[Moment], phases: &[f64]) -> Vec<Step> {
     (0..moments.len() - 1).map(pair).collect()
 }
 
+/// Standard deviation of κ where nothing is known of it.
+const UNKNOWN: f64 = 1e3;
+
 /// What is known beforehand of how amplitude acts: mean and standard deviation (1/rad²).
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Bounds {
@@ -206,12 +210,16 @@ impl Bounds {
     /// Of the other mode's amplitude.
     pub const OTHER: Self = Self { kappa: [0.0, 0.1], lambda: [0.0, 0.3], fourth: [0.0; 2] };
 
-    /// Of the mode's own amplitude.
-    pub fn of(slowest: bool) -> Self {
-        if slowest {
+    /// Of the mode's own amplitude. Of a displacement nobody knows what angle it is of, nor κ therefore.
+    pub fn of(slowest: bool, measured: Measured) -> Self {
+        let of_angles = if slowest {
             Self { kappa: [0.03, 0.03], lambda: [0.0, 0.15], fourth: [1e-3, 0.1] }
         } else {
             Self { kappa: [0.4, 0.5], lambda: [0.0, 0.5], fourth: [0.03, 0.5] }
+        };
+        match measured {
+            Measured::Angles => of_angles,
+            Measured::Displacement => Self { kappa: [0.0, UNKNOWN], ..of_angles },
         }
     }
 }
@@ -244,8 +252,8 @@ struct Slope {
 }
 
 impl<'a> Regression<'a> {
-    fn of(moments: &'a [Moment], others: &[&[Moment]], slowest: bool) -> Self {
-        let Bounds { kappa, lambda, .. } = Bounds::of(slowest);
+    fn of(moments: &'a [Moment], others: &[&[Moment]], bounds: Bounds) -> Self {
+        let Bounds { kappa, lambda, .. } = bounds;
         let mut terms = vec![Term { integral: powers(moments, moments, 2), kappa, lambda }];
         terms.extend(others.iter().map(|other| Term {
             integral: powers(moments, other, 2),

@@ -118,7 +118,8 @@ impl Estimators {
     }
 
     /// The laws at small amplitude; the damped sinusoids where the amplitude does not matter or its effect cannot be followed.
-    pub fn choose(&self, envelope: Option<&Envelope>, amplitudes_rad: &[f64], duration_s: f64, mode: usize) -> Choice {
+    pub fn choose(&self, whole: &Whole, envelope: Option<&Envelope>, amplitudes_rad: &[f64], mode: usize) -> Choice {
+        let (duration_s, known) = (whole.signal.duration_s(), whole.measured == Measured::Angles);
         let mut lawful_rad = amplitudes_rad.to_vec();
         // of a mode alone, what the laws leave out acts with the windows' amplitudes; another mode's share in it is not followed
         if let (Some(envelope), [only]) = (envelope, &mut lawful_rad[..]) {
@@ -132,12 +133,14 @@ impl Estimators {
         let [changed_hz, changed_xi] = unfollowed(amplitudes_rad, decays, mode);
         let (changed_hz, changed_xi) = (changed_hz * frequency_hz.value, changed_xi * damping_ratio.value);
         let squares: f64 = lawful_rad.iter().map(|a| a * a).sum();
-        let omitted = Bounds::of(mode == 0).fourth.map(|bound| bound * squares * squares);
-        let felt = changed_hz > 0.3 * frequency_hz.sd;
+        let omitted = Bounds::of(mode == 0, whole.measured).fourth.map(|bound| bound * squares * squares);
+        // what angle a displacement is of nobody knows, nor therefore what amplitude has changed
+        let felt = !known || changed_hz > 0.3 * frequency_hz.sd;
         // a law that reaches far beyond the steps it was laid through tells nothing at its end
         let sound = |e: &Envelope, law: &FrequencyLaw| {
             e.steps.iter().any(|s| (law.f0_hz.value / s.frequency_hz.value - 1.0).abs() < FARTHEST_LAW)
                 && law.f0_hz.half() < FARTHEST_LAW * law.f0_hz.value
+                && (known || law.f0_hz.half() < WIDEST_LAW * frequency_hz.half())
         };
         let law = envelope.and_then(|e| e.frequency.filter(|f| sound(e, f)).map(|f| (e, f)));
         match law {
@@ -165,6 +168,9 @@ impl Estimators {
         }
     }
 }
+
+/// How much less exactly than that at the record's own amplitudes the frequency at small amplitude may be known, to be told in its place.
+const WIDEST_LAW: f64 = 5.0;
 
 /// How far from the frequency of its nearest step, and how wide, relative to it, f₀ may be: a pendulum released at 145° has 0.5 f₀.
 const FARTHEST_LAW: f64 = 0.5;
@@ -215,8 +221,11 @@ fn unfollowed(amplitudes_rad: &[f64], decays: f64, mode: usize) -> [f64; 2] {
     let (mut f2, mut xi2) = (0.0, 0.0);
     for (other, amplitude_rad) in amplitudes_rad.iter().enumerate() {
         // all of another mode's that outlives it
-        let (bounds, share) =
-            if other == mode { (Bounds::of(mode == 0), weighed(decays)) } else { (Bounds::OTHER, 1.0) };
+        let (bounds, share) = if other == mode {
+            (Bounds::of(mode == 0, Measured::Angles), weighed(decays))
+        } else {
+            (Bounds::OTHER, 1.0)
+        };
         f2 += (share * amplitude_rad.powi(2) * rms(bounds.kappa)).powi(2);
         xi2 += (share * amplitude_rad.powi(2) * rms(bounds.lambda)).powi(2);
     }

@@ -10,6 +10,8 @@ use crate::model::chain::Chain;
 /// First zero of the Bessel function J₀.
 const BESSEL_ZERO: f64 = 2.404_825_557_695_773;
 
+/// How near the frequency of a weight on a thread one must lie for that to hang there: a length to the weight's middle that is stated to some per cent, a swing of 30°.
+const LIKE_A_WEIGHT: f64 = 0.03;
 /// How far below the floor a frequency must lie, relative to it, before anything is called wrong: a length stated to 1 %.
 const TOLERANCE: f64 = 0.005;
 
@@ -59,7 +61,13 @@ impl Floor {
         let below = frequency_hz.high < floor_hz * (1.0 - TOLERANCE);
         let ratio = frequency_hz.value / floor_hz;
         let remedy = below.then(|| Remedy { time: ratio, length: ratio.powi(-2), gravity: ratio.powi(2) });
+        let weight_hz = (gravity_m_s2 / length_m).sqrt() / std::f64::consts::TAU;
+        let is_weight = specimen.links.is_empty() && (frequency_hz.value / weight_hz - 1.0).abs() < LIKE_A_WEIGHT;
         let statement = match remedy {
+            Some(_) if is_weight => format!(
+                "{:.4} Hz is below the floor of {floor_hz:.4} Hz ({body}), but a weight on a thread of {length_m} m swings at {weight_hz:.4} Hz: if that is what hangs there, describe it with [[specimen.links]], its com_m from the hinge",
+                frequency_hz.value
+            ),
             Some(r) => format!(
                 "{:.4} Hz is below the floor of {floor_hz:.4} Hz ({body}): time base, length or gravity is wrong; mended by time × {:.3}, or length × {:.3}, or gravity × {:.3}",
                 frequency_hz.value, r.time, r.length, r.gravity

@@ -203,7 +203,7 @@ impl Identification {
                 rest
             }
         };
-        let chosen = modes::choose_modes(&signal, &self.spectrum)?;
+        let chosen = modes::choose_modes(&signal, &self.spectrum, self.record.measured)?;
         Ok((signal, chosen))
     }
 

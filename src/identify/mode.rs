@@ -5,7 +5,7 @@ use serde::Serialize;
 
 use super::consistency::Consistency;
 use super::damping::{Damping, Trend};
-use super::envelope::{Envelope, FrequencyLaw};
+use super::envelope::{Bounds, Envelope, FrequencyLaw};
 use super::estimate::{Estimate, probability};
 use super::estimators::{Estimator, Estimators, Whole};
 use super::floor::amplitude_dependence;
@@ -80,7 +80,7 @@ impl Mode {
         let amplitudes_rad: Vec<f64> = (0..whole.fit.poles.len()).map(|m| whole.fit.amplitude_rad(m)).collect();
         let duration_s = whole.signal.duration_s();
         let choice =
-            estimators.choose(envelope.as_ref(), &amplitudes_rad, duration_s, mode).beside_harmonic(whole.fit, mode);
+            estimators.choose(whole, envelope.as_ref(), &amplitudes_rad, mode).beside_harmonic(whole.fit, mode);
         let raw = estimators.raw;
         let changes =
             |e: &&Envelope| e.decay.is_some_and(|d| d.p_viscous < 0.01) || e.damping.is_some_and(|d| d.p_value < 0.01);
@@ -256,14 +256,14 @@ impl Mode {
 
 /// The mode's history in the windows of all modes; where those cannot show it, in windows of its own cycles.
 fn envelope_of(whole: &Whole, mode: usize) -> Result<Envelope, String> {
-    let slowest = mode == 0;
-    let shared = whole.windows.as_ref().map_err(Clone::clone).and_then(|w| Envelope::of(w, mode, slowest));
+    let bounds = Bounds::of(mode == 0, whole.measured);
+    let shared = whole.windows.as_ref().map_err(Clone::clone).and_then(|w| Envelope::of(w, mode, bounds));
     if shared.is_ok() || whole.fit.poles.len() == 1 {
         return shared;
     }
     let own = Windows::of_mode(whole.signal, whole.fit, mode)?;
     let others = (0..whole.fit.poles.len()).filter(|m| *m != mode).map(|m| whole.fit.amplitude_rad(m));
-    Ok(Envelope::of(&own, 0, slowest)?.beside_unfollowed(others))
+    Ok(Envelope::of(&own, 0, bounds)?.beside_unfollowed(others))
 }
 
 fn shape(whole: &Whole, mode: usize) -> Vec<LinkMotion> {

@@ -9,6 +9,7 @@ use super::signal::Signal;
 use super::sinusoids::{FEWEST_CYCLES, Pole, SinusoidFit};
 use super::spectrum::Spectrum;
 use super::windows::Windows;
+use crate::series::Measured;
 
 /// Damping ratios tried at a spectral peak.
 const DAMPING_STARTS: [f64; 3] = [0.001, 0.008, 0.05];
@@ -47,7 +48,7 @@ const LINES_TRIED: usize = 4;
 ///
 /// # Errors
 /// In words, when nothing oscillates.
-pub fn choose_modes(signal: &Signal, spectrum: &Spectrum) -> Result<Chosen, String> {
+pub fn choose_modes(signal: &Signal, spectrum: &Spectrum, measured: Measured) -> Result<Chosen, String> {
     let one = strongest(signal, spectrum)?;
     let drift_terms = one.links.first().map_or(0, |l| l.drift_rad.len());
     let highest_hz = spectrum.significant().map(|p| p.frequency_hz.value).fold(0.0, f64::max);
@@ -72,7 +73,7 @@ pub fn choose_modes(signal: &Signal, spectrum: &Spectrum) -> Result<Chosen, Stri
     let faster_than_drift = |p: &Pole| p.frequency_hz() > slowest_hz;
     let sound = |fit: &SinusoidFit| apart(&fit.poles) && fit.poles.iter().all(|p| damped(p) && faster_than_drift(p));
     match best(signal, &starts, drift_terms, sound) {
-        Some(two) => Ok(decide(signal, spectrum, one, two)),
+        Some(two) => Ok(decide(signal, spectrum, measured, one, two)),
         None => {
             let statement = "one mode; no second one is seen".to_owned();
             Ok(Chosen { fit: one, count: ModeCount { modes: 1, bic_gain: None, p_value: None, statement } })
@@ -162,7 +163,7 @@ impl Improvement<'_> {
 }
 
 /// F-test and information criterion.
-fn decide(signal: &Signal, spectrum: &Spectrum, one: SinusoidFit, two: SinusoidFit) -> Chosen {
+fn decide(signal: &Signal, spectrum: &Spectrum, measured: Measured, one: SinusoidFit, two: SinusoidFit) -> Chosen {
     let more = (two.parameters() - one.parameters()) as f64;
     let bic_gain = one.deviance - two.deviance - more * (signal.values() as f64).ln();
     let duration_s = signal.duration_s();
@@ -173,7 +174,12 @@ fn decide(signal: &Signal, spectrum: &Spectrum, one: SinusoidFit, two: SinusoidF
     let (large, small) = (two.amplitude_rad(strong), two.amplitude_rad(weak));
     // sin θ gives a third harmonic of A³/192, a chain a few times that; an error that goes with the place in the picture gives others, no larger than what a value errs
     let noise_rad = two.links.iter().map(|link| link.noise_rad).fold(0.0, f64::max);
-    let most = noise_rad.max(0.05 * large.powi(3));
+    let cube = match measured {
+        Measured::Angles => large.powi(3),
+        // of whatever angle up to a radian
+        Measured::Displacement => large,
+    };
+    let most = noise_rad.max(0.05 * cube);
     let harmonic = (times - times.round()).abs() < 0.03 && times.round() >= 2.0 && small < most;
     let modes = if p_value < LEAST_P && bic_gain > 10.0 && !harmonic { 2 } else { 1 };
     let statement = if harmonic {
