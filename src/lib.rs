@@ -31,6 +31,7 @@ pub mod progress;
 mod digits;
 mod digest;
 mod statistics;
+mod held;
 
 pub mod video;
 pub mod steady;

@@ -133,6 +133,30 @@ fn what_init_writes_is_enough_to_track_and_says_what_is_still_to_be_measured() {
     assert!(refused(&bench.freeswing(&["init", "swing.mp4"])).contains("exists already"));
 }
 
+/// A hand holds what swings for a second: nothing is learnt from that, and it is said what to leave out.
+#[test]
+fn a_beginning_that_is_held_is_left_out() {
+    let bench = Bench::of(&scene());
+    let made = Command::new("ffmpeg")
+        .args(["-loglevel", "error", "-y", "-i", "swing.mp4", "-vf", "tpad=start_mode=clone:start_duration=1"])
+        .args(["-c:v", "libx264", "-crf", "18", "held.mp4"])
+        .current_dir(bench.folder.path())
+        .status();
+    assert!(made.unwrap().success());
+    std::fs::rename(bench.path("held.mp4"), bench.path("swing.mp4")).unwrap();
+    let words = done(&bench.freeswing(&["init", "swing.mp4"]));
+    assert!(words.contains("held still until t = 1."), "{words}");
+    let file = std::fs::read_to_string(bench.path("experiment.toml")).unwrap();
+    let from_s = file.lines().find_map(|line| line.strip_prefix("from_s = ")).unwrap().parse::<f64>().unwrap();
+    assert!((1.0..1.2).contains(&from_s), "{file}");
+    let words = done(&bench.track(&["--config", "experiment.toml"]));
+    assert!(!words.contains("held") && column(&bench.table(), "t_s")[0] >= from_s, "{words}");
+    let words = done(&bench.track(&[]));
+    assert!(words.contains("held still until t = 1.") && words.contains("with --from 1."), "{words}");
+    let identified = bench.freeswing(&["identify", "angles.csv"]);
+    assert!(String::from_utf8_lossy(&identified.stdout).lines().next().unwrap().contains("held still until t = 1."));
+}
+
 #[test]
 fn a_hinge_below_all_that_swings_is_the_first_mark() {
     let bench = Bench::of(&scene());

@@ -104,6 +104,9 @@ impl InitArgs {
                 console.remark(format!("{video}: {} marks, from the hinge down: {}", colours.len(), colours.join(", ")))
             }
         }
+        if let Some(held_s) = finding.held_until_s {
+            console.remark(format!("held still until t = {held_s:.2} s, as by a hand: left out (from_s in {out})"));
+        }
         console.remark(hinge_in_words(finding));
         if let Some(other) = finding.apart.first() {
             let [[x, y], [ox, oy]] = [finding.marks[0].thing.place_px(), other.place_px()];

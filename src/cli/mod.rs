@@ -167,6 +167,12 @@ fn recordings(
             let message = format!("{} rows between --from and --until; widen them", kept.len());
             return Err(crate::Error::Table { path: series.path.clone(), line: None, message });
         }
+        if let Some(released_s) = kept.released_s() {
+            console.warning(format!(
+                "{}: what swings is held still until t = {released_s:.2} s, which no model knows of; leave that out with --from {released_s:.2}",
+                series.path.display()
+            ));
+        }
         Record::of(&kept, marks)
     };
     all.iter().map(record).collect()

@@ -97,6 +97,8 @@ pub struct Identification {
     pub record: Record,
     /// Its spectrum.
     pub spectrum: Spectrum,
+    /// Until when it is held still at first, as by a hand; only what follows is identified.
+    pub held_until_s: Option<f64>,
     /// What keeps it from being a swing; then there are no modes.
     pub tumbling: Option<Tumbling>,
     /// How far each link's resting angle moves over the record, no part of any mode; zero where the data do not ask for a drift.
@@ -121,8 +123,10 @@ pub struct Identification {
 /// [`crate::Error::Simulation`] when the experiment's specimen cannot swing. What the data cannot tell is no error but says so in the result.
 pub fn identify(series: &AngleSeries, experiment: Option<&Experiment>) -> Result<Identification> {
     let body = experiment.map(|e| Ok(Body { experiment: e, chain: Chain::of(&e.specimen)? })).transpose()?;
+    let (series, held_until_s) = &let_go(series);
     let (signal, wrapped) = Signal::of(series).unwrapped();
     let mut found = Identification::of_record(series, &signal, Measured::Angles);
+    found.held_until_s = *held_until_s;
     for link in wrapped {
         found.notes.push(format!("θ{} jumps by full turns, as wrapped angles do: taken out", link + 1));
     }
@@ -132,8 +136,16 @@ pub fn identify(series: &AngleSeries, experiment: Option<&Experiment>) -> Result
 
 /// Identifies the displacement of one mark, over [`crate::series::PX_PER_RAD`].
 pub fn identify_displacement(series: &AngleSeries) -> Identification {
+    let (series, held_until_s) = &let_go(series);
     let signal = Signal::of(series);
-    Identification::of_record(series, &signal, Measured::Displacement).with_modes(signal, None)
+    let found = Identification::of_record(series, &signal, Measured::Displacement);
+    Identification { held_until_s: *held_until_s, ..found }.with_modes(signal, None)
+}
+
+/// What follows a beginning in which it is held, and until when that is.
+fn let_go(series: &AngleSeries) -> (AngleSeries, Option<f64>) {
+    let released_s = series.released_s();
+    (series.slice(series.rows(released_s.unwrap_or(f64::NEG_INFINITY), f64::INFINITY)), released_s)
 }
 
 impl Identification {
@@ -169,6 +181,7 @@ impl Identification {
         Self {
             schema: "freeswing.identify/1",
             summary: String::new(),
+            held_until_s: None,
             tumbling: None,
             drift_rad: Vec::new(),
             swing_mode: None,

@@ -24,8 +24,11 @@ pub(super) fn summary(found: &Identification) -> String {
     let doubt = gaps.or_else(|| found.record.doubt()).or_else(|| found.modes.iter().find_map(Mode::doubt));
     let doubts = doubt.map(|doubt| format!(" — {doubt}"));
     let floor = found.floor.iter().filter(|f| f.below).map(|f| format!(" — {}", f.statement));
+    let held = found.held_until_s.map(|held_s| {
+        format!(" — held still until t = {held_s:.2} s; only what follows is used, as with `--from {held_s:.2}`")
+    });
     let part = found.tumbling.iter().map(|t| format!(" — {}", t.statement));
-    modes.join("; ") + &part.chain(doubts).chain(floor).collect::<String>()
+    modes.join("; ") + &held.into_iter().chain(part).chain(doubts).chain(floor).collect::<String>()
 }
 
 fn of_mode(mode: &Mode) -> String {

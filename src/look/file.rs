@@ -48,7 +48,8 @@ pub fn to_toml(finding: &Finding, video: &str, part: &Rig) -> String {
     );
     specimen(&mut text, finding);
     rig(&mut text, finding);
-    looked_at(&mut text, part);
+    let held = Rig { from_s: finding.held_until_s.or(part.from_s), ..part.clone() };
+    looked_at(&mut text, &held);
     text
 }
 

@@ -16,6 +16,7 @@ use std::path::Path;
 use crate::detect::{Album, COUNTS, Hue, Trial};
 use crate::error::{Error, Result};
 use crate::experiment::MarkColour;
+use crate::held::released_s;
 use crate::measure::{Camera, Options, Session};
 use crate::progress::Progress;
 use crate::track::hanging::{self, MOST_MARKS};
@@ -53,6 +54,8 @@ pub struct Finding {
     pub still: Vec<Thing>,
     /// Things of the marks' look that swing by themselves.
     pub apart: Vec<Thing>,
+    /// Until when it is held still at first, as by a hand: that is left out.
+    pub held_until_s: Option<f64>,
     /// Turns a second of the first mark that swings.
     pub frequency_hz: Option<f64>,
     /// Time stamps.
@@ -126,9 +129,19 @@ fn further_stretches(session: &Session<'_>, first: &[FrameBlobs]) -> Vec<f64> {
 /// The chain that the things of these looks form throughout the recording, measured exactly.
 fn measured(session: &mut Session<'_>, looks: Vec<(Hue, String)>, progress: &dyn Progress) -> Result<Option<Finding>> {
     let (hues, names): (Vec<Hue>, Vec<String>) = looks.into_iter().unzip();
-    let frames = session.gather(hues, progress)?;
-    let all = things(&frames);
-    let Some(chain) = hanging::longest(&all, &names) else { return Ok(None) };
+    let mut frames = session.gather(hues, progress)?;
+    let mut all = things(&frames);
+    let Some(mut chain) = hanging::longest(&all, &names) else { return Ok(None) };
+    // a hand that holds a mark covers part of it, at one end of its arc
+    let held_until_s = held_until_s(&frames, &chain.marks.iter().map(|i| &all[*i]).collect::<Vec<_>>());
+    if let Some(held_s) = held_until_s {
+        frames.retain(|frame| frame.t_s >= held_s);
+        all = things(&frames);
+        chain = match hanging::longest(&all, &names) {
+            Some(chain) => chain,
+            None => return Ok(None),
+        };
+    }
     let t_s: Vec<f64> = frames.iter().map(|f| f.t_s).collect();
     let marks: Vec<Mark> = chain
         .marks
@@ -146,6 +159,7 @@ fn measured(session: &mut Session<'_>, looks: Vec<(Hue, String)>, progress: &dyn
         |t: &&Thing| t.moves && hanging::hangs_alone(t) && marks.iter().all(|m| m.thing.is_seen_beside(t));
     let apart = all.iter().filter(swings_apart).filter(alike);
     Ok(Some(Finding {
+        held_until_s,
         frequency_hz: marks.get(swinging).and_then(|m| turns_per_second(&m.thing, &t_s)),
         still: still.cloned().collect(),
         apart: apart.cloned().collect(),
@@ -158,6 +172,21 @@ fn measured(session: &mut Session<'_>, looks: Vec<(Hue, String)>, progress: &dyn
         camera: session.camera(),
         background: background(session.album()),
     }))
+}
+
+/// When what moves farthest is let go, if it is held at first.
+fn held_until_s(frames: &[FrameBlobs], marks: &[&Thing]) -> Option<f64> {
+    let farthest = marks.iter().max_by(|a, b| a.travel_px.total_cmp(&b.travel_px))?;
+    let along = |axis: usize| -> (Vec<f64>, Vec<f64>) {
+        let seen = frames.iter().zip(&farthest.path);
+        seen.filter_map(|(frame, place)| Some((frame.t_s, (*place)?[axis]))).unzip()
+    };
+    let range = |(_, px): &(Vec<f64>, Vec<f64>)| {
+        px.iter().copied().fold(f64::MIN, f64::max) - px.iter().copied().fold(f64::MAX, f64::min)
+    };
+    let (t_s, px) = [0, 1].map(along).into_iter().max_by(|a, b| range(a).total_cmp(&range(b)))?;
+    // two digits are written, and must lie behind it
+    released_s(&t_s, &px).map(|held_s| (100.0 * held_s).ceil() / 100.0)
 }
 
 /// What is worth following: every hue that moves, dark spots, light spots; each with its name.

@@ -30,10 +30,17 @@ impl Session<'_> {
                 let ways = self.ways(index, trial, progress)?;
                 let lacking = |chain: &Chain| wanted.map_or(0, |wanted| chain.marks.len().abs_diff(wanted));
                 let best = best(ways, |chain| chain.worth - lacking(chain) as f64);
-                let Some(Way { hue, chain: Some(chain) }) = best else { continue };
+                let Some(Way { hue, chain: Some(chain) }) = best else {
+                    if wanted.is_none() {
+                        self.count(1);
+                    }
+                    continue;
+                };
                 self.hues[index] = hue;
                 if wanted.is_none() {
-                    self.count(&chain);
+                    // a pivot that is known is no mark
+                    let hinge = usize::from(chain.hinge_marked && self.options.rig.pivot_px.is_some());
+                    self.count(chain.marks.len() - hinge);
                 }
             }
         }
@@ -74,10 +81,8 @@ impl Session<'_> {
         Ok([index].into_iter().chain(known..hues.len()).map(way).collect())
     }
 
-    /// As many marks as hang together. A pivot that is known is none of them.
-    fn count(&mut self, chain: &Chain) {
-        let hinge = usize::from(chain.hinge_marked && self.options.rig.pivot_px.is_some());
-        let marks = chain.marks.len() - hinge;
+    /// As many marks as hang together; one where nothing does, for more is not known.
+    fn count(&mut self, marks: usize) {
         self.hues[0].marks = marks;
         self.slots.resize(marks, MarkSlot { hue: 0 });
     }

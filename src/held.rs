@@ -1,0 +1,69 @@
+//! A beginning in which what swings is held still, as by a hand, until it is let go.
+//!
+//! What is let go at rest stays within a part ε of its range for arccos(1 − 2ε)/2π of a period, 0.064 of it for ε = 0.04. What stays there four times as long was held.
+
+use crate::statistics::median;
+
+/// Part of the range within which a hand holds still.
+const STILL: f64 = 0.04;
+/// Part of a period for which it does, at least.
+const LONGEST_REST: f64 = 0.25;
+/// Values whose median is where it is held.
+const FIRST: usize = 5;
+/// Fewest values, and fewest passes of the middle, that show a period.
+const FEWEST_VALUES: usize = 30;
+const FEWEST_PASSES: usize = 3;
+
+/// When it is let go: the time of the first value from which on it moves; `None` where it is not held at first.
+pub fn released_s(t_s: &[f64], values: &[f64]) -> Option<f64> {
+    if values.len() < FEWEST_VALUES || t_s.len() != values.len() {
+        return None;
+    }
+    let held = median(&mut values[..FIRST].to_vec())?;
+    let mut sorted = values.to_vec();
+    sorted.sort_unstable_by(f64::total_cmp);
+    let last = sorted.len() - 1;
+    let range = sorted[last * 49 / 50] - sorted[last / 50];
+    let is_away = |value: &f64| (value - held).abs() > STILL * range;
+    // one value alone may be wrong
+    let leaves = values.windows(2).position(|pair| pair.iter().all(is_away))?;
+    let middle = median(&mut values[leaves..].to_vec())?;
+    let passes: Vec<f64> = (leaves + 1..values.len())
+        .filter(|k| (values[*k] - middle) * (values[k - 1] - middle) < 0.0)
+        .map(|k| t_s[k])
+        .collect();
+    if passes.len() < FEWEST_PASSES {
+        return None;
+    }
+    let half_period_s = median(&mut passes.windows(2).map(|pair| pair[1] - pair[0]).collect::<Vec<_>>())?;
+    (t_s[leaves] - t_s[0] > LONGEST_REST * 2.0 * half_period_s).then_some(t_s[leaves])
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn swing(t: f64, released_s: f64) -> f64 {
+        let noise = 0.003 * (1e5 * t * t).sin();
+        if t < released_s { 0.5 + noise } else { 0.5 * (-0.03 * t).exp() * (5.0 * (t - released_s)).cos() + noise }
+    }
+
+    fn released(at_s: f64, value: impl Fn(f64) -> f64) -> Option<f64> {
+        let t_s: Vec<f64> = (0..360).map(|k| at_s + f64::from(k) / 30.0).collect();
+        released_s(&t_s, &t_s.iter().map(|t| value(*t)).collect::<Vec<_>>())
+    }
+
+    #[test]
+    fn a_held_beginning_ends_where_it_is_let_go() {
+        let found = released(0.0, |t| swing(t, 0.8)).unwrap();
+        assert!((0.8..0.95).contains(&found), "{found}");
+    }
+
+    #[test]
+    fn what_is_let_go_at_once_or_swings_already_is_not_held() {
+        assert_eq!(released(0.0, |t| swing(t, 0.0)), None);
+        assert_eq!(released(2.3, |t| swing(t, 0.0)), None);
+        assert_eq!(released(0.0, |t| 0.01 * (1e5 * t * t).sin()), None);
+        assert_eq!(released(0.0, |_| 0.3), None);
+    }
+}
