@@ -51,11 +51,13 @@ pub fn cautions(m: &Measurement, options: &Options) -> Vec<String> {
         cautions.extend(link_length(m, options, link, first));
         cautions.extend(turns(m, options, link));
     }
+    let held = held(m);
     for mark in 0..m.tracks.marks.len() {
-        cautions.extend(mark_noise(m, mark));
+        // a hand's trembling is no noise of a mark's
+        cautions.extend(mark_noise(m, mark).filter(|_| held.is_none()));
         cautions.extend(blur(m, mark));
     }
-    cautions.extend(held(m));
+    cautions.extend(held);
     cautions.extend(pivot(m, options));
     cautions.extend(camera(m, options));
     cautions.extend(time(m, options));

@@ -194,6 +194,10 @@ impl Findings<'_> {
             Place::Hinge => "It acts at the hinge",
             Place::Joint => "It acts in the joint",
             Place::Air => "It acts from outside along the strip",
+            // what acts on the specimen may look the same
+            Place::Camera if self.verdict.class.iter().any(|effect| effect.place() != Place::Camera) => {
+                "It is an error of the camera, or a cause that the recording does not tell from one"
+            }
             Place::Camera => "It is an error of the camera, not of the model",
         }
         .to_owned();
@@ -211,13 +215,9 @@ impl Findings<'_> {
         }
         let shares = energy_shares;
         if shares.iter().sum::<f64>() > 0.0 {
-            let _ = write!(
-                statement,
-                ". Of the energy lost {:.0} % go at the hinge, {:.0} % in the joint, {:.0} % to the air",
-                1e2 * shares[0],
-                1e2 * shares[1],
-                1e2 * shares[2]
-            );
+            let [hinge, joint, air] = shares.map(|share| format!("{:.0} %", 1e2 * share));
+            let in_joint = if self.context.marks() > 1 { format!(", {joint} in the joint") } else { String::new() };
+            let _ = write!(statement, ". Of the energy lost {hinge} go at the hinge{in_joint}, {air} to the air");
         }
         statement.push('.');
         statement

@@ -158,9 +158,15 @@ impl Mode {
         if self.constant_though_wide() {
             None
         } else if !agrees {
+            // no scale of the angles makes a frequency rise with amplitude that gravity makes fall
+            let times = (k.value / expected).max(0.0).sqrt();
+            let scale = if times > 0.0 {
+                format!(", or the true angles are about {times:.2} × the stated ones")
+            } else {
+                String::new()
+            };
             Some(format!(
-                "f = f₀(1 − κA²) has {measured}, gravity alone makes {expected:.4}: a nonlinear stiffness is at work, or the true angles are {:.2} × the stated ones",
-                (k.value / expected).max(0.0).sqrt()
+                "f = f₀(1 − κA²) has {measured}, gravity alone makes {expected:.4}: a nonlinear stiffness is at work{scale}"
             ))
         } else if !k.holds(0.0) {
             Some(format!("the frequency falls with amplitude as gravity makes it ({measured}, expected {expected:.4})"))

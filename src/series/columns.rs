@@ -5,6 +5,9 @@ use std::path::Path;
 use super::{DISPLACEMENT, Measured};
 use crate::error::{Error, Result};
 
+/// Names of columns that hold thousandths of what is wanted.
+const THOUSANDTHS: [&str; 5] = ["t_ms", "time_ms", "theta1_mrad", "theta2_mrad", "theta3_mrad"];
+
 /// Where each quantity stands.
 pub struct Columns {
     /// Of the time stamps.
@@ -87,7 +90,10 @@ fn missing(name: &str, names: &[&str]) -> String {
     let nearest = names.iter().max_by(|a, b| strsim::jaro_winkler(name, a).total_cmp(&strsim::jaro_winkler(name, b)));
     let hint = nearest
         .filter(|n| strsim::jaro_winkler(name, n) > 0.5)
-        .map(|n| format!("; is it `{n}`? Then rename it"))
+        .map(|n| match THOUSANDTHS.contains(n) {
+            true => format!("; is it `{n}`? Then divide it by 1000 and rename it"),
+            false => format!("; is it `{n}`? Then rename it"),
+        })
         .unwrap_or_default();
     format!("no column `{name}` among {list}{hint}")
 }

@@ -44,6 +44,9 @@ pub enum Measured {
     Displacement,
 }
 
+/// More than any encoder counts.
+const MOST_COUNTS: f64 = 1e9;
+
 /// The angles of one recording as a table of numbers.
 #[derive(Debug, Clone, PartialEq)]
 pub struct AngleSeries {
@@ -214,8 +217,13 @@ impl AngleSeries {
             }
             let is_angle = measured == Measured::Angles;
             if let Some(swing) = impossible_swing(&values).filter(|_| is_angle) {
+                let remedy = if values.iter().all(|value| value.fract() == 0.0 && value.abs() < MOST_COUNTS) {
+                    "looks like an encoder's counts; multiply by 2π over its counts a turn (or by π/180 if it is whole degrees)"
+                } else {
+                    "looks like degrees; multiply by π/180"
+                };
                 let message = format!(
-                    "{name} swings to and fro by {swing:.0} in one go, {:.1} full turns if radians: looks like degrees; multiply by π/180",
+                    "{name} swings to and fro by {swing:.0} in one go, {:.1} full turns if radians: {remedy}",
                     swing / std::f64::consts::TAU
                 );
                 return Err(table.refuse(None, &message));
