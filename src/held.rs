@@ -1,16 +1,17 @@
 //! A beginning in which what swings is held still, as by a hand, until it is let go.
 //!
-//! What is let go at rest stays within a part ε of its range for arccos(1 − 2ε)/2π of a period, 0.064 of it for ε = 0.04. What stays there four times as long was held.
+//! What is let go at rest stays within 4 % of its range for 0.064 of a period, and passes its middle 0.186 of a period later: 0.34 times that. Let go 2° from the top it stays as long as it then takes to
+//! fall (1.06). What stays half as long again was held.
 
 use crate::statistics::median;
 
 /// Part of the range within which a hand holds still.
 const STILL: f64 = 0.04;
-/// Part of a period for which it does, at least.
-const LONGEST_REST: f64 = 0.25;
+/// How many times as long as its way to the middle it stays there, at least.
+const LONGEST_REST: f64 = 1.5;
 /// Values whose median is where it is held.
 const FIRST: usize = 5;
-/// Fewest values, and fewest passes of the middle, that show a period.
+/// Fewest values, and fewest passes of the middle, that show a swing.
 const FEWEST_VALUES: usize = 30;
 const FEWEST_PASSES: usize = 3;
 
@@ -32,11 +33,8 @@ pub fn released_s(t_s: &[f64], values: &[f64]) -> Option<f64> {
         .filter(|k| (values[*k] - middle) * (values[k - 1] - middle) < 0.0)
         .map(|k| t_s[k])
         .collect();
-    if passes.len() < FEWEST_PASSES {
-        return None;
-    }
-    let half_period_s = median(&mut passes.windows(2).map(|pair| pair[1] - pair[0]).collect::<Vec<_>>())?;
-    (t_s[leaves] - t_s[0] > LONGEST_REST * 2.0 * half_period_s).then_some(t_s[leaves])
+    let way_s = passes.first().filter(|_| passes.len() >= FEWEST_PASSES)? - t_s[leaves];
+    (t_s[leaves] - t_s[0] > LONGEST_REST * way_s).then_some(t_s[leaves])
 }
 
 #[cfg(test)]
@@ -65,5 +63,20 @@ mod tests {
         assert_eq!(released(2.3, |t| swing(t, 0.0)), None);
         assert_eq!(released(0.0, |t| 0.01 * (1e5 * t * t).sin()), None);
         assert_eq!(released(0.0, |_| 0.3), None);
+    }
+
+    #[test]
+    fn what_falls_from_near_the_top_is_not_held() {
+        let (mut angle, mut rate) = (178f64.to_radians(), 0.0);
+        let mut angles = Vec::new();
+        for _ in 0..600 {
+            angles.push(angle);
+            for _ in 0..100 {
+                rate -= 25.0 * angle.sin() / 3000.0;
+                angle += rate / 3000.0;
+            }
+        }
+        let t_s: Vec<f64> = (0..600).map(|k| f64::from(k) / 30.0).collect();
+        assert_eq!(released_s(&t_s, &angles), None);
     }
 }

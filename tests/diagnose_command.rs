@@ -265,6 +265,20 @@ fn a_tilted_camera_is_not_told_from_a_side_force_without_a_plumb_line() {
 }
 
 #[test]
+fn of_an_encoder_no_error_of_a_camera_is_named() {
+    let folder = Folder::new();
+    let angles = folder.swing(BASE, "angle_gain = 0.05\n");
+    let of = |base: &str| folder.diagnosis(&angles, base, &[]);
+    let camera = of(BASE);
+    assert_eq!(names(&camera["verdict"]["effects"]), ["angle_gain"]);
+    let encoder = of(&format!("[rig]\nsensor = \"encoder\"\n{BASE}"));
+    let inclusion = encoder["verdict"]["inclusion"].as_object().unwrap();
+    for effect in ["angle_gain", "camera_oblique", "differential_lag", "time_base"] {
+        assert_eq!(inclusion[effect].as_f64(), Some(0.0), "{effect}: {encoder:#}");
+    }
+}
+
+#[test]
 fn a_camera_that_looks_askew_is_named_with_its_stretch_and_its_shear() {
     let folder = Folder::new();
     let angles = folder.swing(BASE, "camera_oblique = { stretch = -0.02, shear = 0.03 }\n");

@@ -3,7 +3,7 @@
 
 use std::fmt;
 
-use crate::experiment::{Experiment, Hysteresis};
+use crate::experiment::{Experiment, Hysteresis, Sensor};
 use crate::fit::Belief;
 use crate::model::Parameter;
 
@@ -155,6 +155,8 @@ pub struct Entry {
     pub acts: Acts,
     /// Whether it means anything.
     pub needs: Needs,
+    /// Whether an encoder cannot err so.
+    pub of_camera: bool,
     /// The part of its own torque by which its law may be wrong before something unknown is suspected beside it. That of a hysteresis is larger: how it goes
     /// over from spring to slip has as many forms as there are authors.
     pub law_error: f64,
@@ -241,6 +243,7 @@ const fn entry(parameters: &'static [Parameter], place: Place, acts: Acts, words
         cost,
         acts,
         needs,
+        of_camera: false,
         law_error,
         shapes: &[],
         can_stop: false,
@@ -253,6 +256,10 @@ const fn position(entry: Entry) -> Entry {
     Entry { phase: Some(Phase::Position), ..entry }
 }
 
+const fn of_camera(entry: Entry) -> Entry {
+    Entry { of_camera: true, ..entry }
+}
+
 const fn velocity(entry: Entry) -> Entry {
     Entry { phase: Some(Phase::Velocity), ..entry }
 }
@@ -263,36 +270,36 @@ static TABLE: [Entry; 18] = {
     use Parameter as P;
     use Place::{Air, Camera, Hinge, Joint};
     [
-        velocity(entry(&[P::TimeBase], Camera, Pace, "a camera clock that runs wrong")),
+        of_camera(velocity(entry(&[P::TimeBase], Camera, Pace, "a camera clock that runs wrong"))),
         Entry {
             cost: Cost::EveryInstant,
             ..velocity(entry(&[P::DroppedFrames], Camera, Otherwise, "frames missing at one instant"))
         },
         entry(&[P::CameraTilt], Camera, Otherwise, "a tilted camera"),
-        position(entry(
+        of_camera(position(entry(
             &[P::AngleGain],
             Camera,
             Otherwise,
             "a common gain of the angles (a sensor's scale; of small swings, a view askew)",
-        )),
+        ))),
         Entry {
             id: "camera_oblique",
             set_up: |problem| problem.looks_askew(),
-            ..position(entry(
+            ..of_camera(position(entry(
                 &[P::ViewStretch, P::ViewShear],
                 Camera,
                 Otherwise,
                 "a camera that looks askew (oblique view, pixels that are not square)",
-            ))
+            )))
         },
         Entry {
             needs: Needs::Joint,
-            ..velocity(entry(
+            ..of_camera(velocity(entry(
                 &[P::DifferentialLag],
                 Camera,
                 Otherwise,
                 "a lag of θ2 behind θ1 (rolling shutter, filter)",
-            ))
+            )))
         },
         Entry {
             shapes: PROPORTIONAL,
@@ -435,6 +442,7 @@ impl Effect {
             Needs::Spring => base.iter().any(|parameter| parameter.is_spring()),
             Needs::Strip => marks > 1 && strip && base.contains(&Parameter::JointStiffness),
         };
+        let meaningful = meaningful && !(self.entry().of_camera && experiment.rig.sensor == Sensor::Encoder);
         // a camera that misses frames, and the first coefficient of a named effect
         meaningful && !self.parameters().iter().any(|p| base.contains(p)) && !self.is_set(experiment)
     }

@@ -20,7 +20,7 @@ pub use law::{Coefficient, Law, LawPlace};
 pub use light::{Coating, Face, Film, Heat, Laser, Light};
 pub use model::{Effects, Hysteresis, Model, ObliqueView, SupportMotion};
 pub use render::{Caption, Codec, CodecName, Distractor, Lens, Noise, Occlusion, PixelFormat, Render, Rgb, Siting};
-pub use rig::{Look, MarkColour, Rig, Support};
+pub use rig::{Look, MarkColour, Rig, Sensor, Support};
 pub use specimen::{Inertia, Link, Reflectivity, Specimen};
 
 use crate::error::{Error, Result};

@@ -112,6 +112,17 @@ pub enum Support {
     Clamped,
 }
 
+/// What measured the angles.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Deserialize, serde::Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Sensor {
+    /// A camera.
+    #[default]
+    Camera,
+    /// An encoder on each hinge: its scale, its clock and its view are right; its zero may not be.
+    Encoder,
+}
+
 /// How the specimen hangs and is seen.
 #[derive(Debug, Clone, PartialEq, Deserialize)]
 #[serde(default, deny_unknown_fields)]
@@ -122,6 +133,8 @@ pub struct Rig {
     pub support: Support,
     /// A torsion spring at a hinge.
     pub support_stiffness_n_m_per_rad: f64,
+    /// What measured the angles.
+    pub sensor: Sensor,
     /// The camera looks into a mirror.
     pub mirrored: bool,
     /// A fixed, unmarked hinge; then the first mark is the joint.
@@ -156,6 +169,7 @@ impl Default for Rig {
             gravity_m_s2: 9.80665,
             support: Support::Hinged,
             support_stiffness_n_m_per_rad: 0.0,
+            sensor: Sensor::Camera,
             mirrored: false,
             pivot_px: None,
             pivot_sd_px: None,

@@ -149,8 +149,7 @@ impl<'a, 'p> Search<'a, 'p> {
     }
 
     /// Searches for what the base model lacks, the file taken at its word. Whole recordings of a rig that are dear and far from the model are left to their pieces:
-    /// of bearings and castings no model is right to the noise. It ends where a strip is
-    /// found to bend everywhere: see [`Self::of_bending_strip`].
+    /// of bearings and castings no model is right to the noise. It is cut short where a strip is found to bend everywhere: see [`Self::of_bending_strip`].
     pub fn run(&mut self) {
         let is_rig = !self.context.experiment.specimen.links.is_empty();
         if is_rig && self.prepared.part < 1.0 && self.leaves_more_than_noise() && self.pieces().is_some() {
@@ -230,7 +229,7 @@ impl<'a, 'p> Search<'a, 'p> {
     fn pieces(&self) -> Option<Prepared> {
         let (model, _) = self.base().problem.model(0, &[]).ok()?;
         let cut = || self.prepared.in_pieces(self.context.settings, model.pace_rad_s());
-        let bends = self.context.is_strip() || self.bending_n_m2.is_some();
+        let bends = self.context.is_strip() || self.context.fine_strip.is_some();
         (!bends && !self.context.is_in_pieces()).then(cut).flatten()
     }
 
