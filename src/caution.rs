@@ -2,7 +2,7 @@
 
 use crate::angles::Angle;
 use crate::experiment::Experiment;
-use crate::held::released_s;
+use crate::held::released_of;
 use crate::measure::{Measurement, Options, Steadying};
 use crate::statistics::median;
 use crate::track::hanging::{LEAST_TURN, MOST_MARKS};
@@ -198,12 +198,8 @@ fn held(m: &Measurement) -> Option<String> {
         let seen = m.file_t_s.iter().zip(points);
         seen.filter_map(|(t, point)| Some((*t, point.measured?.position_px[axis]))).unzip()
     };
-    let range = |(_, px): &(Vec<f64>, Vec<f64>)| {
-        px.iter().copied().fold(f64::MIN, f64::max) - px.iter().copied().fold(f64::MAX, f64::min)
-    };
     let paths = m.tracks.marks.iter().flat_map(|points| [0, 1].map(|axis| along(points, axis)));
-    let (t_s, px) = paths.max_by(|a, b| range(a).total_cmp(&range(b)))?;
-    released_s(&t_s, &px).map(|held_s| {
+    released_of(paths).map(|held_s| {
         format!(
             "what swings is held still until t = {held_s:.2} s, as by a hand, which covers marks and belongs to no swing: leave that out with --from {held_s:.2}"
         )

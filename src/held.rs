@@ -15,8 +15,17 @@ const FIRST: usize = 5;
 const FEWEST_VALUES: usize = 30;
 const FEWEST_PASSES: usize = 3;
 
+/// When what moves farthest of some paths, each of times and values, is let go.
+pub fn released_of(paths: impl Iterator<Item = (Vec<f64>, Vec<f64>)>) -> Option<f64> {
+    let range = |(_, values): &(Vec<f64>, Vec<f64>)| {
+        values.iter().copied().fold(f64::MIN, f64::max) - values.iter().copied().fold(f64::MAX, f64::min)
+    };
+    let (t_s, values) = paths.max_by(|a, b| range(a).total_cmp(&range(b)))?;
+    released_s(&t_s, &values)
+}
+
 /// When it is let go: the time of the first value from which on it moves; `None` where it is not held at first.
-pub fn released_s(t_s: &[f64], values: &[f64]) -> Option<f64> {
+fn released_s(t_s: &[f64], values: &[f64]) -> Option<f64> {
     if values.len() < FEWEST_VALUES || t_s.len() != values.len() {
         return None;
     }

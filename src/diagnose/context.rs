@@ -15,7 +15,7 @@ use crate::model::{Parameter, Work};
 const YIELD: (f64, f64) = (0.2, 2.5);
 /// The same of a joint that has no spring: a bearing, whose friction is dry.
 const DRY_YIELD: (f64, f64) = (1e-3, 0.5);
-/// Rods between two marks while bending all along the strip is only a candidate.
+/// The strip while bending all along it is only a candidate.
 const CANDIDATE: BendingStrip = BendingStrip { rods: 3, bending_n_m2: None };
 
 /// What every fit of one diagnosis shares.

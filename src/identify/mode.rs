@@ -41,8 +41,8 @@ pub struct Mode {
     pub rms_rad: f64,
     /// Undamped natural frequency to take.
     pub frequency_hz: Estimate,
-    /// The amplitude at which the frequency is meant, where amplitude may change it and the data do not tell how; its interval
-    /// holds that at small amplitude as well.
+    /// The amplitude at which the frequency is meant, where amplitude may change it and the data do not tell how. Of angles the
+    /// interval holds that at small amplitude as well; of a displacement, whose angle nobody knows, it does not.
     pub frequency_at_amplitude_rad: Option<f64>,
     /// ξ to take.
     pub damping: Damping,

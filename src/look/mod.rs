@@ -16,7 +16,7 @@ use std::path::Path;
 use crate::detect::{Album, COUNTS, Hue, Trial};
 use crate::error::{Error, Result};
 use crate::experiment::MarkColour;
-use crate::held::released_s;
+use crate::held::released_of;
 use crate::measure::{Camera, Options, Session};
 use crate::progress::Progress;
 use crate::track::hanging::{self, MOST_MARKS};
@@ -181,12 +181,8 @@ fn held_until_s(frames: &[FrameBlobs], marks: &[&Thing]) -> Option<f64> {
         let seen = frames.iter().zip(&farthest.path);
         seen.filter_map(|(frame, place)| Some((frame.t_s, (*place)?[axis]))).unzip()
     };
-    let range = |(_, px): &(Vec<f64>, Vec<f64>)| {
-        px.iter().copied().fold(f64::MIN, f64::max) - px.iter().copied().fold(f64::MAX, f64::min)
-    };
-    let (t_s, px) = [0, 1].map(along).into_iter().max_by(|a, b| range(a).total_cmp(&range(b)))?;
     // two digits are written, and must lie behind it
-    released_s(&t_s, &px).map(|held_s| (100.0 * held_s).ceil() / 100.0)
+    released_of([0, 1].map(along).into_iter()).map(|held_s| (100.0 * held_s).ceil() / 100.0)
 }
 
 /// What is worth following: every hue that moves, dark spots, light spots; each with its name.

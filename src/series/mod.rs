@@ -8,7 +8,7 @@ use std::ops::Range;
 use std::path::{Path, PathBuf};
 
 use crate::error::{Error, Result};
-use crate::held::released_s;
+use crate::held::released_of;
 use crate::statistics::{median, median_step_s};
 use columns::{Columns, Row, Table, not_a_table};
 
@@ -237,12 +237,7 @@ impl AngleSeries {
         let known = |angles: &Vec<Option<f64>>| -> (Vec<f64>, Vec<f64>) {
             self.t_s.iter().zip(angles).filter_map(|(t, angle)| Some((*t, (*angle)?))).unzip()
         };
-        let range = |(_, values): &(Vec<f64>, Vec<f64>)| {
-            let highest = values.iter().copied().fold(f64::NEG_INFINITY, f64::max);
-            highest - values.iter().copied().fold(f64::INFINITY, f64::min)
-        };
-        let farthest = self.theta_rad.iter().map(known).max_by(|a, b| range(a).total_cmp(&range(b)))?;
-        released_s(&farthest.0, &farthest.1)
+        released_of(self.theta_rad.iter().map(known))
     }
 
     /// Number of links.

@@ -23,13 +23,11 @@ impl<'a> Search<'a, '_> {
     /// strip that is right, and beside it alone.
     pub fn of_bending_strip(&mut self, records: &[Record], kept: &'a OnceLock<Prepared>) -> Option<Self> {
         let is_found = self.is_cut_short || self.bends();
-        let may_bend = || {
-            let unexplained = self.misfit().is_some_and(|misfit| misfit.unexplained);
-            let stiffness = self.base().value(Parameter::JointStiffness)?;
-            let may_bend = unexplained && self.effects.contains(&Effect::DistributedFlexibility);
-            may_bend.then(|| bending_n_m2(stiffness, self.context.experiment))
+        let as_stiff = || {
+            let stiffness = self.base().value(Parameter::JointStiffness).filter(|_| self.may_bend())?;
+            Some(bending_n_m2(stiffness, self.context.experiment))
         };
-        let stated = if is_found { self.bending_n_m2 } else { may_bend() }?;
+        let stated = if is_found { self.bending_n_m2 } else { as_stiff() }?;
         let settings = self.context.settings;
         let mut experiment = self.context.experiment.clone();
         experiment.model.effects.distributed_flexibility = Some(stated);
@@ -55,6 +53,11 @@ impl<'a> Search<'a, '_> {
         self.bending_n_m2.is_some()
     }
 
+    /// Whether the links may be a strip, nothing else explaining what is left.
+    fn may_bend(&self) -> bool {
+        self.effects.contains(&Effect::DistributedFlexibility) && self.misfit().is_some_and(|misfit| misfit.unexplained)
+    }
+
     /// Whether another base model does better.
     pub fn is_behind(&self) -> bool {
         self.rival.is_some_and(|rival| least(&self.fits).is_none_or(|best| best.left_share() > rival))
@@ -63,8 +66,7 @@ impl<'a> Search<'a, '_> {
     /// Bending where nothing else explains what is left: from the base model's motion its own may not be found.
     pub(super) fn seek_bending(&mut self) {
         let is_tried = self.fits.iter().any(|fit| fit.hypothesis.has(Effect::DistributedFlexibility));
-        let may_bend = self.effects.contains(&Effect::DistributedFlexibility) && !is_tried;
-        if may_bend && self.misfit().is_some_and(|misfit| misfit.unexplained) {
+        if !is_tried && self.may_bend() {
             let found = self.fitted(&[Proposal::Anew(bending::alone(), self.base())]);
             self.keep(found);
         }
