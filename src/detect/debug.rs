@@ -16,10 +16,11 @@ use image::{DynamicImage, GrayImage, ImageFormat, Luma, Rgb, RgbImage};
 use opencv::core::{Mat, Point, Scalar, Vec3b};
 use opencv::imgproc;
 
-use super::blobs::{self, Target};
+use super::blobs::Target;
 use super::component::to_255;
 use super::mask::Mask;
 use super::plane::Plane;
+use super::region::regions;
 use super::{Blob, Detector, Hue};
 use crate::error::{Error, Result};
 use crate::output::{self, OutputFile};
@@ -198,7 +199,7 @@ impl View<'_> {
         let (columns, rows) = self.picture.layout.chroma_size();
         let mut samples = vec![0u8; columns * rows];
         for target in targets.iter().filter(|t| !t.is_sought_everywhere()) {
-            for region in blobs::regions(self.picture, target.axis, target.threshold) {
+            for region in regions(self.picture, target.axis, target.threshold) {
                 let mask = Mask::of(self.picture, target.axis, target.threshold, target.thin, region);
                 for (y, row) in mask.rows() {
                     let to = &mut samples[y * columns + mask.left()..][..row.len()];

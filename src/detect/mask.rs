@@ -2,11 +2,11 @@
 
 use std::ops::Range;
 
-use super::blobs::{MARGIN, Region};
 use super::centroid::Silhouette;
 use super::component::HueAxis;
 use super::morphology::{dilate, erode};
 use super::plane::Plane;
+use super::region::{MARGIN, Region};
 use crate::video::Picture;
 
 /// What is above the threshold.

@@ -9,6 +9,7 @@ pub mod debug;
 mod mask;
 mod morphology;
 mod plane;
+mod region;
 mod samples;
 mod shading;
 mod siting;

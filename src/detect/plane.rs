@@ -15,8 +15,8 @@ use opencv::core::{
 };
 use opencv::imgproc;
 
-use super::blobs::Region;
 use super::component::HueAxis;
+use super::region::Region;
 use super::samples::Samples;
 use crate::error::{Error, Result};
 use crate::video::Picture;

@@ -4,10 +4,10 @@
 //! difference is its persistence. The marks are the most persistent summits, and the threshold lies between the
 //! saddle and the summit of the weakest of them, so an amber film or a bright background shifts it where it must be.
 
-use super::blobs::Region;
 use super::component::{from_255, to_255};
 use super::morphology::{dilate, erode};
 use super::plane::Plane;
+use super::region::Region;
 
 /// Below this, on the scale to 255, nothing is taken for a mark: the chroma noise of cameras and codecs.
 pub const LEAST_COMPONENT: f64 = 16.0;

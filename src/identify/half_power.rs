@@ -18,8 +18,8 @@ use nalgebra::Complex;
 use serde::Serialize;
 
 use super::estimate::Estimate;
+use super::pole::Pole;
 use super::signal::Signal;
-use super::sinusoids::Pole;
 use super::spectrum::{Window, line_sd_hz};
 
 /// Width at half power, in 1/T, of a steady oscillation cut off by the record.

@@ -26,6 +26,7 @@ pub mod half_power;
 mod mode;
 pub mod modes;
 pub mod pencil;
+pub mod pole;
 mod projection;
 pub mod signal;
 pub mod sinusoids;

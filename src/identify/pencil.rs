@@ -6,8 +6,8 @@
 
 use nalgebra::DMatrix;
 
+use super::pole::Pole;
 use super::signal::{LinkSamples, Signal};
-use super::sinusoids::Pole;
 
 /// Grid points taken, at most: the cost rises with their cube.
 const MOST_POINTS: usize = 300;

@@ -2,10 +2,10 @@
 
 use levenberg_marquardt::LeastSquaresProblem;
 use nalgebra::storage::Owned;
-use nalgebra::{Complex, DMatrix, DVector, Dyn};
+use nalgebra::{DMatrix, DVector, Dyn};
 
+use super::pole::Pole;
 use super::signal::{LinkSamples, Signal};
-use super::sinusoids::{LinkFit, Pole, SinusoidFit};
 
 /// The least-squares problem in the poles alone.
 pub(super) struct Projection {
@@ -22,13 +22,13 @@ pub(super) fn drift_phase(tau_s: f64, duration_s: f64) -> f64 {
 pub(super) struct Projected {
     pub tau_s: Vec<f64>,
     duration_s: f64,
-    drift_terms: usize,
+    pub drift_terms: usize,
     pub measured: DVector<f64>,
     weight: f64,
     pub orthonormal: DMatrix<f64>,
-    triangle: DMatrix<f64>,
+    pub triangle: DMatrix<f64>,
     /// offset, a₁, b₁, a₂, b₂, …, d₁, d₂, …
-    coefficients: DVector<f64>,
+    pub coefficients: DVector<f64>,
     pub residual: DVector<f64>,
 }
 
@@ -112,42 +112,6 @@ impl Projection {
             link.weight = 1.0 / noise.max(1e-6 * largest).max(f64::MIN_POSITIVE).sqrt();
         }
         Some(())
-    }
-
-    pub fn finish(self, origin_s: f64, poles: Vec<Pole>) -> Option<SinusoidFit> {
-        let values: usize = self.links.iter().map(|l| l.tau_s.len()).sum();
-        let drift_terms = self.links.first()?.drift_terms;
-        let linear = 1 + drift_terms + 2 * poles.len();
-        let share = 2.0 * poles.len() as f64 / values as f64;
-        let degrees_of_freedom =
-            (values - self.links.len() * linear).checked_sub(2 * poles.len()).filter(|d| *d > 0)? as f64;
-        let jacobian = self.jacobian()?;
-        let chi2: f64 = self.residuals()?.norm_squared();
-        let covariance = jacobian.tr_mul(&jacobian).try_inverse()? * (chi2 / degrees_of_freedom);
-        let mut links = Vec::new();
-        let mut deviance = 0.0;
-        for link in self.links {
-            let n = link.tau_s.len() as f64;
-            let rss = link.residual.norm_squared();
-            deviance += n * (rss / n).max(f64::MIN_POSITIVE).ln();
-            let noise_rad = (rss / (n * (1.0 - share) - linear as f64).max(1.0)).sqrt();
-            let inverse = link.triangle.try_inverse()?;
-            let spread = |k: usize| inverse.row(k).norm();
-            let c = &link.coefficients;
-            let modes = 0..poles.len();
-            links.push(LinkFit {
-                offset_rad: c[0],
-                drift_rad: c.as_slice()[1 + 2 * poles.len()..].to_vec(),
-                amplitudes_rad: modes.clone().map(|m| Complex::new(c[1 + 2 * m], -c[2 + 2 * m])).collect(),
-                amplitude_sd_rad: modes
-                    .map(|m| noise_rad * spread(1 + 2 * m).hypot(spread(2 + 2 * m)) * std::f64::consts::FRAC_1_SQRT_2)
-                    .collect(),
-                residual_rad: link.residual.as_slice().to_vec(),
-                noise_rad,
-            });
-        }
-        let finite = covariance.iter().all(|c| c.is_finite());
-        finite.then_some(SinusoidFit { origin_s, poles, covariance, links, degrees_of_freedom, deviance })
     }
 }
 

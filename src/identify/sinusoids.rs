@@ -13,65 +13,16 @@
 //! is a damped oscillation only if [`Pole::is_seen_to_swing`], if no amplitude exceeds what was recorded, and if the linearisation behind the
 //! intervals reaches as far as they do; otherwise there is no result.
 
-use levenberg_marquardt::LevenbergMarquardt;
+use levenberg_marquardt::{LeastSquaresProblem as _, LevenbergMarquardt};
 use nalgebra::{Complex, DMatrix};
-use serde::Serialize;
 
 use super::estimate::Estimate;
+use super::pole::Pole;
 use super::projection::{Projection, drift_phase};
 use super::signal::{LinkSamples, Signal};
 
-/// Fewest cycles by which an oscillation is told from a drift: within two, offset, trend and two half swings fit each other's data.
-pub const FEWEST_CYCLES: f64 = 2.0;
 /// A mode's amplitude at the start over the range of what was recorded, at most: an oscillation that starts at its zero reaches less than its amplitude.
 const LARGEST_AMPLITUDE: f64 = 2.0;
-
-/// One damped oscillation: its pole −σ ± iω.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
-pub struct Pole {
-    /// ω, damped angular frequency.
-    pub omega_rad_s: f64,
-    /// σ; an amplitude falls as e^{−σt}.
-    pub decay_per_s: f64,
-}
-
-impl Pole {
-    /// From the natural frequency and the damping ratio.
-    pub fn of(frequency_hz: f64, damping_ratio: f64) -> Self {
-        let natural_rad_s = std::f64::consts::TAU * frequency_hz;
-        Self {
-            omega_rad_s: natural_rad_s * (1.0 - damping_ratio * damping_ratio).max(0.0).sqrt(),
-            decay_per_s: damping_ratio * natural_rad_s,
-        }
-    }
-
-    /// Undamped natural frequency f.
-    pub fn frequency_hz(&self) -> f64 {
-        self.omega_rad_s.hypot(self.decay_per_s) / std::f64::consts::TAU
-    }
-
-    /// ξ.
-    pub fn damping_ratio(&self) -> f64 {
-        self.decay_per_s / self.omega_rad_s.hypot(self.decay_per_s)
-    }
-
-    /// Cycles within a record, or before the amplitude has changed twentyfold, whichever is less.
-    pub fn cycles_seen(&self, duration_s: f64) -> f64 {
-        let lasting_s = 20f64.ln() / self.decay_per_s.abs().max(f64::MIN_POSITIVE);
-        self.omega_rad_s / std::f64::consts::TAU * duration_s.min(lasting_s)
-    }
-
-    /// Whether a record shows it to and fro often enough that it is no drift.
-    pub fn is_seen_to_swing(&self, duration_s: f64) -> bool {
-        self.cycles_seen(duration_s) >= FEWEST_CYCLES
-    }
-
-    /// Mean over a record of the square of an oscillation of unit amplitude at its start.
-    pub fn mean_square(&self, duration_s: f64) -> f64 {
-        let x = 2.0 * self.decay_per_s * duration_s;
-        0.5 * if x.abs() < 1e-6 { 1.0 } else { -(-x).exp_m1() / x }
-    }
-}
 
 /// What the fit says about one link.
 #[derive(Debug, Clone, PartialEq)]
@@ -137,7 +88,45 @@ impl SinusoidFit {
         if !poles.iter().all(sane) {
             return None;
         }
-        problem.finish(origin_s, poles).filter(|fit| fit.stays_within(signal) && fit.is_resolved())
+        Self::of_solved(problem, origin_s).filter(|fit| fit.stays_within(signal) && fit.is_resolved())
+    }
+
+    /// The fit that a solved problem is, with its covariance.
+    fn of_solved(problem: Projection, origin_s: f64) -> Option<Self> {
+        let poles = problem.poles();
+        let values: usize = problem.links.iter().map(|l| l.tau_s.len()).sum();
+        let drift_terms = problem.links.first()?.drift_terms;
+        let linear = 1 + drift_terms + 2 * poles.len();
+        let share = 2.0 * poles.len() as f64 / values as f64;
+        let degrees_of_freedom =
+            (values - problem.links.len() * linear).checked_sub(2 * poles.len()).filter(|d| *d > 0)? as f64;
+        let jacobian = problem.jacobian()?;
+        let chi2: f64 = problem.residuals()?.norm_squared();
+        let covariance = jacobian.tr_mul(&jacobian).try_inverse()? * (chi2 / degrees_of_freedom);
+        let mut links = Vec::new();
+        let mut deviance = 0.0;
+        for link in problem.links {
+            let n = link.tau_s.len() as f64;
+            let rss = link.residual.norm_squared();
+            deviance += n * (rss / n).max(f64::MIN_POSITIVE).ln();
+            let noise_rad = (rss / (n * (1.0 - share) - linear as f64).max(1.0)).sqrt();
+            let inverse = link.triangle.try_inverse()?;
+            let spread = |k: usize| inverse.row(k).norm();
+            let c = &link.coefficients;
+            let modes = 0..poles.len();
+            links.push(LinkFit {
+                offset_rad: c[0],
+                drift_rad: c.as_slice()[1 + 2 * poles.len()..].to_vec(),
+                amplitudes_rad: modes.clone().map(|m| Complex::new(c[1 + 2 * m], -c[2 + 2 * m])).collect(),
+                amplitude_sd_rad: modes
+                    .map(|m| noise_rad * spread(1 + 2 * m).hypot(spread(2 + 2 * m)) * std::f64::consts::FRAC_1_SQRT_2)
+                    .collect(),
+                residual_rad: link.residual.as_slice().to_vec(),
+                noise_rad,
+            });
+        }
+        let finite = covariance.iter().all(|c| c.is_finite());
+        finite.then_some(SinusoidFit { origin_s, poles, covariance, links, degrees_of_freedom, deviance })
     }
 
     /// Whether no amplitude is larger than the recording allows.

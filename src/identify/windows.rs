@@ -7,8 +7,9 @@
 
 use nalgebra::Complex;
 
+use super::pole::Pole;
 use super::signal::{LinkSamples, Signal};
-use super::sinusoids::{Pole, SinusoidFit};
+use super::sinusoids::SinusoidFit;
 use crate::statistics::median;
 
 /// Cycles of the slowest mode in a window.

@@ -39,7 +39,7 @@ pub fn of(picture: &Picture<'_>, axis: HueAxis, silhouette: &Silhouette) -> Opti
     let patch = Patch::read(picture, &outline);
     let zones = Zones::of(&patch, &outline);
     let is_near_edge = |sample: &&Sample| {
-        let inside_px = -outline.depth_px(sample) - outline.bands_px[usize::from(sample.sector)] - MARGIN_PX;
+        let inside_px = -sample.depth_px(&outline) - outline.bands_px[usize::from(sample.sector)] - MARGIN_PX;
         (0.0..RING_PX).contains(&inside_px)
     };
     let pixels: Vec<&Sample> = zones.core.into_iter().filter(is_near_edge).collect();

@@ -203,7 +203,7 @@ fn for_each_share(
     }
     let profile = Profile::of(zones, outline, surroundings, shares);
     for sample in foreign {
-        visit(sample, profile.at(outline.depth_px(sample)), shares[usize::from(sample.sector)].variance);
+        visit(sample, profile.at(sample.depth_px(outline)), shares[usize::from(sample.sector)].variance);
     }
 }
 

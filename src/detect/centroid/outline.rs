@@ -5,7 +5,6 @@ use std::f32::consts::TAU;
 use super::super::component::HueAxis;
 use super::Silhouette;
 use super::disc::Disc;
-use super::patch::Sample;
 use crate::video::Picture;
 
 /// The narrowest half width of the boundary band: codecs and chroma interpolation soften every edge this much.
@@ -68,21 +67,6 @@ impl Outline {
             outline.bands_px[sector] = FADE * disc.blur_px + 0.5 * along(disc.sweep_px).abs();
         }
         outline
-    }
-
-    /// How far outside the boundary a pixel lies.
-    #[inline]
-    pub fn depth_px(&self, sample: &Sample) -> f32 {
-        sample.distance_px - self.radii_px[usize::from(sample.sector)]
-    }
-
-    /// Where a pixel lies.
-    #[inline]
-    pub fn zone(&self, sample: &Sample) -> Zone {
-        let (depth, band) = (self.depth_px(sample), self.bands_px[usize::from(sample.sector)]);
-        // counted rather than asked one by one: which zone comes next cannot be foretold
-        let boundaries = [depth >= -band, depth > band, depth > band + RING_PX];
-        [Zone::Core, Zone::Band, Zone::Ring, Zone::Beyond][boundaries.map(usize::from).iter().sum::<usize>()]
     }
 
     /// Number of sectors.

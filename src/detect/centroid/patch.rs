@@ -2,7 +2,7 @@
 
 use std::ops::Range;
 
-use super::outline::Outline;
+use super::outline::{Outline, RING_PX, Zone};
 use crate::video::{Picture, Plane};
 
 /// Luma, C_b and C_r as 8-bit codes, all equally sharp.
@@ -32,6 +32,21 @@ impl Sample {
     #[inline]
     pub fn is_white(&self) -> bool {
         (self.dx_px as i32 + self.dy_px as i32) & 1 == 0
+    }
+
+    /// How far outside the boundary a pixel lies.
+    #[inline]
+    pub fn depth_px(&self, outline: &Outline) -> f32 {
+        self.distance_px - outline.radii_px[usize::from(self.sector)]
+    }
+
+    /// Where a pixel lies.
+    #[inline]
+    pub fn zone(&self, outline: &Outline) -> Zone {
+        let (depth, band) = (self.depth_px(outline), outline.bands_px[usize::from(self.sector)]);
+        // counted rather than asked one by one: which zone comes next cannot be foretold
+        let boundaries = [depth >= -band, depth > band, depth > band + RING_PX];
+        [Zone::Core, Zone::Band, Zone::Ring, Zone::Beyond][boundaries.map(usize::from).iter().sum::<usize>()]
     }
 }
 

@@ -18,7 +18,7 @@ impl Profile {
         let mut profile = Self { band_px, bins: vec![(0.0, 0); (4.0 * band_px) as usize + 2] };
         for sample in &zones.band {
             let sector = usize::from(sample.sector);
-            let depth = outline.depth_px(sample);
+            let depth = sample.depth_px(outline);
             if let Some(share) = shares[sector].of(sample.levels, surroundings.background_at(sector, sample)) {
                 profile.add(depth, share);
             }

@@ -61,7 +61,7 @@ impl Surroundings {
             [0, 1, 2].map(|k| median(&mut zones.core.iter().map(|s| s.levels[k]).collect::<Vec<_>>()).unwrap_or(0.0))
         } else {
             let inside = zones.core.iter().chain(&zones.band);
-            inside.min_by(|a, b| outline.depth_px(a).total_cmp(&outline.depth_px(b)))?.levels
+            inside.min_by(|a, b| a.depth_px(outline).total_cmp(&b.depth_px(outline)))?.levels
         };
         let scatter = vec![scatter_of(zones.ring.iter().map(|s| s.levels)); outline.count()];
         let mut surroundings = Self {

@@ -26,7 +26,7 @@ impl<'a> Zones<'a> {
         let room = || Vec::with_capacity(patch.samples.len() / 2);
         let mut zones = [room(), room(), room(), Vec::new()];
         for sample in &patch.samples {
-            let zone = outline.zone(sample);
+            let zone = sample.zone(outline);
             if every || sample.is_white() || matches!(zone, Zone::Ring | Zone::Beyond) {
                 zones[zone as usize].push(sample);
             }
