@@ -8,6 +8,7 @@ use super::decrement::Decrement;
 use super::envelope::{Bounds, Envelope, FrequencyLaw};
 use super::estimate::{Estimate, chi_squared_tail};
 use super::half_power::HalfPower;
+use super::modulated::Modulated;
 use super::signal::Signal;
 use super::sinusoids::SinusoidFit;
 use super::spectrum::Spectrum;
@@ -28,6 +29,8 @@ pub enum Method {
     Sinusoids,
     /// Amplitudes and phases of windows; frequency and damping at small amplitude.
     Envelope,
+    /// One oscillation whose frequency and damping go with its amplitude, where the record is too short for windows.
+    Modulated,
 }
 
 /// What one method says.
@@ -65,6 +68,8 @@ pub(super) struct Whole<'a> {
     pub spectrum: &'a Spectrum,
     pub fit: &'a SinusoidFit,
     pub windows: &'a Result<Windows, String>,
+    /// Where the record is too short for windows.
+    pub modulated: Option<&'a Modulated>,
     pub noise_rad: &'a [f64],
     pub measured: Measured,
 }
@@ -85,6 +90,8 @@ pub(super) struct Choice {
     /// The amplitude at which the frequency is meant, where amplitude may change it and the data do not tell how.
     pub frequency_at_rad: Option<f64>,
     pub basis: String,
+    /// Whether a constant ξ is meant at small amplitude.
+    pub at_small_amplitude: bool,
 }
 
 impl Estimators {
@@ -107,7 +114,8 @@ impl Estimators {
             windowed(envelope, whole.measured),
         ];
         let nyquist_hz = 0.5 / whole.signal.step_s;
-        let each = each.map(|e| e.resolved(nyquist_hz)).into();
+        let each = each.into_iter().chain(whole.modulated.map(modulated));
+        let each = each.map(|e| e.resolved(nyquist_hz)).collect();
         Self { each, raw, residual_excess: excess[mode] }
     }
 
@@ -134,13 +142,24 @@ impl Estimators {
         let (changed_hz, changed_xi) = (changed_hz * frequency_hz.value, changed_xi * damping_ratio.value);
         let squares: f64 = lawful_rad.iter().map(|a| a * a).sum();
         let omitted = Bounds::of(mode == 0, whole.measured).fourth.map(|bound| bound * squares * squares);
+        let is_told = |law: &FrequencyLaw| known || law.f0_hz.half() < WIDEST_LAW * frequency_hz.half();
+        if let Some(own) = whole.modulated.filter(|own| is_told(&own.frequency)) {
+            return Choice {
+                frequency_hz: own.frequency.f0_hz,
+                damping_ratio: own.damping_ratio,
+                frequency_at_rad: None,
+                basis: "one oscillation whose frequency and damping go with its amplitude: f and ξ at small amplitude"
+                    .to_owned(),
+                at_small_amplitude: true,
+            };
+        }
         // what angle a displacement is of nobody knows, nor therefore what amplitude has changed
         let felt = !known || changed_hz > 0.3 * frequency_hz.sd;
         // a law that reaches far beyond the steps it was laid through tells nothing at its end
         let sound = |e: &Envelope, law: &FrequencyLaw| {
             e.steps.iter().any(|s| (law.f0_hz.value / s.frequency_hz.value - 1.0).abs() < FARTHEST_LAW)
                 && law.f0_hz.half() < FARTHEST_LAW * law.f0_hz.value
-                && (known || law.f0_hz.half() < WIDEST_LAW * frequency_hz.half())
+                && is_told(law)
         };
         let law = envelope.and_then(|e| e.frequency.filter(|f| sound(e, f)).map(|f| (e, f)));
         match law {
@@ -152,18 +171,21 @@ impl Estimators {
                     .map_or_else(|| envelope.damping_over_the_record(), |xi| relatively_blurred(xi, omitted[1])),
                 frequency_at_rad: None,
                 basis: "windows: f and ξ at small amplitude".to_owned(),
+                at_small_amplitude: true,
             },
             None if felt || self.residual_excess > 1.0 => Choice {
                 frequency_hz: frequency_hz.blurred(changed_hz),
                 damping_ratio: damping_ratio.blurred(changed_xi),
                 frequency_at_rad: felt.then(|| amplitudes_rad[mode] * weighed(decays).sqrt()),
                 basis: "damped sinusoids over the whole record; widened for what amplitude may have changed".to_owned(),
+                at_small_amplitude: false,
             },
             _ => Choice {
                 frequency_hz,
                 damping_ratio,
                 frequency_at_rad: None,
                 basis: "damped sinusoids over the whole record".to_owned(),
+                at_small_amplitude: false,
             },
         }
     }
@@ -206,6 +228,7 @@ impl Choice {
                 "{}; widened: it lies on the third harmonic of the slowest mode, which only a forward model separates",
                 self.basis
             ),
+            at_small_amplitude: self.at_small_amplitude,
         }
     }
 }
@@ -327,9 +350,23 @@ fn windowed(envelope: &Result<Envelope, String>, measured: Measured) -> Estimato
     }
 }
 
+fn modulated(own: &Modulated) -> Estimator {
+    Estimator {
+        method: Method::Modulated,
+        frequency_hz: Some(own.frequency.f0_hz),
+        damping_ratio: Some(own.damping_ratio),
+        note: None,
+    }
+}
+
 /// Power of the residual in the lines beside a mode (2/T to 9/T away on both sides) over that of white noise of the same variance; 1 unless the
 /// excess would come about by chance less than once in a thousand records. Least squares sees only that part of the residual.
 pub(super) fn residual_excess(residual: &Signal, omega_rad_s: f64) -> f64 {
+    excess_power(residual, omega_rad_s)[0]
+}
+
+/// The same with that chance.
+pub(super) fn excess_power(residual: &Signal, omega_rad_s: f64) -> [f64; 2] {
     let line = std::f64::consts::TAU / residual.duration_s();
     let (mut sum, mut lines) = (0.0, 0.0);
     for link in &residual.links {
@@ -347,5 +384,5 @@ pub(super) fn residual_excess(residual: &Signal, omega_rad_s: f64) -> f64 {
     }
     // each line's power is half a χ² of two degrees of freedom
     let p_value = chi_squared_tail(2.0 * sum, 2.0 * lines);
-    if p_value < 1e-3 { (sum / lines).max(1.0) } else { 1.0 }
+    [if p_value < 1e-3 { (sum / lines).max(1.0) } else { 1.0 }, p_value]
 }

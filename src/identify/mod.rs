@@ -8,6 +8,7 @@
 //! | [`sinusoids`], [`pencil`], [`modes`] | damped sinusoids beside a drift by least squares, started from a matrix pencil; one mode or two |
 //! | [`tumbling`] | a motion that is no swing about rest: no modes |
 //! | [`windows`], [`envelope`], [`decay_law`] | frequency and damping as functions of amplitude |
+//! | [`modulated`], `slow_flow` | the same over a record that is too short for windows |
 //! | [`estimators`], [`damping`], [`Mode`] | all of them side by side, and which to take |
 //! | [`equivalents`] | K_eq, C_eq (Eq. 29, 30) |
 //! | [`mod@floor`] | the frequency below which nothing hung can swing |
@@ -25,11 +26,13 @@ pub mod floor;
 pub mod half_power;
 mod mode;
 pub mod modes;
+pub mod modulated;
 pub mod pencil;
 pub mod pole;
 mod projection;
 pub mod signal;
 pub mod sinusoids;
+mod slow_flow;
 pub mod spectrum;
 mod summary;
 mod table;
@@ -52,6 +55,7 @@ use equivalents::Equivalents;
 use estimators::Whole;
 use floor::Floor;
 use modes::{Chosen, ModeCount};
+use modulated::Modulated;
 use signal::Signal;
 use spectrum::Spectrum;
 use tumbling::Tumbling;
@@ -226,9 +230,14 @@ impl Identification {
         self.drift_rad = fit.drift_ranges_rad(recorded);
         let signal = &fit.without_drift(recorded);
         let windows = Windows::of(signal, &fit);
-        self.record.noise_rad = match &windows {
-            Ok(windows) => windows.noise_rad.clone(),
-            Err(_) => fit.links.iter().map(|l| l.noise_rad).collect(),
+        let modulated = match &windows {
+            Ok(_) => None,
+            Err(_) => Modulated::of(recorded, &fit, self.record.measured),
+        };
+        self.record.noise_rad = match (&windows, &modulated) {
+            (Ok(windows), _) => windows.noise_rad.clone(),
+            (Err(_), Some(modulated)) => modulated.noise_rad.clone(),
+            (Err(_), None) => fit.links.iter().map(|l| l.noise_rad).collect(),
         };
         let noise_rad = &self.record.noise_rad;
         let whole = Whole {
@@ -236,6 +245,7 @@ impl Identification {
             spectrum: &self.spectrum,
             fit: &fit,
             windows: &windows,
+            modulated: modulated.as_ref(),
             noise_rad,
             measured: self.record.measured,
         };

@@ -9,6 +9,7 @@ use super::envelope::{Bounds, Envelope, FrequencyLaw};
 use super::estimate::{Estimate, probability};
 use super::estimators::{Estimator, Estimators, Whole};
 use super::floor::amplitude_dependence;
+use super::modulated::Modulated;
 use super::windows::Windows;
 use crate::model::chain::Chain;
 use crate::series::Measured;
@@ -60,12 +61,17 @@ pub struct Mode {
     pub frequency_consistency: Option<Consistency>,
     /// Whether the dampings agree.
     pub damping_consistency: Option<Consistency>,
-    /// Frequency and damping against amplitude.
+    /// Frequency and damping against amplitude, from window to window.
     pub envelope: Option<Envelope>,
+    /// The same over the whole record at once, where it is too short for windows.
+    pub modulated: Option<Modulated>,
     /// κ that a swing of this shape has without any missing physics.
     pub expected_kappa_per_rad2: Option<f64>,
     /// What the reader should know.
     pub notes: Vec<String>,
+    /// Whether a constant ξ is meant at small amplitude.
+    #[serde(skip)]
+    pub at_small_amplitude: bool,
     /// In what its sizes are told.
     #[serde(skip)]
     pub measured: Measured,
@@ -87,7 +93,10 @@ impl Mode {
         Self {
             number: mode + 1,
             rms_rad: whole.fit.strength(mode, duration_s).sqrt(),
-            damping_trend: envelope.as_ref().filter(changes).map(Trend::of),
+            damping_trend: match whole.modulated {
+                Some(own) => own.trend,
+                None => envelope.as_ref().filter(changes).map(Trend::of),
+            },
             expected_kappa_per_rad2: match whole.measured {
                 Measured::Angles => expected_kappa(&shape, whole.fit.poles[mode].frequency_hz(), chain, gravity_m_s2),
                 // nobody knows what angle it is of
@@ -98,12 +107,14 @@ impl Mode {
             frequency_at_amplitude_rad: choice.frequency_at_rad,
             damping: Damping::of(choice.damping_ratio, &raw[1], duration_s),
             basis: choice.basis,
+            at_small_amplitude: choice.at_small_amplitude,
             shape,
             residual_excess: estimators.residual_excess,
             frequency_consistency: estimators.compare(raw[0], |e| e.frequency_hz),
             damping_consistency: estimators.compare(raw[1], |e| e.damping_ratio),
             estimators: estimators.each,
             envelope,
+            modulated: whole.modulated.cloned(),
             notes: Vec::new(),
         }
     }
@@ -128,7 +139,7 @@ impl Mode {
 
     /// The frequency at small amplitude; where the data do not tell how it depends on amplitude, with this κ.
     pub fn small_amplitude_hz(&self, kappa_per_rad2: f64) -> Estimate {
-        match self.envelope.as_ref().and_then(|e| e.frequency) {
+        match self.frequency_law() {
             Some(law) => law.f0_hz,
             None => {
                 let amplitude_rad = self.amplitude_rad();
@@ -144,8 +155,10 @@ impl Mode {
         all.into_iter().flatten().map(|finding| format!("mode {number}: {finding}")).collect()
     }
 
-    fn frequency_law(&self) -> Option<FrequencyLaw> {
-        self.envelope.as_ref().and_then(|e| e.frequency)
+    /// How its frequency goes with amplitude, where the data tell it.
+    pub(super) fn frequency_law(&self) -> Option<FrequencyLaw> {
+        let of_windows = self.envelope.as_ref().and_then(|e| e.frequency);
+        of_windows.or_else(|| self.modulated.as_ref().map(|own| own.frequency))
     }
 
     /// κ against that of gravity alone.
@@ -219,7 +232,7 @@ impl Mode {
     fn of_frequency(&self) -> Option<String> {
         let test = self.frequency_consistency.filter(|t| !t.agree)?;
         let meaning = if self.frequency_law().is_some_and(|l| l.p_constant < 0.01) {
-            "the frequency depends on amplitude, which each estimator weighs differently; take f₀ of the envelope"
+            "the frequency depends on amplitude, which each estimator weighs differently; take f₀"
         } else {
             "amplitude does not explain it; look for dropped frames, a neighbouring mode or forcing"
         };

@@ -35,7 +35,6 @@ fn of_mode(mode: &Mode) -> String {
     let index: String =
         mode.number.to_string().chars().filter_map(|c| char::from_u32(0x2080 + c.to_digit(10)?)).collect();
     let f = rounded(&mode.frequency_hz, 1.0);
-    let small = mode.basis.starts_with("windows");
     let damping = match &mode.damping {
         Damping::Identified(xi) => match mode.damping_trend {
             Some(trend) => {
@@ -43,7 +42,7 @@ fn of_mode(mode: &Mode) -> String {
                 format!("ξ{index} = {low} to {high} % over the record, {}", trend.words())
             }
             None => {
-                let at = if small { " at small amplitude" } else { "" };
+                let at = if mode.at_small_amplitude { " at small amplitude" } else { "" };
                 format!("ξ{index} = {} %{at}", rounded(xi, 100.0))
             }
         },

@@ -110,6 +110,7 @@ impl Display for Mode {
                 Method::Decrement => "decrement",
                 Method::Sinusoids => "damped sinusoids",
                 Method::Envelope => "envelope",
+                Method::Modulated => "slow flow",
             };
             let (frequency, damping) = (cell(&e.frequency_hz, 5), cell(&e.damping_ratio, 6));
             writeln!(f, "  {name:18}{frequency:>30}{damping:>33}  {}", e.note.as_deref().unwrap_or(""))?;
@@ -136,6 +137,16 @@ impl Mode {
     /// Frequency and damping from window to window, a dozen lines at most.
     fn against_amplitude(&self, f: &mut Formatter<'_>) -> fmt::Result {
         let measured = self.measured;
+        if let Some(law) = self.frequency_law() {
+            let expected =
+                self.expected_kappa_per_rad2.map(|k| format!("; a pendulum of this shape {k:.4}")).unwrap_or_default();
+            writeln!(
+                f,
+                "  f = f₀(1 − κA²): f₀ = {} Hz, κ = {}{expected}",
+                interval(&law.f0_hz, 5),
+                measured.interval_per_square(&law.kappa_per_rad2)
+            )?;
+        }
         let Some(envelope) = &self.envelope else { return Ok(()) };
         writeln!(f, "  {:>8}{:>12}{:>26}{:>28}", "t (s)", format!("A ({})", measured.symbol()), "f (Hz)", "ξ")?;
         let every = envelope.steps.len().div_ceil(12).max(1);
@@ -148,16 +159,6 @@ impl Mode {
                 measured.shown(step.amplitude_rad),
                 format!("{:.5} ± {:.5}", frequency.value, frequency.half()),
                 format!("{:.6} ± {:.6}", damping.value, damping.half())
-            )?;
-        }
-        if let Some(law) = envelope.frequency {
-            let expected =
-                self.expected_kappa_per_rad2.map(|k| format!("; a pendulum of this shape {k:.4}")).unwrap_or_default();
-            writeln!(
-                f,
-                "  f = f₀(1 − κA²): f₀ = {} Hz, κ = {}{expected}",
-                interval(&law.f0_hz, 5),
-                measured.interval_per_square(&law.kappa_per_rad2)
             )?;
         }
         if let Some(law) = envelope.decay {

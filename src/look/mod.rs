@@ -30,6 +30,9 @@ const LEAST_WEIGHT: f64 = 2e-3;
 /// Stretches of the recording in which a chain is sought, one after the other.
 const STRETCHES: usize = 3;
 
+/// Chains of a stretch that are measured, the best first, until one of them hangs together throughout.
+const CHAINS: usize = 3;
+
 /// One mark of the chain.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Mark {
@@ -88,19 +91,21 @@ pub fn look(path: &Path, options: &Options, folder: &Path, progress: &dyn Progre
     let mut session = Session::open(path, &options, folder, progress)?;
     let looks = looks(session.album())?;
     let (hues, names): (Vec<Hue>, Vec<String>) = looks.iter().cloned().unzip();
-    let (mut seen, mut from_s, mut rest) = (Vec::new(), None, Vec::new());
+    let (mut seen, mut unsteady, mut from_s, mut rest) = (Vec::new(), Vec::new(), None, Vec::new());
     for stretch in 0..STRETCHES {
         let frames = session.glance(&hues, from_s, progress)?;
         if stretch == 0 {
             rest = further_stretches(&session, &frames);
         }
         let all = things(&frames);
-        if let Some(chain) = hanging::longest(&all, &names) {
+        for chain in hanging::chains(&all, &names).into_iter().take(CHAINS) {
             let mut worn: Vec<u8> = chain.marks.iter().map(|i| all[*i].hue).collect();
             worn.sort_unstable();
             worn.dedup();
-            let worn = worn.into_iter().map(|hue| looks[usize::from(hue)].clone()).collect();
-            if let Some(finding) = measured(&mut session, worn, progress)? {
+            let worn: Vec<_> = worn.into_iter().map(|hue| looks[usize::from(hue)].clone()).collect();
+            if !chain.is_steady(&all) {
+                unsteady.push((chain.worth, worn));
+            } else if let Some(finding) = measured(&mut session, worn, progress)? {
                 return Ok(finding);
             }
         }
@@ -108,6 +113,13 @@ pub fn look(path: &Path, options: &Options, folder: &Path, progress: &dyn Progre
         match rest.pop() {
             Some(begin_s) => from_s = Some(begin_s),
             None => break,
+        }
+    }
+    // a motion that is no oscillation, as a double pendulum that turns over
+    unsteady.sort_by(|a, b| b.0.total_cmp(&a.0));
+    for (_, worn) in unsteady.into_iter().take(CHAINS) {
+        if let Some(finding) = measured(&mut session, worn, progress)? {
+            return Ok(finding);
         }
     }
     Err(nothing_swings(path, &seen, &names, session.stream().stated_frames))

@@ -6,6 +6,7 @@
 
 use std::cmp::Ordering;
 
+use super::steadiness::steadiness;
 use super::tracklet::Tracklet;
 use super::{FrameBlobs, MarkSlot, Sighting};
 use crate::statistics::median;
@@ -67,6 +68,8 @@ pub(super) struct Candidate {
     pub moves: bool,
     /// It moves while it is seen whole, too.
     moves_whole: bool,
+    /// See [`steadiness`].
+    pub steadiness: f64,
     /// How much its distance from the pivot changes; see [`stretch`].
     pivot_stretch: f64,
     /// Position by frame.
@@ -220,6 +223,7 @@ pub(super) fn candidates(tracklets: &[Tracklet], window: &[FrameBlobs], pivot_px
                 lateness: t.sightings.first().map_or(1.0, |s| s.0 as f64 / window.len() as f64),
                 ln_area: median(&mut ln_areas).unwrap_or(0.0),
                 order: order(&path, pivot_px),
+                steadiness: steadiness(&path),
                 pivot_stretch: pivot_px.map_or(0.0, |p| stretch_of(&vec![Some(p); path.len()], &path, travel_px)),
                 path,
             }
@@ -262,7 +266,8 @@ fn search(
 fn score(kept: &[&Candidate], assignment: &[Option<usize>]) -> f64 {
     let chosen: Vec<&Candidate> = assignment.iter().flatten().map(|i| kept[*i]).collect();
     // of two halves of a track, before a gap and after it, the first: what follows it will be found again
-    let presence: f64 = chosen.iter().map(|c| c.presence - c.lateness).sum();
+    let sure = |c: &Candidate| if c.moves { c.steadiness } else { 1.0 };
+    let presence: f64 = chosen.iter().map(|c| c.presence * sure(c) - c.lateness).sum();
     // a mark by itself has no distance to another that tells it: of two like pendulums, the one that swings about the pivot
     let from_pivot = match assignment {
         [only] => only.map_or(0.0, |only| kept[only].pivot_stretch),

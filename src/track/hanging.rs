@@ -47,22 +47,38 @@ pub struct Chain {
     pub worth: f64,
 }
 
-/// The best chain that any look shows, filled up with what other looks add to it.
-pub fn longest(things: &[Thing], names: &[String]) -> Option<Chain> {
+impl Chain {
+    /// Its marks go as anything that swings does, more likely than not: spots of a texture that are taken for one thing do not.
+    pub fn is_steady(&self, things: &[Thing]) -> bool {
+        let moving = || self.marks.iter().map(|i| &things[*i]).filter(|thing| thing.moves);
+        moving().map(|thing| thing.steadiness).sum::<f64>() > 0.5 * moving().count() as f64
+    }
+}
+
+/// The chains that the looks show, the best one first, and before it that which other looks add to.
+pub fn chains(things: &[Thing], names: &[String]) -> Vec<Chain> {
     let hued = |hue: u8| names[usize::from(hue)].starts_with('#');
     // what is darker or lighter on a thing of a hue, or of its own kind, is printed on it or shines on it
     let bears =
         |bearer: u8, hue: u8| !hued(hue) && (hued(bearer) || names[usize::from(bearer)] == names[usize::from(hue)]);
-    let best = (0..names.len() as u8)
-        .filter_map(|hue| {
-            let is_part = |marks: &[usize]| are_parts(things, marks, &|bearer| bears(bearer.hue, hue));
-            of_look(things, &|t| t.hue == hue, hued(hue), &is_part)
-        })
-        .max_by(|a, b| a.worth.total_cmp(&b.worth))?;
+    let of_one = |hue: u8| {
+        let is_part = |marks: &[usize]| are_parts(things, marks, &|bearer| bears(bearer.hue, hue));
+        of_look(things, &|t| t.hue == hue, hued(hue), &is_part)
+    };
+    let mut chains: Vec<Chain> = (0..names.len() as u8).filter_map(of_one).collect();
+    chains.sort_by(|a, b| b.worth.total_cmp(&a.worth));
     // marks of several colours: what swings with the chain and is like its marks
     let coloured = of_look(things, &|t| hued(t.hue), true, &|_| false);
-    let wins = |c: &Chain| (c.marks.len(), c.worth) > (best.marks.len(), best.worth);
-    Some(coloured.filter(wins).unwrap_or(best))
+    let wins = |c: &Chain| chains.first().is_some_and(|best| (c.marks.len(), c.worth) > (best.marks.len(), best.worth));
+    if let Some(coloured) = coloured.filter(wins) {
+        chains.insert(0, coloured);
+    }
+    chains
+}
+
+/// The best of them.
+pub fn longest(things: &[Thing], names: &[String]) -> Option<Chain> {
+    chains(things, names).into_iter().next()
 }
 
 /// The chain that things of the marks' hues form.
@@ -159,9 +175,10 @@ fn off_line_px(points: &[[f64; 2]]) -> f64 {
     (0.5 * (xx + yy) - (0.25 * (xx - yy).powi(2) + xy * xy).sqrt()).max(0.0).sqrt()
 }
 
-/// More marks are better, seen in every frame.
+/// More marks are better, seen in every frame, whose past foretells them.
 fn value(things: &[Thing], marks: &[usize]) -> f64 {
-    marks.iter().map(|i| things[*i].presence).sum()
+    let of_one = |thing: &Thing| thing.presence * if thing.moves { thing.steadiness } else { 1.0 };
+    marks.iter().map(|i| of_one(&things[*i])).sum()
 }
 
 /// Of things in one place, such as one mark seen by two looks, the first. And of things that are hardly seen side by
@@ -260,7 +277,8 @@ mod tests {
         let path: Vec<Option<[f64; 2]>> = (0..300).map(|i| Some(path(0.05 * f64::from(i)))).collect();
         let x: Vec<f64> = path.iter().flatten().map(|p| p[0]).collect();
         let travel_px = 0.5 * (x.iter().copied().fold(f64::MIN, f64::max) - x.iter().copied().fold(f64::MAX, f64::min));
-        Thing { hue, presence: 1.0, area_px2: 300.0, travel_px, moves, path }
+        let steadiness = crate::track::steadiness::steadiness(&path);
+        Thing { hue, presence: 1.0, area_px2: 300.0, travel_px, moves, steadiness, path }
     }
 
     fn joint(t: f64) -> [f64; 2] {

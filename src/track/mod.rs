@@ -11,6 +11,7 @@ mod kalman;
 mod noise;
 mod sighting;
 mod smooth;
+mod steadiness;
 mod thing;
 mod tracker;
 mod tracklet;

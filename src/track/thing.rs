@@ -18,6 +18,8 @@ pub struct Thing {
     pub travel_px: f64,
     /// It swings.
     pub moves: bool,
+    /// How well its past foretells its place: [`super::steadiness`].
+    pub steadiness: f64,
     /// Position by frame.
     pub path: Vec<Option<[f64; 2]>>,
 }
@@ -80,6 +82,7 @@ pub fn things(window: &[FrameBlobs]) -> Vec<Thing> {
             area_px2: c.ln_area.exp(),
             travel_px: c.travel_px,
             moves: c.moves,
+            steadiness: c.steadiness,
             path: c.path,
         })
         .collect()

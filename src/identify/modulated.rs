@@ -1,0 +1,202 @@
+//! One oscillation whose frequency and damping go with its amplitude, over the whole record at once.
+//!
+//! Where a record is too short to be cut into [`super::windows`], the [slow flow](super::slow_flow) still shows how the phase bends as the swing becomes
+//! smaller. Which losses there are, and whether the resting angle drifts, the Bayesian information criterion says. What hung bodies allow of κ enters as an
+//! observation, as in [`super::envelope`]; of a displacement nobody knows what angle it is of, and k = κA² is open up to that of a swing of some 70°.
+
+use nalgebra::DVector;
+use serde::Serialize;
+
+use super::damping::Trend;
+use super::envelope::{Bounds, FrequencyLaw};
+use super::estimate::{Estimate, f_tail};
+use super::estimators::excess_power;
+use super::signal::Signal;
+use super::sinusoids::SinusoidFit;
+use super::slow_flow::{Coefficients, SETS, SIXTH, SlowFlow};
+use crate::series::Measured;
+
+/// κ of a pendulum (1/rad²).
+const PENDULUM: f64 = 1.0 / 16.0;
+/// Standard deviation of k of a displacement: that of a swing of 70° (judgement).
+const K_OF_A_DISPLACEMENT: f64 = 0.1;
+/// A damping ratio goes with amplitude where it changes by more than this many standard deviations (statistics).
+const CHANGES: f64 = 3.0;
+
+/// What the fit says.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Modulated {
+    /// Frequency against amplitude.
+    pub frequency: FrequencyLaw,
+    /// ξ at small amplitude where it is a constant, else stretched to what it is from the record's first amplitude to its last.
+    pub damping_ratio: Estimate,
+    /// How it goes with amplitude, where it does.
+    pub trend: Option<Trend>,
+    /// Standard deviation of each link's residual.
+    pub noise_rad: Vec<f64>,
+}
+
+impl Modulated {
+    /// Of a recording with one mode, of which these damped sinusoids are known; `None` where its amplitude does not change slowly, or nothing converges.
+    pub(super) fn of(recorded: &Signal, sinusoids: &SinusoidFit, measured: Measured) -> Option<Self> {
+        let [pole] = sinusoids.poles[..] else { return None };
+        let prior = (prior_of_k(recorded, sinusoids.amplitude_rad(0), measured), measured);
+        let noise_rad: Vec<f64> = sinusoids.links.iter().map(|link| link.noise_rad).collect();
+        let drifts = sinusoids.links.first().map_or(0, |link| link.drift_rad.len());
+        let viscous = [0, drifts]
+            .into_iter()
+            .take(if drifts > 0 { 2 } else { 1 })
+            .filter_map(|terms| SlowFlow::at(recorded, pole, prior, terms, &noise_rad).solved(SETS[0]));
+        let best = viscous.flat_map(with_others).min_by(|a, b| a.criterion().total_cmp(&b.criterion()))?;
+        best.changes_slowly().then_some(())?;
+        let Some(until_s) = best.sticks_from_s() else { return told(&best) };
+        let swing = recorded.between(recorded.span_s[0], until_s);
+        pole.is_seen_to_swing(swing.duration_s()).then_some(())?;
+        told(&best.over(&swing)?)
+    }
+}
+
+/// With one set of losses after the other.
+fn with_others(viscous: SlowFlow<'_>) -> Vec<SlowFlow<'_>> {
+    let others = SETS[1..].iter().filter_map(|set| viscous.clone().solved(set)).filter(SlowFlow::loses);
+    others.chain([viscous.clone()]).collect()
+}
+
+/// Mean and standard deviation of what k may be.
+fn prior_of_k(recorded: &Signal, amplitude_rad: f64, measured: Measured) -> [f64; 2] {
+    let [mean, sd] = Bounds::of(true, measured).kappa.map(|bound| bound * amplitude_rad.powi(2));
+    match measured {
+        // one link alone is a pendulum
+        Measured::Angles if recorded.links.len() == 1 => [PENDULUM * amplitude_rad.powi(2), sd],
+        Measured::Angles => [mean, sd],
+        Measured::Displacement => [0.0, K_OF_A_DISPLACEMENT],
+    }
+}
+
+/// What a fit says, with intervals that allow for what it leaves near the oscillation and for the powers of the amplitude that it leaves out.
+fn told(flow: &SlowFlow<'_>) -> Option<Modulated> {
+    let (amplitude_rad, last) = (flow.amplitude_rad()?, flow.last()?);
+    let own = flow.coefficients();
+    let Coefficients { omega_rad_s: omega, k, losses_per_s: [dry, viscous, drag] } = own;
+    let [excess, p_value] = excess_power(&flow.residual()?, omega);
+    let covariance = flow.covariance()? * excess;
+    // of a linear function of ω₀, k, β₀, β₁, β₂
+    let sd = |slope: [f64; 5]| {
+        let slope = DVector::from_column_slice(&slope);
+        slope.dot(&(&covariance * &slope)).max(0.0).sqrt()
+    };
+    let free = flow.degrees_of_freedom();
+    let estimate = |value: f64, slope: [f64; 5]| Estimate::new(value, sd(slope), free);
+    let xi = |a: f64| {
+        let slope = [0.0, 0.0, 1.0 / (a * omega), 1.0 / omega, a / omega];
+        estimate((dry / a + viscous + drag * a) / omega, slope)
+    };
+    let (large, small) = (xi(1.0), xi(last));
+    // a linear damper's ξ, too, goes with amplitude by as much
+    let bounds = Bounds::of(true, flow.measured);
+    let squared = match flow.measured {
+        Measured::Angles => amplitude_rad.powi(2) * last,
+        // of a pendulum, whose k tells it
+        Measured::Displacement => (k.abs() + covariance[(1, 1)].sqrt()) / PENDULUM * last,
+    };
+    let linear = bounds.lambda[1] * squared * large.value.abs();
+    let above = |a: f64, b: f64| {
+        let sd = sd([0.0, 0.0, (1.0 / a - 1.0 / b) / omega, 0.0, (a - b) / omega]);
+        xi(a).value - xi(b).value > CHANGES * sd.hypot(linear)
+    };
+    let least_at = (dry / drag).sqrt();
+    let trend = match () {
+        () if last < least_at && least_at < 1.0 && above(last, least_at) && above(1.0, least_at) => {
+            Some(Trend::LeastBetween)
+        }
+        () if above(1.0, last) => Some(Trend::GrowsWithAmplitude),
+        () if above(last, 1.0) => Some(Trend::FallsWithAmplitude),
+        () => None,
+    };
+    let next = match flow.measured {
+        Measured::Angles => bounds.fourth[0] * squared.powi(2),
+        // half of the last power that stands there
+        Measured::Displacement => 0.5 * SIXTH * (k * last).powi(3).abs(),
+    };
+    // the second order in δ/A is a part of the phase
+    let of_friction = (own.shift() / last).powi(2) / (omega * flow.signal.duration_s());
+    let turn = std::f64::consts::TAU;
+    let f0_hz = estimate(omega.hypot(viscous) / turn, [1.0 / turn, 0.0, 0.0, 0.0, 0.0]);
+    let k = estimate(k, [0.0, 1.0, 0.0, 0.0, 0.0]);
+    let modulated = Modulated {
+        frequency: FrequencyLaw {
+            f0_hz: f0_hz.blurred(next.hypot(of_friction) * f0_hz.value),
+            kappa_per_rad2: k.times(amplitude_rad.powi(-2)),
+            p_constant: f_tail((k.value / k.sd).powi(2), 1.0, free),
+            p_value,
+        },
+        damping_ratio: match trend {
+            None => small.blurred(linear),
+            Some(_) => large.covering(small.low, small.high),
+        },
+        trend,
+        noise_rad: flow.noise_rad.clone(),
+    };
+    let law = &modulated.frequency;
+    let numbers = [&law.f0_hz, &law.kappa_per_rad2, &modulated.damping_ratio];
+    numbers.iter().all(|number| number.sd.is_finite() && number.value.is_finite()).then_some(modulated)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::identify;
+    use super::*;
+    use crate::series::AngleSeries;
+
+    const F0_HZ: f64 = 0.8;
+
+    /// Ten cycles of a pendulum, 60 values a second, with these losses of the angular acceleration, and no noise but that of four digits.
+    fn swing(amplitude_rad: f64, loss: impl Fn(f64) -> f64) -> AngleSeries {
+        let omega = std::f64::consts::TAU * F0_HZ;
+        let slope = |[theta, rate]: [f64; 2]| [rate, -omega * omega * theta.sin() - loss(rate)];
+        let along = |y: [f64; 2], k: [f64; 2], h: f64| [y[0] + h * k[0], y[1] + h * k[1]];
+        let (steps, dt) = (200, 1.0 / 60.0);
+        let h = dt / f64::from(steps);
+        let mut y = [amplitude_rad, 0.0];
+        let mut rows = Vec::new();
+        for k in 0..(10.0 / F0_HZ / dt) as usize {
+            rows.push((k as f64 * dt, (1e4 * y[0]).round() / 1e4));
+            for _ in 0..steps {
+                let k1 = slope(y);
+                let k2 = slope(along(y, k1, 0.5 * h));
+                let k3 = slope(along(y, k2, 0.5 * h));
+                let k4 = slope(along(y, k3, h));
+                y = [0, 1].map(|i| y[i] + h / 6.0 * (k1[i] + 2.0 * k2[i] + 2.0 * k3[i] + k4[i]));
+            }
+        }
+        let text: String = rows.iter().map(|(t, theta)| format!("{t},{theta}\n")).collect();
+        AngleSeries::parse(format!("t_s,theta1_rad\n{text}").as_bytes(), "swing.csv".as_ref()).unwrap()
+    }
+
+    #[test]
+    fn ten_cycles_tell_the_frequency_at_small_amplitude() {
+        let losses: [(&str, fn(f64) -> f64, Option<Trend>); 3] = [
+            ("viscous", |v| 0.04 * v, None),
+            ("drag", |v| 0.01 * v + 0.05 * v * v.abs(), Some(Trend::GrowsWithAmplitude)),
+            ("friction", |v| 0.02 * v + 0.05 * (v / 1e-3).tanh(), Some(Trend::FallsWithAmplitude)),
+        ];
+        for (name, loss, trend) in losses {
+            for amplitude_rad in [0.1, 0.4, 0.8] {
+                let found = identify(&swing(amplitude_rad, loss), None).unwrap();
+                let mode = &found.modes[0];
+                let (f, case) = (mode.frequency_hz, format!("{name}, {amplitude_rad} rad: {found}"));
+                assert!(mode.modulated.is_some() && mode.frequency_at_amplitude_rad.is_none(), "{case}");
+                assert!(f.holds(F0_HZ) && f.half() < 2e-3 * F0_HZ, "{case}");
+                if amplitude_rad == 0.4 {
+                    assert_eq!(mode.damping_trend, trend, "{case}");
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn a_swing_that_friction_stops_at_once_has_no_slow_flow() {
+        let found = identify(&swing(0.05, |v| 0.15 * (v / 1e-3).tanh()), None).unwrap();
+        assert!(found.modes.iter().all(|mode| mode.modulated.is_none()), "{found}");
+    }
+}
