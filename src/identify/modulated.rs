@@ -175,7 +175,8 @@ mod tests {
 
     #[test]
     fn ten_cycles_tell_the_frequency_at_small_amplitude() {
-        let losses: [(&str, fn(f64) -> f64, Option<Trend>); 3] = [
+        type Case = (&'static str, fn(f64) -> f64, Option<Trend>);
+        let losses: [Case; 3] = [
             ("viscous", |v| 0.04 * v, None),
             ("drag", |v| 0.01 * v + 0.05 * v * v.abs(), Some(Trend::GrowsWithAmplitude)),
             ("friction", |v| 0.02 * v + 0.05 * (v / 1e-3).tanh(), Some(Trend::FallsWithAmplitude)),

@@ -131,7 +131,7 @@ fn places(things: &[Thing]) -> Option<String> {
 fn found_in_words(finding: &Finding) -> String {
     let n = finding.marks.len();
     let first = &finding.marks[usize::from(finding.hinge_marked)];
-    let width_px = 2.0 * (first.thing.area_px2 / std::f64::consts::PI).sqrt();
+    let width_px = 2.0 * first.thing.radius_px();
     let turns = finding.frequency_hz.map_or(String::new(), |f| format!(", about {f:.3} times a second of the file"));
     format!(
         "{n} mark{} about {width_px:.0} px wide; the {} swings by ± {:.0} px{turns}",
@@ -169,7 +169,10 @@ fn pivot(text: &mut String, finding: &Finding) {
         let _ = writeln!(text, "# the first mark is the hinge: at {x:.1}, {y:.1} lies the {what}");
     } else if finding.states_pivot() {
         let _ = writeln!(text, "pivot_px = [{x:.2}, {y:.2}]    # centre of the first arc{beside}");
-        let _ = writeln!(text, "pivot_sd_px = [{sx:.2}, {sy:.2}]      # its standard deviation");
+        let _ = writeln!(
+            text,
+            "pivot_sd_px = [{sx:.2}, {sy:.2}]      # its standard deviation, with that of a lens nobody has calibrated"
+        );
         let _ = writeln!(text, "# the first mark is {:.1} px below it", arc.radius_px);
     } else {
         let _ = writeln!(

@@ -170,6 +170,11 @@ fn measured(session: &mut Session<'_>, looks: Vec<(Hue, String)>, progress: &dyn
     let swings_apart =
         |t: &&Thing| t.moves && hanging::hangs_alone(t) && marks.iter().all(|m| m.thing.is_seen_beside(t));
     let apart = all.iter().filter(swings_apart).filter(alike);
+    let first = &marks[swinging.min(marks.len() - 1)].thing;
+    let stream = session.stream();
+    let (width, height) = stream.orientation.size(stream.stored_size_px);
+    let size_px = [width as f64, height as f64];
+    let arc = chain.arc.map(|arc| arc.through_a_lens(&first.places_px(), first.radius_px(), size_px));
     Ok(Some(Finding {
         held_until_s,
         frequency_hz: marks.get(swinging).and_then(|m| turns_per_second(&m.thing, &t_s)),
@@ -177,7 +182,7 @@ fn measured(session: &mut Session<'_>, looks: Vec<(Hue, String)>, progress: &dyn
         apart: apart.cloned().collect(),
         links_px,
         marks,
-        arc: chain.arc,
+        arc,
         hinge_marked: chain.hinge_marked,
         timing: Timing::audit(&t_s, session.stream().nominal_rate_hz, session.stream().tick_s),
         stream: session.stream().clone(),

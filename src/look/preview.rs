@@ -58,7 +58,7 @@ fn draw(image: &mut RgbImage, finding: &Finding) -> opencv::Result<()> {
             pen.line(*pair[0], *pair[1], WHITE, 1)?;
         }
         for (i, mark) in finding.marks.iter().enumerate() {
-            let radius = (mark.thing.area_px2 / std::f64::consts::PI).sqrt();
+            let radius = mark.thing.radius_px();
             pen.ring(nodes[i], radius + 2.0, BLUE)?;
             pen.text(&format!("{} {}", i + 1, mark.colour), [nodes[i][0] + radius + 6.0, nodes[i][1] + 5.0])?;
         }

@@ -15,6 +15,9 @@ const PLACE_ERROR_PX: f64 = 0.05;
 /// The same of shading and highlights, as a share of the mark's radius.
 const SHADING_ERROR: f64 = 0.005;
 const INDEPENDENT_PLACES: f64 = 10.0;
+/// What a lens that nobody has calibrated moves a point in the picture's corner, as a share of its distance from the middle: one standard deviation (judgement:
+/// ordinary lenses stay below 1 to 2 %; a wide-angle one has to be calibrated).
+const LENS: f64 = 0.01;
 /// Points below which there is no arc.
 const FEWEST_POINTS: usize = 8;
 
@@ -81,6 +84,27 @@ impl Arc {
     }
 }
 
+impl Arc {
+    /// With the deviation that a lens adds of which nothing is known: a point at a distance r from the middle of the picture, its corner at R, is seen moved towards
+    /// it by k r (r/R)². `points`, `mark_radius_px` as for [`Arc::of`].
+    #[must_use]
+    pub fn through_a_lens(self, points: &[[f64; 2]], mark_radius_px: f64, size_px: [f64; 2]) -> Self {
+        let middle = size_px.map(|size| 0.5 * size);
+        let corner2 = middle[0].powi(2) + middle[1].powi(2);
+        let straight = |p: &[f64; 2]| {
+            let off = [p[0] - middle[0], p[1] - middle[1]];
+            let moved = 1.0 + LENS * (off[0].powi(2) + off[1].powi(2)) / corner2;
+            [middle[0] + moved * off[0], middle[1] + moved * off[1]]
+        };
+        let points: Vec<[f64; 2]> = points.iter().map(straight).collect();
+        let Some(other) = Self::of(&points, mark_radius_px) else { return self };
+        // where that centre would be seen, to first order
+        let beyond = straight(&other.centre_px);
+        let off = |k: usize| 2.0 * other.centre_px[k] - beyond[k] - self.centre_px[k];
+        Self { sd_px: [0, 1].map(|k| self.sd_px[k].hypot(off(k))), ..self }
+    }
+}
+
 /// Standard deviations of the centre within which a point is the centre, and what a mark there may be off, px and as a
 /// share of the radius.
 const CENTRE_DEVIATIONS: f64 = 4.0;
@@ -139,6 +163,25 @@ mod tests {
         }
         let sd_px = |amplitude_rad, radius_px| Arc::of(&swing(amplitude_rad, 0.05), radius_px).unwrap().sd_px[1];
         assert!(sd_px(0.5, 8.0) < sd_px(0.1, 8.0) && sd_px(0.5, 8.0) < sd_px(0.5, 40.0));
+    }
+
+    #[test]
+    fn a_lens_that_nobody_knows_adds_to_the_deviation_of_the_centre() {
+        let size_px = [640.0, 480.0];
+        for barrel in [-0.02, 0.02] {
+            let swing = (0..400).map(|i| 0.5 * (0.13 * f64::from(i)).sin());
+            let seen = |x: f64, y: f64| {
+                let off = [x - 320.0, y - 240.0];
+                let moved = 1.0 - barrel * (off[0].powi(2) + off[1].powi(2)) / 400.0f64.powi(2);
+                [320.0 + moved * off[0], 240.0 + moved * off[1]]
+            };
+            let path: Vec<[f64; 2]> = swing.map(|a| seen(318.0 + 400.0 * a.sin(), 10.0 + 400.0 * a.cos())).collect();
+            let (arc, pivot) = (Arc::of(&path, 15.0).unwrap(), seen(318.0, 10.0));
+            let off_px = (arc.centre_px[1] - pivot[1]).abs();
+            let sd_px = arc.through_a_lens(&path, 15.0, size_px).sd_px[1];
+            assert!(off_px > 3.0 * arc.sd_px[1], "{off_px}, {arc:?}");
+            assert!(off_px < 3.0 * sd_px && sd_px < off_px, "{off_px}, {sd_px}");
+        }
     }
 
     #[test]

@@ -129,16 +129,12 @@ fn are_parts(things: &[Thing], marks: &[usize], bears: &dyn Fn(&Thing) -> bool) 
     let area_px2: f64 = marks.iter().map(|i| things[*i].area_px2).sum();
     let holds = |whole: &Thing, i: &usize| {
         let part = &things[*i];
-        let lies_within = whole.distance_px(part).is_some_and(|d| d < PARTS_REACH * radius_px(whole));
+        let lies_within = whole.distance_px(part).is_some_and(|d| d < PARTS_REACH * whole.radius_px());
         let moves_alike = (part.travel_px / whole.travel_px - 1.0).abs() < PARTS_TRAVEL;
         lies_within && moves_alike && part.stretch(whole) < MOST_STRETCH
     };
     let mut wholes = things.iter().filter(|t| t.moves && t.presence > LEAST_PRESENCE && bears(t));
     wholes.any(|whole| whole.area_px2 > PARTS_TIMES * area_px2 && marks.iter().all(|i| holds(whole, i)))
-}
-
-fn radius_px(thing: &Thing) -> f64 {
-    (thing.area_px2 / std::f64::consts::PI).sqrt()
 }
 
 /// The circle on which the first mark swings; `Some(None)` where its path is so flat that it shows no centre. What
@@ -148,9 +144,9 @@ fn radius_px(thing: &Thing) -> f64 {
 /// no clear centre, or about a point within itself. Two such things do not keep their distance; one alone is no mark.
 fn hangs(things: &[Thing], marks: &[usize]) -> Option<Option<Arc>> {
     let first = &things[*marks.first()?];
-    let path: Vec<[f64; 2]> = first.path.iter().flatten().copied().collect();
+    let path = first.places_px();
     let most_px = MOST_OFF_ARC * first.travel_px;
-    let own_radius_px = radius_px(first);
+    let own_radius_px = first.radius_px();
     let is_no_cover = marks.len() > 1 || first.travel_px > own_radius_px;
     match Arc::of(&path, own_radius_px) {
         Some(arc) => {
@@ -220,8 +216,8 @@ fn rigid_set(things: &[Thing], movers: &[usize], first: usize) -> Vec<usize> {
 /// clearer: there is no link between them that has an angle.
 fn without_shadows(things: &[Thing], mut marks: Vec<usize>) -> Vec<usize> {
     let off_arc_px = |i: &usize| {
-        let path: Vec<[f64; 2]> = things[*i].path.iter().flatten().copied().collect();
-        Arc::of(&path, radius_px(&things[*i])).map_or_else(|| off_line_px(&path), |arc| arc.residual_px)
+        let path = things[*i].places_px();
+        Arc::of(&path, things[*i].radius_px()).map_or_else(|| off_line_px(&path), |arc| arc.residual_px)
     };
     marks.sort_by(|a, b| off_arc_px(a).total_cmp(&off_arc_px(b)));
     let mut kept: Vec<usize> = Vec::new();

@@ -63,6 +63,16 @@ impl Thing {
         2 * both > seen(self).min(seen(other))
     }
 
+    /// Radius of a disc of its area.
+    pub fn radius_px(&self) -> f64 {
+        (self.area_px2 / std::f64::consts::PI).sqrt()
+    }
+
+    /// Where it was seen.
+    pub fn places_px(&self) -> Vec<[f64; 2]> {
+        self.path.iter().flatten().copied().collect()
+    }
+
     /// Usual place.
     pub fn place_px(&self) -> [f64; 2] {
         [0, 1].map(|axis| median(&mut self.path.iter().flatten().map(|p| p[axis]).collect::<Vec<_>>()).unwrap_or(0.0))
