@@ -341,3 +341,32 @@ hinge_viscous = 2.371e-4
         .success()
         .stdout(contains("With the file's values: not reproduced: from"));
 }
+
+#[test]
+fn a_beginning_that_a_hand_holds_is_left_out_unless_it_is_asked_for() {
+    let folder = Folder::new();
+    let angles = folder.angles(SWING);
+    let text = fs::read_to_string(&angles).unwrap();
+    let (header, rows) = text.split_once('\n').unwrap();
+    let columns: Vec<&str> = header.split(',').collect();
+    let at = |name: &str| columns.iter().position(|column| *column == name).unwrap();
+    let value = |row: &str, name: &str| row.split(',').nth(at(name)).unwrap().parse::<f64>().unwrap();
+    let first = rows.lines().next().unwrap();
+    let mut held = "t_s,theta1_rad,theta2_rad\n".to_owned();
+    for k in 0..60 {
+        let tremble = 1e-3 * f64::from(k * k).sin();
+        let (t, a, b) = (f64::from(k) / 30.0, value(first, "theta1_rad"), value(first, "theta2_rad"));
+        held += &format!("{t:.6},{:.6},{:.6}\n", a + tremble, b + tremble);
+    }
+    for row in rows.lines() {
+        let angle = |name: &str| value(row, name);
+        held += &format!("{:.6},{:.6},{:.6}\n", 2.0 + angle("t_s"), angle("theta1_rad"), angle("theta2_rad"));
+    }
+    let (held, config) = (folder.write("held.csv", &held), folder.write("config.toml", SWING));
+    let fit = |more: &[&str]| freeswing("fit").arg(&held).arg("--config").arg(&config).args(more).assert().success();
+    fit(&[])
+        .stderr(contains("held still until t = 2.").and(contains("left out")))
+        .stdout(contains("Fitted: reproduced"));
+    let kept = fit(&["--from", "0.5"]);
+    kept.stderr(contains("leave that out with --from 2.")).stdout(contains("not reproduced"));
+}

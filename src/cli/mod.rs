@@ -162,16 +162,23 @@ fn recordings(
     let all = paths.iter().map(|path| read_angles(path, console)).collect::<crate::Result<Vec<_>>>()?;
     refuse_twice(&all)?;
     let record = |series: &AngleSeries| {
-        let kept = series.slice(series.rows(from_s, until_s));
+        let mut kept = series.slice(series.rows(from_s, until_s));
         if kept.len() < crate::series::FEWEST_ROWS {
             let message = format!("{} rows between --from and --until; widen them", kept.len());
             return Err(crate::Error::Table { path: series.path.clone(), line: None, message });
         }
         if let Some(released_s) = kept.released_s() {
-            console.warning(format!(
-                "{}: what swings is held still until t = {released_s:.2} s, which no model knows of; leave that out with --from {released_s:.2}",
+            let held = format!(
+                "{}: what swings is held still until t = {released_s:.2} s, as by a hand, which no model knows of",
                 series.path.display()
-            ));
+            );
+            // a beginning that was asked for stays
+            if from_s.is_finite() {
+                console.warning(format!("{held}; leave that out with --from {released_s:.2}"));
+            } else {
+                console.warning(format!("{held}: left out, as with --from {released_s:.2}"));
+                kept = kept.slice(kept.rows(released_s, f64::INFINITY));
+            }
         }
         Record::of(&kept, marks)
     };
