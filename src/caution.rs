@@ -106,7 +106,13 @@ fn spares(m: &Measurement) -> Vec<String> {
     let mut said = Vec::new();
     if !moving.is_empty() {
         let (one, all) = (moving.len() == 1, marks + moving.len());
+        let hang_on = m.tracks.spares.iter().any(|s| s.moves && s.hangs_on);
         let remedy = match (all <= MOST_MARKS, one) {
+            (true, _) if !hang_on => format!(
+                "{} no distance from {}: measure what swings by itself in a run of its own, with --roi around it",
+                if one { "it keeps" } else { "they keep" },
+                if marks == 1 { "the mark" } else { "the marks" }
+            ),
             (true, true) => format!("say --markers {all} if it is a mark, or leave it out with --roi"),
             (true, false) => format!("say --markers {all} if they are marks, or leave them out with --roi"),
             (false, _) => {

@@ -32,6 +32,8 @@ pub struct Spare {
     pub travel_px: f64,
     /// It swings.
     pub moves: bool,
+    /// It keeps its distance from a mark, as the marks of a chain do.
+    pub hangs_on: bool,
 }
 
 /// Half a range of motion below which a thing stands still, px, beyond its own scatter.
@@ -94,7 +96,6 @@ pub(super) fn choose(
         candidates.iter_mut().for_each(|c| c.order = order(&c.path, Some(place_px)));
     }
     candidates.sort_by(|a, b| (b.moves, b.presence).partial_cmp(&(a.moves, a.presence)).unwrap_or(Ordering::Equal));
-    let spares_of = |taken: &[usize]| spares(&candidates_but(&candidates, taken));
     // of what stands still only a possible hinge is considered, if anything swings at all
     let swings = candidates.iter().any(|c| c.moves);
     let hinge = |c: &Candidate| candidates.iter().any(|m| m.moves && stretch(c, m) < MOST_STRETCH);
@@ -123,7 +124,7 @@ pub(super) fn choose(
     let moves = assignment.iter().flatten().any(|i| kept[*i].moves);
     let chosen: Vec<Option<usize>> = assignment.into_iter().map(|c| c.map(|i| kept[i].tracklet)).collect();
     let taken: Vec<usize> = chosen.iter().flatten().copied().collect();
-    let spares = spares_of(&taken);
+    let spares = spares(&candidates, &taken);
     Choice { chosen, spares, moves }
 }
 
@@ -165,14 +166,16 @@ fn candidates_but<'a>(candidates: &'a [Candidate], taken: &[usize]) -> Vec<&'a C
     candidates.iter().filter(beside).collect()
 }
 
-fn spares(candidates: &[&Candidate]) -> Vec<Spare> {
-    candidates
-        .iter()
-        .map(|c| {
-            let position_px = middle_px(&c.path).unwrap_or_default();
-            Spare { hue: c.hue, position_px, travel_px: c.travel_px, moves: c.moves }
-        })
-        .collect()
+fn spares(candidates: &[Candidate], taken: &[usize]) -> Vec<Spare> {
+    let marks: Vec<&Candidate> = candidates.iter().filter(|c| taken.contains(&c.tracklet)).collect();
+    let spare = |c: &Candidate| Spare {
+        hue: c.hue,
+        position_px: middle_px(&c.path).unwrap_or_default(),
+        travel_px: c.travel_px,
+        moves: c.moves,
+        hangs_on: marks.iter().any(|mark| stretch(c, mark) < MOST_STRETCH),
+    };
+    candidates_but(candidates, taken).into_iter().map(spare).collect()
 }
 
 /// Takes back what cannot be a mark: what stands still and is no hinge.
