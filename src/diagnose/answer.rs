@@ -187,7 +187,8 @@ impl Answer {
             law: findings.learnt.as_ref().and_then(LearntLaw::of),
             statement: findings.verdict_statement(),
             to_decide: verdict.to_decide.clone(),
-            among_themselves: is_beyond_noise(findings.named(), &settings.noise),
+            among_themselves: is_beyond_noise(findings.named(), &settings.noise)
+                || !verdict.effects.is_empty() && findings.posterior.unknown > settings.verdict.even,
         }
     }
 }

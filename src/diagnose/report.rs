@@ -203,8 +203,7 @@ pub struct Answer {
     pub statement: String,
     /// The measurement that would split the class.
     pub to_decide: Option<String>,
-    /// Whether the names leave so much more than noise that they are weighed among themselves.
-    #[serde(skip)]
+    /// Whether something remains beside the names, so that explanations are weighed among themselves.
     pub among_themselves: bool,
 }
 

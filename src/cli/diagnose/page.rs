@@ -30,7 +30,7 @@ pub(super) fn page(diagnosis: &Diagnosis) -> String {
         text.push_str(&paragraph("", &pieces));
     }
     text.push('\n');
-    // where the names stand although more is missing, they are weighed among themselves
+    // where something remains beside the names, they are weighed among themselves
     let among = verdict.among_themselves;
     let heading = if among { "among these" } else { "probability" };
     let mut table = Table::new(["the base model and", heading, "left mrad", "coefficient", "sd", "unit"]);
@@ -49,7 +49,9 @@ pub(super) fn page(diagnosis: &Diagnosis) -> String {
             table.row([name, probability, left]);
         }
     }
-    table.row(["something not in the table".to_owned(), number(verdict.unknown_probability, 3)]);
+    if !among || verdict.status == Status::Unknown {
+        table.row(["something not in the table".to_owned(), number(verdict.unknown_probability, 3)]);
+    }
     text.push_str(&table.text());
     if diagnosis.candidates.iter().take(LISTED).any(|candidate| !candidate.fit.certified) {
         text.push_str("  * not certified: it has not converged, too few starts agree, or fewer effects leave less\n");

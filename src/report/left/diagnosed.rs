@@ -71,6 +71,7 @@ pub struct Quantity {
 pub struct Candidate {
     pub effects: Vec<String>,
     pub probability: Option<f64>,
+    pub probability_if_named: Option<f64>,
     pub parameters: BTreeMap<String, Quantity>,
     pub rmse_rad: Vec<Option<f64>>,
 }
@@ -90,6 +91,7 @@ pub struct Verdict {
     pub law: Option<Law>,
     pub statement: String,
     pub to_decide: Option<String>,
+    pub among_themselves: bool,
 }
 
 /// What the names leave.

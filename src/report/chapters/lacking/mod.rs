@@ -10,7 +10,7 @@ use std::fmt::Write;
 use super::{Chapter, times};
 use crate::diagnose::Effect;
 use crate::report::html::{escaped, milli, paragraph, table, value, verbatim, verbatim_copyable, with_half};
-use crate::report::left::{Diagnosed, Law, Left, Remainder};
+use crate::report::left::{Candidate, Diagnosed, Law, Left, Remainder};
 use crate::report::plot::{Axis, Ink, Plot, Series, Style};
 use prediction::{before_and_after, swing};
 
@@ -101,8 +101,10 @@ fn inclusion(found: &Diagnosed) -> Plot {
 }
 
 fn candidates(found: &Diagnosed) -> String {
+    let among = found.verdict.among_themselves;
+    let probability = |c: &Candidate| if among { c.probability_if_named } else { c.probability };
     let listed = found.candidates.iter().take(LISTED).enumerate();
-    let listed = listed.filter(|(k, c)| *k < 2 || c.probability.is_some_and(|p| p >= LIKELY));
+    let listed = listed.filter(|(k, c)| *k < 2 || probability(c).is_some_and(|p| p >= LIKELY));
     let rows = listed.map(|(_, candidate)| {
         let names = candidate.effects.iter().map(|id| escaped(&words(id))).collect::<Vec<_>>().join("<br>");
         let names = if names.is_empty() { "the base model alone".to_owned() } else { names };
@@ -115,12 +117,14 @@ fn candidates(found: &Diagnosed) -> String {
             .map(|link| milli(&candidate.rmse_rad, link, "mrad"))
             .collect::<Vec<_>>()
             .join(", ");
-        vec![names, value(candidate.probability, 3, ""), coefficients, left]
+        vec![names, value(probability(candidate), 3, ""), coefficients, left]
     });
     let unknown = vec!["something not in the table".to_owned(), value(found.verdict.unknown_probability, 3, "")];
-    let rows: Vec<Vec<String>> = rows.chain([unknown]).collect();
+    let unknown = (!among || found.verdict.status == "unknown").then_some(unknown);
+    let heading = if among { "probability among these" } else { "probability" };
+    let rows: Vec<Vec<String>> = rows.chain(unknown).collect();
     "<h3>Explanations compared</h3>\n".to_owned()
-        + &table(&["the base model and", "probability", "coefficient ± 1 sd", "left of the angles (rms)"], rows)
+        + &table(&["the base model and", heading, "coefficient ± 1 sd", "left of the angles (rms)"], rows)
 }
 
 fn proof(found: &Diagnosed) -> String {
