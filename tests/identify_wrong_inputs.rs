@@ -91,7 +91,7 @@ fn units() -> Vec<(&'static str, String, Wanted)> {
         (
             "one angle in degrees of a swing of 1°",
             s.first(same, |t, _| 1.1 * (-0.03 * t).exp() * (8.5 * t).cos() + 1e-3 * noise((1e4 * t) as usize)),
-            Doubts("are the angles in degrees?"),
+            Doubts("are the angles in degrees"),
         ),
         (
             "one angle in degrees of a swing of half a degree",

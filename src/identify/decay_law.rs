@@ -6,7 +6,7 @@ use nalgebra::{DMatrix, DVector, Dyn};
 use serde::Serialize;
 
 use super::estimate::{Estimate, chi_squared_tail, f_tail};
-use super::windows::Moment;
+use super::windows::{FEWEST_OF_A_LAW, Moment};
 
 /// dA/dt = −(b₀ + b₁A + b₂A²).
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
@@ -43,7 +43,7 @@ impl Widening {
 impl DecayLaw {
     /// The three-term law, with a test against the viscous one.
     pub(super) fn of(moments: &[Moment], exponential: &DecayFit) -> Option<Self> {
-        if moments.len() < 6 {
+        if moments.len() < FEWEST_OF_A_LAW {
             return None;
         }
         let full = DecayFit::of(moments, [true, true, true])?;

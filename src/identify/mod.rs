@@ -8,7 +8,7 @@
 //! | [`sinusoids`], [`pencil`], [`modes`] | damped sinusoids beside a drift by least squares, started from a matrix pencil; one mode or two |
 //! | [`tumbling`] | a motion that is no swing about rest: no modes |
 //! | [`windows`], [`envelope`], [`decay_law`] | frequency and damping as functions of amplitude |
-//! | [`modulated`], `slow_flow` | the same over a record that is too short for windows |
+//! | [`modulated`], `slow_flow` | the same over a record that is too short for many windows |
 //! | [`estimators`], [`damping`], [`Mode`] | all of them side by side, and which to take |
 //! | [`equivalents`] | K_eq, C_eq (Eq. 29, 30) |
 //! | [`mod@floor`] | the frequency below which nothing hung can swing |
@@ -231,12 +231,12 @@ impl Identification {
         let signal = &fit.without_drift(recorded);
         let windows = Windows::of(signal, &fit);
         let modulated = match &windows {
-            Ok(_) => None,
-            Err(_) => Modulated::of(recorded, &fit, self.record.measured),
+            Ok(windows) if windows.are_many() => None,
+            _ => Modulated::of(recorded, &fit, self.record.measured),
         };
         self.record.noise_rad = match (&windows, &modulated) {
+            (_, Some(modulated)) => modulated.noise_rad.clone(),
             (Ok(windows), _) => windows.noise_rad.clone(),
-            (Err(_), Some(modulated)) => modulated.noise_rad.clone(),
             (Err(_), None) => fit.links.iter().map(|l| l.noise_rad).collect(),
         };
         let noise_rad = &self.record.noise_rad;

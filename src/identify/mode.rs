@@ -15,7 +15,7 @@ use crate::model::chain::Chain;
 use crate::series::Measured;
 
 /// By how much the theory of κ may be off: it is the first term in A², for a shape that does not change with amplitude.
-const THEORY_TOLERANCE: f64 = 0.15;
+pub(super) const THEORY_TOLERANCE: f64 = 0.15;
 
 /// A pendulum that swings more slowly is more than 100 m long.
 const SLOWEST_SWING_HZ: f64 = 0.05;
@@ -157,8 +157,8 @@ impl Mode {
 
     /// How its frequency goes with amplitude, where the data tell it.
     pub(super) fn frequency_law(&self) -> Option<FrequencyLaw> {
-        let of_windows = self.envelope.as_ref().and_then(|e| e.frequency);
-        of_windows.or_else(|| self.modulated.as_ref().map(|own| own.frequency))
+        let of_windows = || self.envelope.as_ref().and_then(|e| e.frequency);
+        self.modulated.as_ref().map(|own| own.frequency).or_else(of_windows)
     }
 
     /// κ against that of gravity alone.
@@ -181,7 +181,7 @@ impl Mode {
             Some(format!(
                 "f = f₀(1 − κA²) has {measured}, gravity alone makes {expected:.4}: a nonlinear stiffness is at work{scale}"
             ))
-        } else if !k.holds(0.0) {
+        } else if !k.holds(0.0) && k.half() < 0.5 * expected.abs() {
             Some(format!("the frequency falls with amplitude as gravity makes it ({measured}, expected {expected:.4})"))
         } else {
             None
@@ -217,7 +217,7 @@ impl Mode {
         }
         if self.constant_though_wide() {
             return Some(format!(
-                "the frequency does not fall with amplitude, as a pendulum's does, although θ reaches {amplitude_rad:.1} rad: are the angles in degrees?"
+                "the frequency does not fall with amplitude, as a pendulum's does, although θ reaches {amplitude_rad:.1} rad: are the angles in degrees, or does a spring bring it back?"
             ));
         }
         let lower = self.shape.get(1).filter(|_| self.moves_together())?;

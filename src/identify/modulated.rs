@@ -1,6 +1,6 @@
 //! One oscillation whose frequency and damping go with its amplitude, over the whole record at once.
 //!
-//! Where a record is too short to be cut into [`super::windows`], the [slow flow](super::slow_flow) still shows how the phase bends as the swing becomes
+//! Where a record is too short to be cut into many [`super::windows`], the [slow flow](super::slow_flow) still shows how the phase bends as the swing becomes
 //! smaller. Which losses there are, and whether the resting angle drifts, the Bayesian information criterion says. What hung bodies allow of κ enters as an
 //! observation, as in [`super::envelope`]; of a displacement nobody knows what angle it is of, and k = κA² is open up to that of a swing of some 70°.
 
@@ -11,15 +11,20 @@ use super::damping::Trend;
 use super::envelope::{Bounds, FrequencyLaw};
 use super::estimate::{Estimate, f_tail};
 use super::estimators::excess_power;
+use super::mode::THEORY_TOLERANCE;
 use super::signal::Signal;
 use super::sinusoids::SinusoidFit;
-use super::slow_flow::{Coefficients, SETS, SIXTH, SlowFlow};
+use super::slow_flow::{Coefficients, SETS, SlowFlow};
 use crate::series::Measured;
 
 /// κ of a pendulum (1/rad²).
 const PENDULUM: f64 = 1.0 / 16.0;
 /// Standard deviation of k of a displacement: that of a swing of 70° (judgement).
 const K_OF_A_DISPLACEMENT: f64 = 0.1;
+/// A residual near the oscillation that noise makes in fewer records is a misfit (statistics).
+const LEAST_P: f64 = 1e-3;
+/// A change of a damping ratio by less than this part is not told (judgement).
+const LEAST_CHANGE: f64 = 0.1;
 /// A damping ratio goes with amplitude where it changes by more than this many standard deviations (statistics).
 const CHANGES: f64 = 3.0;
 
@@ -37,7 +42,7 @@ pub struct Modulated {
 }
 
 impl Modulated {
-    /// Of a recording with one mode, of which these damped sinusoids are known; `None` where its amplitude does not change slowly, or nothing converges.
+    /// Of a recording with one mode, of which these damped sinusoids are known; `None` where it is no weakly nonlinear oscillation, or leaves more than noise.
     pub(super) fn of(recorded: &Signal, sinusoids: &SinusoidFit, measured: Measured) -> Option<Self> {
         let [pole] = sinusoids.poles[..] else { return None };
         let prior = (prior_of_k(recorded, sinusoids.amplitude_rad(0), measured), measured);
@@ -48,7 +53,7 @@ impl Modulated {
             .take(if drifts > 0 { 2 } else { 1 })
             .filter_map(|terms| SlowFlow::at(recorded, pole, prior, terms, &noise_rad).solved(SETS[0]));
         let best = viscous.flat_map(with_others).min_by(|a, b| a.criterion().total_cmp(&b.criterion()))?;
-        best.changes_slowly().then_some(())?;
+        best.is_weakly_nonlinear().then_some(())?;
         let Some(until_s) = best.sticks_from_s() else { return told(&best) };
         let swing = recorded.between(recorded.span_s[0], until_s);
         pole.is_seen_to_swing(swing.duration_s()).then_some(())?;
@@ -66,8 +71,10 @@ fn with_others(viscous: SlowFlow<'_>) -> Vec<SlowFlow<'_>> {
 fn prior_of_k(recorded: &Signal, amplitude_rad: f64, measured: Measured) -> [f64; 2] {
     let [mean, sd] = Bounds::of(true, measured).kappa.map(|bound| bound * amplitude_rad.powi(2));
     match measured {
-        // one link alone is a pendulum
-        Measured::Angles if recorded.links.len() == 1 => [PENDULUM * amplitude_rad.powi(2), sd],
+        // one link alone is a pendulum, or a spring brings it back
+        Measured::Angles if recorded.links.len() == 1 => {
+            [0.5, 2.0 / 3.0].map(|part| part * PENDULUM * amplitude_rad.powi(2))
+        }
         Measured::Angles => [mean, sd],
         Measured::Displacement => [0.0, K_OF_A_DISPLACEMENT],
     }
@@ -78,8 +85,10 @@ fn told(flow: &SlowFlow<'_>) -> Option<Modulated> {
     let (amplitude_rad, last) = (flow.amplitude_rad()?, flow.last()?);
     let own = flow.coefficients();
     let Coefficients { omega_rad_s: omega, k, losses_per_s: [dry, viscous, drag] } = own;
-    let [excess, p_value] = excess_power(&flow.residual()?, omega);
-    let covariance = flow.covariance()? * excess;
+    // a fit that failed is no evidence
+    let [_, p_value] = excess_power(&flow.residual()?, omega);
+    (p_value > LEAST_P).then_some(())?;
+    let covariance = flow.covariance()?;
     // of a linear function of ω₀, k, β₀, β₁, β₂
     let sd = |slope: [f64; 5]| {
         let slope = DVector::from_column_slice(&slope);
@@ -102,7 +111,8 @@ fn told(flow: &SlowFlow<'_>) -> Option<Modulated> {
     let linear = bounds.lambda[1] * squared * large.value.abs();
     let above = |a: f64, b: f64| {
         let sd = sd([0.0, 0.0, (1.0 / a - 1.0 / b) / omega, 0.0, (a - b) / omega]);
-        xi(a).value - xi(b).value > CHANGES * sd.hypot(linear)
+        let change = xi(a).value - xi(b).value;
+        change > CHANGES * sd.hypot(linear) && change > LEAST_CHANGE * xi(b).value.abs()
     };
     let least_at = (dry / drag).sqrt();
     let trend = match () {
@@ -113,19 +123,24 @@ fn told(flow: &SlowFlow<'_>) -> Option<Modulated> {
         () if above(last, 1.0) => Some(Trend::FallsWithAmplitude),
         () => None,
     };
-    let next = match flow.measured {
-        Measured::Angles => bounds.fourth[0] * squared.powi(2),
-        // half of the last power that stands there
-        Measured::Displacement => 0.5 * SIXTH * (k * last).powi(3).abs(),
+    // the next power is known of a pendulum, of another spring only its order
+    let kappa = k / amplitude_rad.powi(2);
+    let kappa_sd = covariance[(1, 1)].sqrt() / amplitude_rad.powi(2);
+    let is_pendulum = match flow.measured {
+        Measured::Angles => (kappa - PENDULUM).abs() < 2.0 * kappa_sd + THEORY_TOLERANCE * PENDULUM,
+        Measured::Displacement => k > -2.0 * covariance[(1, 1)].sqrt(),
     };
+    let next = if is_pendulum { bounds.fourth[0] * squared.powi(2) } else { (k * last).powi(2) };
     // the second order in δ/A is a part of the phase
     let of_friction = (own.shift() / last).powi(2) / (omega * flow.signal.duration_s());
     let turn = std::f64::consts::TAU;
-    let f0_hz = estimate(omega.hypot(viscous) / turn, [1.0 / turn, 0.0, 0.0, 0.0, 0.0]);
+    let f0_hz = estimate(omega / turn, [1.0 / turn, 0.0, 0.0, 0.0, 0.0]);
+    // of what drag makes of the frequency the equivalent linear damper tells only the order
+    let of_drag = 0.25 * ((viscous + drag).powi(2) - viscous.powi(2)) / omega.powi(2);
     let k = estimate(k, [0.0, 1.0, 0.0, 0.0, 0.0]);
     let modulated = Modulated {
         frequency: FrequencyLaw {
-            f0_hz: f0_hz.blurred(next.hypot(of_friction) * f0_hz.value),
+            f0_hz: f0_hz.blurred(next.hypot(of_friction).hypot(of_drag) * f0_hz.value),
             kappa_per_rad2: k.times(amplitude_rad.powi(-2)),
             p_constant: f_tail((k.value / k.sd).powi(2), 1.0, free),
             p_value,

@@ -2,7 +2,7 @@
 //!
 //! ```text
 //! θᵢ(t) = oᵢ + Σₖ dᵢₖ cos(πkτ/T) + Σₕ Re[cᵢₕ aʰ e^{ihφ}],   h = 1, 2, 3,  τ = t − t₀,  a(t₀) = 1,  φ(t₀) = 0
-//! dφ/dt = ω₀ (1 − k a² − …)                k = κA₀², A₀ the first amplitude of the link that moves most
+//! dφ/dt = ω₀ (1 − k a² + k²a⁴/4 − ξ²/2)    k = κA₀², ξ = (β₁ + β₂a)/ω₀, A₀ the first amplitude of the link that moves most
 //! da/dt = −(β₀ + β₁a + β₂a²)               dry friction, viscous, quadratic drag
 //! ```
 //!
@@ -17,11 +17,12 @@
 //! ```
 //! and it has a third harmonic of constant size.
 //!
-//! The next powers of the amplitude in the frequency are a pendulum's, of an angle whose fundamental has the amplitude A, and of x = L sin θ with A_x = L(A − A³/8 + A⁵/192):
+//! The next power of the amplitude in the frequency is a pendulum's, whose fundamental has the amplitude A. A displacement is taken for x = L sin θ of one: a is the
+//! amplitude of the angle, and the fundamental that is seen
 //!
 //! ```text
 //! f = f₀(1 − A²/16 + A⁴/1024) = f₀(1 − κA² + κ²A⁴/4)
-//! f = f₀(1 − κA_x² − 15/4 κ²A_x⁴ − 23 κ³A_x⁶),    κ = 1/16L²
+//! A_x = 2L J₁(A) = L(A − A³/8 + A⁵/192 − …),   A² = 16κA²
 //! ```
 
 use levenberg_marquardt::{LeastSquaresProblem, LevenbergMarquardt};
@@ -34,7 +35,8 @@ use super::signal::{LinkSamples, Signal};
 use crate::series::Measured;
 
 /// Of ω₀, k, β₀, β₁, β₂ those that are free, with one set of losses after the other.
-pub const SETS: [&[usize]; 4] = [&[0, 1, 3], &[0, 1, 2, 3], &[0, 1, 3, 4], &[0, 1, 2, 3, 4]];
+pub const SETS: [&[usize]; 7] =
+    [&[0, 1, 3], &[0, 1, 2], &[0, 1, 4], &[0, 1, 2, 3], &[0, 1, 3, 4], &[0, 1, 2, 4], &[0, 1, 2, 3, 4]];
 /// An integration step is at most this part of the record: the amplitude changes slowly.
 const STEPS: f64 = 200.0;
 /// Below this part of the first amplitude the swing is over.
@@ -43,10 +45,12 @@ const OVER: f64 = 1e-3;
 const HARMONICS: i32 = 3;
 /// A swing is followed down to so many δ of dry friction (judgement: the second order in δ/A is then 4 %).
 const FEWEST_DELTA: f64 = 5.0;
+/// κA² is at most this, either way: that of a swing of 80° (judgement: beyond it the powers of the amplitude that stand here are too few).
+const MOST_K: f64 = 0.12;
+/// A harmonic is at most this part of the fundamental (judgement: an oscillation of half the frequency has its second one alone).
+const MOST_HARMONIC: f64 = 0.2;
 /// ξ is at most this (judgement: what is of second order in it is then half a percent).
 const MOST_DAMPING: f64 = 0.1;
-/// The last coefficient of the powers of a displacement.
-pub const SIXTH: f64 = 23.0;
 
 /// The least-squares problem in what is not linear.
 #[derive(Debug, Clone)]
@@ -69,13 +73,15 @@ pub struct SlowFlow<'a> {
     omega_rad_s: f64,
 }
 
-/// f/f₀ where κA² is this.
-fn slowed(kappa_a2: f64, measured: Measured) -> f64 {
-    let next = match measured {
-        Measured::Angles => -0.25,
-        Measured::Displacement => 3.75 + SIXTH * kappa_a2,
-    };
-    1.0 - kappa_a2 - next * kappa_a2.powi(2)
+/// f/f₀ of a pendulum where κA² is this.
+fn slowed(kappa_a2: f64) -> f64 {
+    1.0 - kappa_a2 + 0.25 * kappa_a2.powi(2)
+}
+
+/// The amplitude of sin θ over that of θ, of a pendulum of which κA² is this: 2J₁(A)/A.
+fn flattened(kappa_a2: f64) -> f64 {
+    let q = kappa_a2.max(0.0);
+    1.0 - 2.0 * q + 4.0 / 3.0 * q.powi(2) - 4.0 / 9.0 * q.powi(3)
 }
 
 /// What is left of one link, and its coefficients: offset, drifts, cosine and sine of each harmonic.
@@ -146,6 +152,12 @@ impl<'a> SlowFlow<'a> {
     /// Solved with these free, the links weighed by their noise.
     pub fn solved(mut self, free: &[usize]) -> Option<Self> {
         self.free = free.to_vec();
+        let lost = self.values[2..].iter().sum::<f64>();
+        (2..5).filter(|i| !free.contains(i)).for_each(|i| self.values[i] = 0.0);
+        // a loss that begins at nothing shows no slope where it alone is there
+        if self.values[2..].iter().all(|own| *own == 0.0) {
+            free.iter().filter(|i| **i > 1).for_each(|i| self.values[*i] = lost);
+        }
         for _ in 0..2 {
             let (solved, report) = LevenbergMarquardt::new().with_tol(1e-10).with_patience(60).minimize(self);
             report.termination.was_successful().then_some(())?;
@@ -160,7 +172,8 @@ impl<'a> SlowFlow<'a> {
         let Coefficients { omega_rad_s, k, losses_per_s: [dry, viscous, drag] } = self.coefficients_of(values);
         let slope = |a: f64| {
             let loss = if a > OVER { dry + viscous * a + drag * a * a } else { 0.0 };
-            [-loss, omega_rad_s * slowed(k * a * a, self.measured)]
+            let damped = 0.5 * ((viscous + drag * a) / omega_rad_s).powi(2);
+            [-loss, omega_rad_s * (slowed(k * a * a) - damped)]
         };
         let longest_s = self.signal.duration_s() / STEPS;
         let (mut t_s, mut state) = (self.signal.span_s[0], [1.0, 0.0]);
@@ -191,7 +204,11 @@ impl<'a> SlowFlow<'a> {
                 let turn = drift_phase(t_s - self.signal.span_s[0], self.signal.duration_s());
                 (1..=self.drift_terms).for_each(|k| basis[(row, k)] = (turn * k as f64).cos());
                 let turned = |times: i32| Complex::from_polar(1.0, f64::from(times) * phase);
-                let powers = (1..=HARMONICS).map(|times| a.powi(times) * turned(times));
+                let seen = match self.measured {
+                    Measured::Angles => 1.0,
+                    Measured::Displacement => flattened(values[1] * a * a),
+                };
+                let powers = (1..=HARMONICS).map(|times| (seen * a).powi(times) * turned(times));
                 let friction = self.has_friction().then(|| turned(3));
                 let lagging = -Complex::i() * lag * turned(1);
                 for (i, own) in powers.chain(friction).enumerate() {
@@ -244,10 +261,18 @@ impl<'a> SlowFlow<'a> {
         self.values[2..].iter().all(|own| *own >= 0.0)
     }
 
-    /// Whether the amplitude changes little in a cycle.
-    pub fn changes_slowly(&self) -> bool {
-        let per_s = self.values[2..].iter().sum::<f64>() * self.units()[3];
-        per_s.abs() < MOST_DAMPING * self.values[0] * self.units()[0]
+    /// Whether it is one weakly nonlinear oscillation, whose amplitude changes little in a cycle.
+    pub fn is_weakly_nonlinear(&self) -> bool {
+        let own = self.coefficients();
+        let changes_slowly = own.losses_per_s.iter().sum::<f64>().abs() < MOST_DAMPING * own.omega_rad_s;
+        let Some(links) = self.projected(&self.values) else { return false };
+        let size = |link: &Projected, times: usize| {
+            let place = 2 * times - 1 + self.drift_terms;
+            link.coefficients[place].hypot(link.coefficients[place + 1])
+        };
+        let sum = |times: usize| links.iter().map(|link| size(link, times)).sum::<f64>();
+        let is_plain = (2..=HARMONICS as usize).all(|times| sum(times) < MOST_HARMONIC * sum(1));
+        changes_slowly && is_plain && own.k.abs() < MOST_K
     }
 
     /// The Bayesian information criterion, up to a constant.

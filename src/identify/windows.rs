@@ -14,6 +14,8 @@ use crate::statistics::median;
 
 /// Cycles of the slowest mode in a window.
 const WINDOW_CYCLES: f64 = 4.0;
+/// Windows that show a law of three terms.
+pub const FEWEST_OF_A_LAW: usize = 6;
 /// An amplitude must exceed this many of its standard deviations, or its phase cannot be followed.
 const CLEAR_OF_NOISE: f64 = 5.0;
 
@@ -109,6 +111,11 @@ impl Windows {
         }
         windows.fits = fits;
         Ok(windows)
+    }
+
+    /// Whether they show a law of the decay by themselves.
+    pub fn are_many(&self) -> bool {
+        self.fits.len() >= FEWEST_OF_A_LAW
     }
 
     /// One mode alone in windows of its own cycles, every other one taken away as the whole record's fit has it.
