@@ -19,8 +19,10 @@ use crate::series::Measured;
 
 /// κ of a pendulum (1/rad²).
 const PENDULUM: f64 = 1.0 / 16.0;
-/// Standard deviation of k of a displacement: that of a swing of 70° (judgement).
-const K_OF_A_DISPLACEMENT: f64 = 0.1;
+/// Mean and standard deviation of k where nothing is known of it: that of a swing of 70° (judgement).
+const ANY_K: [f64; 2] = [0.0, 0.1];
+/// A fall of the deviance by which a recording contradicts a prior (statistics: three standard deviations).
+const CONTRADICTS: f64 = 9.0;
 /// A residual near the oscillation that noise makes in fewer records is a misfit (statistics).
 const LEAST_P: f64 = 1e-3;
 /// A change of a damping ratio by less than this part is not told (judgement).
@@ -45,14 +47,17 @@ impl Modulated {
     /// Of a recording with one mode, of which these damped sinusoids are known; `None` where it is no weakly nonlinear oscillation, or leaves more than noise.
     pub(super) fn of(recorded: &Signal, sinusoids: &SinusoidFit, measured: Measured) -> Option<Self> {
         let [pole] = sinusoids.poles[..] else { return None };
-        let prior = (prior_of_k(recorded, sinusoids.amplitude_rad(0), measured), measured);
+        let prior = prior_of_k(recorded, sinusoids.amplitude_rad(0), measured);
         let noise_rad: Vec<f64> = sinusoids.links.iter().map(|link| link.noise_rad).collect();
         let drifts = sinusoids.links.first().map_or(0, |link| link.drift_rad.len());
         let viscous = [0, drifts]
             .into_iter()
             .take(if drifts > 0 { 2 } else { 1 })
-            .filter_map(|terms| SlowFlow::at(recorded, pole, prior, terms, &noise_rad).solved(SETS[0]));
+            .filter_map(|terms| SlowFlow::at(recorded, pole, (prior, measured), terms, &noise_rad).solved(SETS[0]));
         let best = viscous.flat_map(with_others).min_by(|a, b| a.criterion().total_cmp(&b.criterion()))?;
+        // where the recording contradicts what hung bodies allow, it is right
+        let best =
+            best.with_prior(ANY_K).filter(|open| best.deviance() - open.deviance() > CONTRADICTS).unwrap_or(best);
         best.is_weakly_nonlinear().then_some(())?;
         let Some(until_s) = best.sticks_from_s() else { return told(&best) };
         let swing = recorded.between(recorded.span_s[0], until_s);
@@ -76,7 +81,7 @@ fn prior_of_k(recorded: &Signal, amplitude_rad: f64, measured: Measured) -> [f64
             [0.5, 2.0 / 3.0].map(|part| part * PENDULUM * amplitude_rad.powi(2))
         }
         Measured::Angles => [mean, sd],
-        Measured::Displacement => [0.0, K_OF_A_DISPLACEMENT],
+        Measured::Displacement => ANY_K,
     }
 }
 

@@ -278,9 +278,18 @@ impl<'a> SlowFlow<'a> {
     /// The Bayesian information criterion, up to a constant.
     pub fn criterion(&self) -> f64 {
         let values = self.signal.values() as f64;
+        self.deviance() + (values - self.degrees_of_freedom()) * values.ln()
+    }
+
+    /// Minus twice the log-likelihood, up to a constant.
+    pub fn deviance(&self) -> f64 {
         let lengths = self.signal.links.iter().map(|link| link.t_s.len() as f64);
-        let deviance: f64 = lengths.zip(&self.noise_rad).map(|(n, sd)| 2.0 * n * sd.ln()).sum();
-        deviance + (values - self.degrees_of_freedom()) * values.ln()
+        lengths.zip(&self.noise_rad).map(|(n, sd)| 2.0 * n * sd.ln()).sum()
+    }
+
+    /// The same solved with another mean and standard deviation of what k may be.
+    pub fn with_prior(&self, prior: [f64; 2]) -> Option<Self> {
+        Self { prior, ..self.clone() }.solved(&self.free)
     }
 
     /// The same of a part of the recording that begins with it.
