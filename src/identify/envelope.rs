@@ -27,6 +27,9 @@ use super::estimate::{Estimate, chi_squared_tail, f_tail};
 use super::windows::{Moment, Windows};
 use crate::series::Measured;
 
+/// By how much the theory of κ may be off: it is the first term in A², for a shape that does not change with amplitude.
+pub(super) const THEORY_TOLERANCE: f64 = 0.15;
+
 /// From here on the frequency within a window is trusted to join it to the next.
 const CLEAR_OF_UNWRAPPING: f64 = 15.0;
 

@@ -22,6 +22,7 @@ pub mod envelope;
 pub mod equivalents;
 pub mod estimate;
 pub mod estimators;
+mod excess;
 pub mod floor;
 pub mod half_power;
 mod mode;

@@ -5,7 +5,7 @@ use serde::Serialize;
 
 use super::consistency::Consistency;
 use super::damping::{Damping, Trend};
-use super::envelope::{Bounds, Envelope, FrequencyLaw};
+use super::envelope::{Bounds, Envelope, FrequencyLaw, THEORY_TOLERANCE};
 use super::estimate::{Estimate, probability};
 use super::estimators::{Estimator, Estimators, Whole};
 use super::floor::amplitude_dependence;
@@ -13,9 +13,6 @@ use super::modulated::Modulated;
 use super::windows::Windows;
 use crate::model::chain::Chain;
 use crate::series::Measured;
-
-/// By how much the theory of κ may be off: it is the first term in A², for a shape that does not change with amplitude.
-pub(super) const THEORY_TOLERANCE: f64 = 0.15;
 
 /// A pendulum that swings more slowly is more than 100 m long.
 const SLOWEST_SWING_HZ: f64 = 0.05;
@@ -63,7 +60,7 @@ pub struct Mode {
     pub damping_consistency: Option<Consistency>,
     /// Frequency and damping against amplitude, from window to window.
     pub envelope: Option<Envelope>,
-    /// The same over the whole record at once, where it is too short for windows.
+    /// The same over the whole record at once, where it is too short for many windows.
     pub modulated: Option<Modulated>,
     /// κ that a swing of this shape has without any missing physics.
     pub expected_kappa_per_rad2: Option<f64>,

@@ -3,7 +3,7 @@
 use serde::Serialize;
 
 use super::estimate::{f_tail, probability};
-use super::estimators::residual_excess;
+use super::excess::residual_excess;
 use super::pencil::matrix_pencil;
 use super::pole::{FEWEST_CYCLES, Pole};
 use super::signal::Signal;

@@ -8,10 +8,9 @@ use nalgebra::DVector;
 use serde::Serialize;
 
 use super::damping::Trend;
-use super::envelope::{Bounds, FrequencyLaw};
+use super::envelope::{Bounds, FrequencyLaw, THEORY_TOLERANCE};
 use super::estimate::{Estimate, f_tail};
-use super::estimators::excess_power;
-use super::mode::THEORY_TOLERANCE;
+use super::excess::excess_power;
 use super::signal::Signal;
 use super::sinusoids::SinusoidFit;
 use super::slow_flow::{Coefficients, SETS, SlowFlow};
