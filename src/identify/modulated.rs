@@ -1,6 +1,6 @@
 //! One oscillation whose frequency and damping go with its amplitude, over the whole record at once.
 //!
-//! Where a record is too short to be cut into many [`super::windows`], the [slow flow](super::slow_flow) still shows how the phase bends as the swing becomes
+//! Where a record is too short to be cut into many [`super::windows`], the slow flow (`slow_flow`) still shows how the phase bends as the swing becomes
 //! smaller. Which losses there are, and whether the resting angle drifts, the Bayesian information criterion says. What hung bodies allow of κ enters as an
 //! observation, as in [`super::envelope`]; of a displacement nobody knows what angle it is of, and k = κA² is open up to that of a swing of some 70°.
 

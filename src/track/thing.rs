@@ -18,7 +18,7 @@ pub struct Thing {
     pub travel_px: f64,
     /// It swings.
     pub moves: bool,
-    /// How well its past foretells its place: [`super::steadiness`].
+    /// How well its past foretells its place, 0 to 1 (`steadiness`).
     pub steadiness: f64,
     /// Position by frame.
     pub path: Vec<Option<[f64; 2]>>,
