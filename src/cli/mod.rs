@@ -167,7 +167,7 @@ fn recordings(
             let message = format!("{} rows between --from and --until; widen them", kept.len());
             return Err(crate::Error::Table { path: series.path.clone(), line: None, message });
         }
-        if let Some(released_s) = kept.released_s() {
+        if let Some((released_s, rest)) = kept.let_go() {
             let held = format!(
                 "{}: what swings is held still until t = {released_s:.2} s, as by a hand, which no model knows of",
                 series.path.display()
@@ -177,7 +177,7 @@ fn recordings(
                 console.warning(format!("{held}; leave that out with --from {released_s:.2}"));
             } else {
                 console.warning(format!("{held}: left out, as with --from {released_s:.2}"));
-                kept = kept.slice(kept.rows(released_s, f64::INFINITY));
+                kept = rest;
             }
         }
         Record::of(&kept, marks)

@@ -5,6 +5,7 @@ use std::f64::consts::FRAC_PI_2;
 use nalgebra::Complex;
 
 use super::Record;
+use crate::identify::envelope::PENDULUM;
 use crate::identify::{Identification, Method, Mode, identify};
 use crate::series::AngleSeries;
 
@@ -17,8 +18,6 @@ const EARLY_PERIODS: f64 = 8.0;
 const FASTER: f64 = 1.5;
 /// A frequency known to a worse part than this is none.
 const VAGUE: f64 = 0.05;
-/// κ of a pendulum, f = f₀(1 − κA²).
-const PENDULUM: f64 = 1.0 / 16.0;
 
 /// One mode as it was seen.
 #[derive(Debug, Clone, PartialEq)]

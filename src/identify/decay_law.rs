@@ -6,6 +6,7 @@ use nalgebra::{DMatrix, DVector, Dyn};
 use serde::Serialize;
 
 use super::estimate::{Estimate, chi_squared_tail, f_tail};
+use super::numerics::{central_differences, runge_kutta};
 use super::windows::{FEWEST_OF_A_LAW, Moment};
 
 /// dA/dt = −(b₀ + b₁A + b₂A²).
@@ -126,11 +127,7 @@ impl DecayProblem<'_> {
         let misfit = self.moments.iter().map(|m| {
             let step_s = (m.t_s - t_s) / 8.0;
             for _ in 0..8 {
-                let k1 = slope(amplitude);
-                let k2 = slope(amplitude + 0.5 * step_s * k1);
-                let k3 = slope(amplitude + 0.5 * step_s * k2);
-                let k4 = slope(amplitude + step_s * k3);
-                amplitude += step_s / 6.0 * (k1 + 2.0 * k2 + 2.0 * k3 + k4);
+                [amplitude] = runge_kutta([amplitude], step_s, |[a]| [slope(a)]);
             }
             t_s = m.t_s;
             (amplitude - m.amplitude_rad()) / m.sd_rad
@@ -158,15 +155,6 @@ impl LeastSquaresProblem<f64, Dyn, Dyn> for DecayProblem<'_> {
     }
 
     fn jacobian(&self) -> Option<DMatrix<f64>> {
-        let columns: Vec<DVector<f64>> = (0..self.scaled.len())
-            .map(|k| {
-                let step = 1e-5;
-                let (mut up, mut down) = (self.scaled.clone(), self.scaled.clone());
-                up[k] += step;
-                down[k] -= step;
-                (self.misfit(&up) - self.misfit(&down)) / (2.0 * step)
-            })
-            .collect();
-        Some(DMatrix::from_columns(&columns))
+        central_differences(&self.scaled, |scaled| Some(self.misfit(scaled)))
     }
 }

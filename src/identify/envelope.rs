@@ -24,9 +24,11 @@ use serde::Serialize;
 
 use super::decay_law::{DecayFit, DecayLaw, Widening};
 use super::estimate::{Estimate, chi_squared_tail, f_tail};
-use super::windows::{Moment, Windows};
+use super::windows::{FEWEST_OF_A_LAW, Moment, Windows};
 use crate::series::Measured;
 
+/// κ of a pendulum (1/rad²), f = f₀(1 − κA²).
+pub const PENDULUM: f64 = 1.0 / 16.0;
 /// By how much the theory of κ may be off: it is the first term in A², for a shape that does not change with amplitude.
 pub(super) const THEORY_TOLERANCE: f64 = 0.15;
 
@@ -300,7 +302,7 @@ impl<'a> Regression<'a> {
     fn slope(&self, values: &[f64], prior: fn(&Term) -> [f64; 2]) -> Option<Slope> {
         let terms: Vec<&Term> = self.terms.iter().collect();
         let plain = self.least_squares(values, &terms, prior)?;
-        if plain.p_value > 0.05 || self.moments.len() < 6 {
+        if plain.p_value > 0.05 || self.moments.len() < FEWEST_OF_A_LAW {
             return Some(plain);
         }
         let with_quartic: Vec<&Term> = terms.into_iter().chain([&self.quartic]).collect();

@@ -223,12 +223,11 @@ impl Choice {
         Self {
             frequency_hz: relatively_blurred(self.frequency_hz, HARMONIC_BAND * share.sqrt()),
             damping_ratio: damping_ratio.blurred(2.0 * share.sqrt() * damping_ratio.value.abs()),
-            frequency_at_rad: self.frequency_at_rad,
             basis: format!(
                 "{}; widened: it lies on the third harmonic of the slowest mode, which only a forward model separates",
                 self.basis
             ),
-            at_small_amplitude: self.at_small_amplitude,
+            ..self
         }
     }
 }

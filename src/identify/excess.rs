@@ -5,6 +5,9 @@ use nalgebra::Complex;
 use super::estimate::chi_squared_tail;
 use super::signal::Signal;
 
+/// Of what noise makes in fewer records something else is the cause (statistics).
+const LEAST_P: f64 = 1e-3;
+
 /// Power of the residual in the lines beside a mode (2/T to 9/T away on both sides) over that of white noise of the same variance; 1 unless the
 /// excess would come about by chance less than once in a thousand records. Least squares sees only that part of the residual.
 pub(super) fn residual_excess(residual: &Signal, omega_rad_s: f64) -> f64 {
@@ -30,5 +33,5 @@ pub(super) fn excess_power(residual: &Signal, omega_rad_s: f64) -> [f64; 2] {
     }
     // each line's power is half a χ² of two degrees of freedom
     let p_value = chi_squared_tail(2.0 * sum, 2.0 * lines);
-    [if p_value < 1e-3 { (sum / lines).max(1.0) } else { 1.0 }, p_value]
+    [if p_value < LEAST_P { (sum / lines).max(1.0) } else { 1.0 }, p_value]
 }

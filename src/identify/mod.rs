@@ -30,6 +30,7 @@ pub mod modes;
 pub mod modulated;
 pub mod pencil;
 pub mod pole;
+mod numerics;
 mod projection;
 pub mod signal;
 pub mod sinusoids;
@@ -52,6 +53,7 @@ use crate::error::Result;
 use crate::experiment::{Experiment, Rig};
 use crate::model::chain::Chain;
 use crate::series::{AngleSeries, Measured};
+use envelope::PENDULUM;
 use equivalents::Equivalents;
 use estimators::Whole;
 use floor::Floor;
@@ -129,10 +131,11 @@ pub struct Identification {
 /// [`crate::Error::Simulation`] when the experiment's specimen cannot swing. What the data cannot tell is no error but says so in the result.
 pub fn identify(series: &AngleSeries, experiment: Option<&Experiment>) -> Result<Identification> {
     let body = experiment.map(|e| Ok(Body { experiment: e, chain: Chain::of(&e.specimen)? })).transpose()?;
-    let (series, held_until_s) = &let_go(series);
+    let let_go = series.let_go();
+    let series = let_go.as_ref().map_or(series, |(_, rest)| rest);
     let (signal, wrapped) = Signal::of(series).unwrapped();
     let mut found = Identification::of_record(series, &signal, Measured::Angles);
-    found.held_until_s = *held_until_s;
+    found.held_until_s = let_go.as_ref().map(|(held_s, _)| *held_s);
     for link in wrapped {
         found.notes.push(format!("θ{} jumps by full turns, as wrapped angles do: taken out", link + 1));
     }
@@ -142,16 +145,12 @@ pub fn identify(series: &AngleSeries, experiment: Option<&Experiment>) -> Result
 
 /// Identifies the displacement of one mark, over [`crate::series::PX_PER_RAD`].
 pub fn identify_displacement(series: &AngleSeries) -> Identification {
-    let (series, held_until_s) = &let_go(series);
+    let let_go = series.let_go();
+    let series = let_go.as_ref().map_or(series, |(_, rest)| rest);
     let signal = Signal::of(series);
     let found = Identification::of_record(series, &signal, Measured::Displacement);
-    Identification { held_until_s: *held_until_s, ..found }.with_modes(signal, None)
-}
-
-/// What follows a beginning in which it is held, and until when that is.
-fn let_go(series: &AngleSeries) -> (AngleSeries, Option<f64>) {
-    let released_s = series.released_s();
-    (series.slice(series.rows(released_s.unwrap_or(f64::NEG_INFINITY), f64::INFINITY)), released_s)
+    let held_until_s = let_go.as_ref().map(|(held_s, _)| *held_s);
+    Identification { held_until_s, ..found }.with_modes(signal, None)
 }
 
 impl Identification {
@@ -275,7 +274,7 @@ impl Identification {
             self.notes.push(message.to_owned());
         }
         if let (Some(body), Some(swing)) = (body, self.modes.get(swing)) {
-            let frequency_hz = swing.small_amplitude_hz(swing.expected_kappa_per_rad2.unwrap_or(1.0 / 16.0));
+            let frequency_hz = swing.small_amplitude_hz(swing.expected_kappa_per_rad2.unwrap_or(PENDULUM));
             let damping_ratio = swing.damping.estimate().copied();
             let floor = Floor::of(&body.experiment.specimen, &body.chain, gravity_m_s2, frequency_hz);
             self.notes.extend(floor.below.then(|| floor.statement.clone()));

@@ -5,7 +5,7 @@ use serde::Serialize;
 
 use super::consistency::Consistency;
 use super::damping::{Damping, Trend};
-use super::envelope::{Bounds, Envelope, FrequencyLaw, THEORY_TOLERANCE};
+use super::envelope::{Bounds, Envelope, FrequencyLaw, PENDULUM, THEORY_TOLERANCE};
 use super::estimate::{Estimate, probability};
 use super::estimators::{Estimator, Estimators, Whole};
 use super::floor::amplitude_dependence;
@@ -314,7 +314,7 @@ fn shape(whole: &Whole, mode: usize) -> Vec<LinkMotion> {
 /// κ that gravity alone makes; without a chain only one link's is known.
 fn expected_kappa(shape: &[LinkMotion], frequency_hz: f64, chain: Option<&Chain>, gravity_m_s2: f64) -> Option<f64> {
     let Some(chain) = chain else {
-        return (shape.len() == 1).then_some(1.0 / 16.0);
+        return (shape.len() == 1).then_some(PENDULUM);
     };
     let complex = |l: &LinkMotion| Complex::from_polar(l.ratio_to_first.value, l.phase_to_first_rad.value);
     let shape: Vec<Complex<f64>> = shape.iter().map(complex).collect();

@@ -4,11 +4,13 @@
 //! smaller. Which losses there are, and whether the resting angle drifts, the Bayesian information criterion says. What hung bodies allow of κ enters as an
 //! observation, as in [`super::envelope`]; of a displacement nobody knows what angle it is of, and k = κA² is open up to that of a swing of some 70°.
 
-use nalgebra::DVector;
+use std::iter;
+
+use nalgebra::{DMatrix, DVector};
 use serde::Serialize;
 
 use super::damping::Trend;
-use super::envelope::{Bounds, FrequencyLaw, THEORY_TOLERANCE};
+use super::envelope::{Bounds, FrequencyLaw, PENDULUM, THEORY_TOLERANCE};
 use super::estimate::{Estimate, f_tail};
 use super::excess::excess_power;
 use super::signal::Signal;
@@ -16,14 +18,10 @@ use super::sinusoids::SinusoidFit;
 use super::slow_flow::{Coefficients, SETS, SlowFlow};
 use crate::series::Measured;
 
-/// κ of a pendulum (1/rad²).
-const PENDULUM: f64 = 1.0 / 16.0;
 /// Mean and standard deviation of k where nothing is known of it: that of a swing of 70° (judgement).
 const ANY_K: [f64; 2] = [0.0, 0.1];
 /// A fall of the deviance by which a recording contradicts a prior (statistics: three standard deviations).
 const CONTRADICTS: f64 = 9.0;
-/// A residual near the oscillation that noise makes in fewer records is a misfit (statistics).
-const LEAST_P: f64 = 1e-3;
 /// A change of a damping ratio by less than this part is not told (judgement).
 const LEAST_CHANGE: f64 = 0.1;
 /// A damping ratio goes with amplitude where it changes by more than this many standard deviations (statistics).
@@ -49,19 +47,17 @@ impl Modulated {
         let prior = prior_of_k(recorded, sinusoids.amplitude_rad(0), measured);
         let noise_rad: Vec<f64> = sinusoids.links.iter().map(|link| link.noise_rad).collect();
         let drifts = sinusoids.links.first().map_or(0, |link| link.drift_rad.len());
-        let viscous = [0, drifts]
-            .into_iter()
-            .take(if drifts > 0 { 2 } else { 1 })
-            .filter_map(|terms| SlowFlow::at(recorded, pole, (prior, measured), terms, &noise_rad).solved(SETS[0]));
+        let of_terms = |terms| SlowFlow::at(recorded, pole, (prior, measured), terms, &noise_rad).solved(SETS[0]);
+        let viscous = iter::once(0).chain((drifts > 0).then_some(drifts)).filter_map(of_terms);
         let best = viscous.flat_map(with_others).min_by(|a, b| a.criterion().total_cmp(&b.criterion()))?;
         // where the recording contradicts what hung bodies allow, it is right
         let best =
             best.with_prior(ANY_K).filter(|open| best.deviance() - open.deviance() > CONTRADICTS).unwrap_or(best);
         best.is_weakly_nonlinear().then_some(())?;
-        let Some(until_s) = best.sticks_from_s() else { return told(&best) };
+        let Some(until_s) = best.sticks_from_s() else { return Told::of(&best)?.modulated() };
         let swing = recorded.between(recorded.span_s[0], until_s);
         pole.is_seen_to_swing(swing.duration_s()).then_some(())?;
-        told(&best.over(&swing)?)
+        Told::of(&best.over(&swing)?)?.modulated()
     }
 }
 
@@ -73,97 +69,151 @@ fn with_others(viscous: SlowFlow<'_>) -> Vec<SlowFlow<'_>> {
 
 /// Mean and standard deviation of what k may be.
 fn prior_of_k(recorded: &Signal, amplitude_rad: f64, measured: Measured) -> [f64; 2] {
-    let [mean, sd] = Bounds::of(true, measured).kappa.map(|bound| bound * amplitude_rad.powi(2));
     match measured {
         // one link alone is a pendulum, or a spring brings it back
         Measured::Angles if recorded.links.len() == 1 => {
             [0.5, 2.0 / 3.0].map(|part| part * PENDULUM * amplitude_rad.powi(2))
         }
-        Measured::Angles => [mean, sd],
+        Measured::Angles => Bounds::of(true, measured).kappa.map(|bound| bound * amplitude_rad.powi(2)),
         Measured::Displacement => ANY_K,
     }
 }
 
-/// What a fit says, with intervals that allow for what it leaves near the oscillation and for the powers of the amplitude that it leaves out.
-fn told(flow: &SlowFlow<'_>) -> Option<Modulated> {
-    let (amplitude_rad, last) = (flow.amplitude_rad()?, flow.last()?);
-    let own = flow.coefficients();
-    let Coefficients { omega_rad_s: omega, k, losses_per_s: [dry, viscous, drag] } = own;
-    // a fit that failed is no evidence
-    let [_, p_value] = excess_power(&flow.residual()?, omega);
-    (p_value > LEAST_P).then_some(())?;
-    let covariance = flow.covariance()?;
-    // of a linear function of ω₀, k, β₀, β₁, β₂
-    let sd = |slope: [f64; 5]| {
+/// A fit that leaves only noise, with intervals that allow for the powers of the amplitude that it leaves out.
+struct Told<'f, 'a> {
+    flow: &'f SlowFlow<'a>,
+    own: Coefficients,
+    /// A₀.
+    amplitude_rad: f64,
+    /// In the end, over A₀.
+    last: f64,
+    /// Of ω₀, k, β₀, β₁, β₂.
+    covariance: DMatrix<f64>,
+    /// Probability of so large a residual near the oscillation.
+    p_value: f64,
+}
+
+impl<'f, 'a> Told<'f, 'a> {
+    fn of(flow: &'f SlowFlow<'a>) -> Option<Self> {
+        let own = flow.coefficients();
+        let [excess, p_value] = excess_power(&flow.residual()?, own.omega_rad_s);
+        // a fit that failed is no evidence
+        (excess <= 1.0).then_some(())?;
+        let (amplitude_rad, last, covariance) = (flow.amplitude_rad()?, flow.last()?, flow.covariance()?);
+        Some(Self { flow, own, amplitude_rad, last, covariance, p_value })
+    }
+
+    /// Of a linear function of ω₀, k, β₀, β₁, β₂.
+    fn sd(&self, slope: [f64; 5]) -> f64 {
         let slope = DVector::from_column_slice(&slope);
-        slope.dot(&(&covariance * &slope)).max(0.0).sqrt()
-    };
-    let free = flow.degrees_of_freedom();
-    let estimate = |value: f64, slope: [f64; 5]| Estimate::new(value, sd(slope), free);
-    let xi = |a: f64| {
+        slope.dot(&(&self.covariance * &slope)).max(0.0).sqrt()
+    }
+
+    fn estimate(&self, value: f64, slope: [f64; 5]) -> Estimate {
+        Estimate::new(value, self.sd(slope), self.flow.degrees_of_freedom())
+    }
+
+    fn k_sd(&self) -> f64 {
+        self.covariance[(1, 1)].sqrt()
+    }
+
+    /// Where the amplitude is a times the first one.
+    fn damping_ratio(&self, a: f64) -> Estimate {
+        let Coefficients { omega_rad_s: omega, losses_per_s: [dry, viscous, drag], .. } = self.own;
         let slope = [0.0, 0.0, 1.0 / (a * omega), 1.0 / omega, a / omega];
-        estimate((dry / a + viscous + drag * a) / omega, slope)
-    };
-    let (large, small) = (xi(1.0), xi(last));
-    // a linear damper's ξ, too, goes with amplitude by as much
-    let bounds = Bounds::of(true, flow.measured);
-    let squared = match flow.measured {
-        Measured::Angles => amplitude_rad.powi(2) * last,
-        // of a pendulum, whose k tells it
-        Measured::Displacement => (k.abs() + covariance[(1, 1)].sqrt()) / PENDULUM * last,
-    };
-    let linear = bounds.lambda[1] * squared * large.value.abs();
-    let above = |a: f64, b: f64| {
-        let sd = sd([0.0, 0.0, (1.0 / a - 1.0 / b) / omega, 0.0, (a - b) / omega]);
-        let change = xi(a).value - xi(b).value;
-        change > CHANGES * sd.hypot(linear) && change > LEAST_CHANGE * xi(b).value.abs()
-    };
-    let least_at = (dry / drag).sqrt();
-    let trend = match () {
-        () if last < least_at && least_at < 1.0 && above(last, least_at) && above(1.0, least_at) => {
-            Some(Trend::LeastBetween)
+        self.estimate((dry / a + viscous + drag * a) / omega, slope)
+    }
+
+    /// The square of the angle's amplitude, midway.
+    fn amplitude_rad2(&self) -> f64 {
+        match self.flow.measured {
+            Measured::Angles => self.amplitude_rad.powi(2) * self.last,
+            // of a pendulum, whose k tells it
+            Measured::Displacement => (self.own.k.abs() + self.k_sd()) / PENDULUM * self.last,
         }
-        () if above(1.0, last) => Some(Trend::GrowsWithAmplitude),
-        () if above(last, 1.0) => Some(Trend::FallsWithAmplitude),
-        () => None,
-    };
-    // the next power is known of a pendulum, of another spring only its order
-    let kappa = k / amplitude_rad.powi(2);
-    let kappa_sd = covariance[(1, 1)].sqrt() / amplitude_rad.powi(2);
-    let is_pendulum = match flow.measured {
-        Measured::Angles => (kappa - PENDULUM).abs() < 2.0 * kappa_sd + THEORY_TOLERANCE * PENDULUM,
-        Measured::Displacement => k > -2.0 * covariance[(1, 1)].sqrt(),
-    };
-    let next = if is_pendulum { bounds.fourth[0] * squared.powi(2) } else { (k * last).powi(2) };
-    // the second order in δ/A is a part of the phase
-    let of_friction = (own.shift() / last).powi(2) / (omega * flow.signal.duration_s());
-    let turn = std::f64::consts::TAU;
-    let f0_hz = estimate(omega / turn, [1.0 / turn, 0.0, 0.0, 0.0, 0.0]);
-    // of what drag makes of the frequency the equivalent linear damper tells only the order
-    let of_drag = 0.25 * ((viscous + drag).powi(2) - viscous.powi(2)) / omega.powi(2);
-    let k = estimate(k, [0.0, 1.0, 0.0, 0.0, 0.0]);
-    let modulated = Modulated {
-        frequency: FrequencyLaw {
-            f0_hz: f0_hz.blurred(next.hypot(of_friction).hypot(of_drag) * f0_hz.value),
-            kappa_per_rad2: k.times(amplitude_rad.powi(-2)),
-            p_constant: f_tail((k.value / k.sd).powi(2), 1.0, free),
-            p_value,
-        },
-        damping_ratio: match trend {
-            None => small.blurred(linear),
-            Some(_) => large.covering(small.low, small.high),
-        },
-        trend,
-        noise_rad: flow.noise_rad.clone(),
-    };
-    let law = &modulated.frequency;
-    let numbers = [&law.f0_hz, &law.kappa_per_rad2, &modulated.damping_ratio];
-    numbers.iter().all(|number| number.sd.is_finite() && number.value.is_finite()).then_some(modulated)
+    }
+
+    /// What amplitude may do to the ξ of a linear damper.
+    fn of_linear_damper(&self) -> f64 {
+        let bound = Bounds::of(true, self.flow.measured).lambda[1];
+        bound * self.amplitude_rad2() * self.damping_ratio(1.0).value.abs()
+    }
+
+    /// Whether ξ at one amplitude is above that at another, by more than a linear damper's.
+    fn is_above(&self, a: f64, b: f64) -> bool {
+        let omega = self.own.omega_rad_s;
+        let sd = self.sd([0.0, 0.0, (1.0 / a - 1.0 / b) / omega, 0.0, (a - b) / omega]);
+        let low = self.damping_ratio(b).value;
+        let change = self.damping_ratio(a).value - low;
+        change > CHANGES * sd.hypot(self.of_linear_damper()) && change > LEAST_CHANGE * low.abs()
+    }
+
+    fn trend(&self) -> Option<Trend> {
+        let [dry, _, drag] = self.own.losses_per_s;
+        let (first, last, least_at) = (1.0, self.last, (dry / drag).sqrt());
+        let is_between = last < least_at && least_at < first;
+        if is_between && self.is_above(last, least_at) && self.is_above(first, least_at) {
+            Some(Trend::LeastBetween)
+        } else if self.is_above(first, last) {
+            Some(Trend::GrowsWithAmplitude)
+        } else if self.is_above(last, first) {
+            Some(Trend::FallsWithAmplitude)
+        } else {
+            None
+        }
+    }
+
+    /// By how much the frequency at small amplitude may be off for what the flow leaves out, relative to it.
+    fn left_out(&self) -> f64 {
+        let Coefficients { omega_rad_s: omega, k, losses_per_s: [_, viscous, drag] } = self.own;
+        let (last, kappa) = (self.last, k / self.amplitude_rad.powi(2));
+        // the next power is known of a pendulum, of another spring only its order
+        let is_pendulum = match self.flow.measured {
+            Measured::Angles => {
+                let kappa_sd = self.k_sd() / self.amplitude_rad.powi(2);
+                (kappa - PENDULUM).abs() < 2.0 * kappa_sd + THEORY_TOLERANCE * PENDULUM
+            }
+            Measured::Displacement => k > -2.0 * self.k_sd(),
+        };
+        let fourth = Bounds::of(true, self.flow.measured).fourth[0];
+        let next = if is_pendulum { fourth * self.amplitude_rad2().powi(2) } else { (k * last).powi(2) };
+        // the second order in δ/A is a part of the phase
+        let of_friction = (self.own.shift() / last).powi(2) / (omega * self.flow.signal.duration_s());
+        // of what drag makes of the frequency the equivalent linear damper tells only the order
+        let of_drag = 0.25 * ((viscous + drag).powi(2) - viscous.powi(2)) / omega.powi(2);
+        next.hypot(of_friction).hypot(of_drag)
+    }
+
+    fn modulated(&self) -> Option<Modulated> {
+        let turn = std::f64::consts::TAU;
+        let f0_hz = self.estimate(self.own.omega_rad_s / turn, [1.0 / turn, 0.0, 0.0, 0.0, 0.0]);
+        let k = self.estimate(self.own.k, [0.0, 1.0, 0.0, 0.0, 0.0]);
+        let trend = self.trend();
+        let (large, small) = (self.damping_ratio(1.0), self.damping_ratio(self.last));
+        let modulated = Modulated {
+            frequency: FrequencyLaw {
+                f0_hz: f0_hz.blurred(self.left_out() * f0_hz.value),
+                kappa_per_rad2: k.times(self.amplitude_rad.powi(-2)),
+                p_constant: f_tail((k.value / k.sd).powi(2), 1.0, self.flow.degrees_of_freedom()),
+                p_value: self.p_value,
+            },
+            damping_ratio: match trend {
+                None => small.blurred(self.of_linear_damper()),
+                Some(_) => large.covering(small.low, small.high),
+            },
+            trend,
+            noise_rad: self.flow.noise_rad.clone(),
+        };
+        let law = &modulated.frequency;
+        let numbers = [&law.f0_hz, &law.kappa_per_rad2, &modulated.damping_ratio];
+        numbers.iter().all(|number| number.sd.is_finite() && number.value.is_finite()).then_some(modulated)
+    }
 }
 
 #[cfg(test)]
 mod tests {
     use super::super::identify;
+    use super::super::numerics::runge_kutta;
     use super::*;
     use crate::series::AngleSeries;
 
@@ -173,7 +223,6 @@ mod tests {
     fn swing(amplitude_rad: f64, loss: impl Fn(f64) -> f64) -> AngleSeries {
         let omega = std::f64::consts::TAU * F0_HZ;
         let slope = |[theta, rate]: [f64; 2]| [rate, -omega * omega * theta.sin() - loss(rate)];
-        let along = |y: [f64; 2], k: [f64; 2], h: f64| [y[0] + h * k[0], y[1] + h * k[1]];
         let (steps, dt) = (200, 1.0 / 60.0);
         let h = dt / f64::from(steps);
         let mut y = [amplitude_rad, 0.0];
@@ -181,11 +230,7 @@ mod tests {
         for k in 0..(10.0 / F0_HZ / dt) as usize {
             rows.push((k as f64 * dt, (1e4 * y[0]).round() / 1e4));
             for _ in 0..steps {
-                let k1 = slope(y);
-                let k2 = slope(along(y, k1, 0.5 * h));
-                let k3 = slope(along(y, k2, 0.5 * h));
-                let k4 = slope(along(y, k3, h));
-                y = [0, 1].map(|i| y[i] + h / 6.0 * (k1[i] + 2.0 * k2[i] + 2.0 * k3[i] + k4[i]));
+                y = runge_kutta(y, h, slope);
             }
         }
         let text: String = rows.iter().map(|(t, theta)| format!("{t},{theta}\n")).collect();

@@ -18,6 +18,30 @@ pub(super) fn drift_phase(tau_s: f64, duration_s: f64) -> f64 {
     std::f64::consts::PI * tau_s / duration_s
 }
 
+/// What enters linearly, eliminated: Φ = QR, c = R⁻¹Qᵀy, r = y − QQᵀy.
+pub(super) struct Eliminated {
+    /// Q.
+    pub orthonormal: DMatrix<f64>,
+    /// R.
+    pub triangle: DMatrix<f64>,
+    /// r.
+    pub residual: DVector<f64>,
+    /// c; `None` where Φ has not its full rank.
+    pub coefficients: Option<DVector<f64>>,
+}
+
+impl Eliminated {
+    /// Of the values y that columns Φ describe.
+    pub fn of(basis: DMatrix<f64>, measured: &DVector<f64>) -> Self {
+        let qr = basis.qr();
+        let (orthonormal, triangle) = (qr.q(), qr.r());
+        let projected = orthonormal.tr_mul(measured);
+        let residual = measured - &orthonormal * &projected;
+        let coefficients = triangle.solve_upper_triangular(&projected);
+        Self { orthonormal, triangle, residual, coefficients }
+    }
+}
+
 /// One link's share of it, at the present poles.
 pub(super) struct Projected {
     pub tau_s: Vec<f64>,
@@ -48,15 +72,9 @@ impl Projected {
                 basis[(row, 2 + 2 * m)] = envelope * sin;
             }
         }
-        let qr = basis.qr();
-        self.orthonormal = qr.q();
-        self.triangle = qr.r();
-        let projected = self.orthonormal.tr_mul(&self.measured);
-        self.residual = &self.measured - &self.orthonormal * &projected;
-        self.coefficients = self
-            .triangle
-            .solve_upper_triangular(&projected)
-            .unwrap_or_else(|| DVector::from_element(columns, f64::NAN));
+        let own = Eliminated::of(basis, &self.measured);
+        (self.orthonormal, self.triangle, self.residual) = (own.orthonormal, own.triangle, own.residual);
+        self.coefficients = own.coefficients.unwrap_or_else(|| DVector::from_element(columns, f64::NAN));
     }
 
     /// Kaufman's Jacobian of the residual: −P⊥ (∂Φ/∂α) c, unweighted.

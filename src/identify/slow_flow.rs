@@ -29,8 +29,9 @@ use levenberg_marquardt::{LeastSquaresProblem, LevenbergMarquardt};
 use nalgebra::storage::Owned;
 use nalgebra::{Complex, DMatrix, DVector, Dyn};
 
+use super::numerics::{central_differences, runge_kutta};
 use super::pole::Pole;
-use super::projection::drift_phase;
+use super::projection::{Eliminated, drift_phase};
 use super::signal::{LinkSamples, Signal};
 use crate::series::Measured;
 
@@ -170,7 +171,7 @@ impl<'a> SlowFlow<'a> {
     /// Amplitude over the first one and phase at each sample.
     fn course(&self, values: &[f64; 5], link: &LinkSamples) -> Vec<[f64; 2]> {
         let Coefficients { omega_rad_s, k, losses_per_s: [dry, viscous, drag] } = self.coefficients_of(values);
-        let slope = |a: f64| {
+        let slope = |[a, _]: [f64; 2]| {
             let loss = if a > OVER { dry + viscous * a + drag * a * a } else { 0.0 };
             let damped = 0.5 * ((viscous + drag * a) / omega_rad_s).powi(2);
             [-loss, omega_rad_s * (slowed(k * a * a) - damped)]
@@ -181,13 +182,7 @@ impl<'a> SlowFlow<'a> {
             let count = ((to_s - t_s) / longest_s).ceil().max(1.0);
             let step_s = (to_s - t_s) / count;
             for _ in 0..count as usize {
-                let k1 = slope(state[0]);
-                let k2 = slope(state[0] + 0.5 * step_s * k1[0]);
-                let k3 = slope(state[0] + 0.5 * step_s * k2[0]);
-                let k4 = slope(state[0] + step_s * k3[0]);
-                for (i, own) in state.iter_mut().enumerate() {
-                    *own += step_s / 6.0 * (k1[i] + 2.0 * k2[i] + 2.0 * k3[i] + k4[i]);
-                }
+                state = runge_kutta(state, step_s, slope);
             }
             t_s = *to_s;
             state
@@ -217,11 +212,8 @@ impl<'a> SlowFlow<'a> {
                     (basis[(row, column)], basis[(row, column + 1)]) = (own.re, own.im);
                 }
             }
-            let qr = basis.qr();
-            let (orthonormal, measured) = (qr.q(), DVector::from_column_slice(&link.theta_rad));
-            let projected = orthonormal.tr_mul(&measured);
-            let residual = &measured - orthonormal * &projected;
-            Some(Projected { residual, coefficients: qr.r().solve_upper_triangular(&projected)? })
+            let own = Eliminated::of(basis, &DVector::from_column_slice(&link.theta_rad));
+            Some(Projected { residual: own.residual, coefficients: own.coefficients? })
         };
         self.signal.links.iter().map(of_link).collect()
     }
@@ -364,17 +356,6 @@ impl LeastSquaresProblem<f64, Dyn, Dyn> for SlowFlow<'_> {
     }
 
     fn jacobian(&self) -> Option<DMatrix<f64>> {
-        let free = self.params();
-        let column = |k: usize| {
-            let step = 1e-5;
-            let moved = |by: f64| {
-                let mut free = free.clone();
-                free[k] += by;
-                self.misfit(&self.with(&free))
-            };
-            Some((moved(step)? - moved(-step)?) / (2.0 * step))
-        };
-        let columns: Vec<DVector<f64>> = (0..free.len()).map(column).collect::<Option<_>>()?;
-        Some(DMatrix::from_columns(&columns))
+        central_differences(&self.params(), |free| self.misfit(&self.with(free)))
     }
 }

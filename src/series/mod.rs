@@ -233,11 +233,17 @@ impl AngleSeries {
     }
 
     /// When it is let go, where it is held still at first, by the angle that varies most.
-    pub fn released_s(&self) -> Option<f64> {
+    fn released_s(&self) -> Option<f64> {
         let known = |angles: &Vec<Option<f64>>| -> (Vec<f64>, Vec<f64>) {
             self.t_s.iter().zip(angles).filter_map(|(t, angle)| Some((*t, (*angle)?))).unzip()
         };
         released_of(self.theta_rad.iter().map(known))
+    }
+
+    /// When it is let go, where it is held still at first, and what follows.
+    pub fn let_go(&self) -> Option<(f64, Self)> {
+        let released_s = self.released_s()?;
+        Some((released_s, self.slice(self.rows(released_s, f64::INFINITY))))
     }
 
     /// Number of links.

@@ -6,7 +6,7 @@
 
 use std::cmp::Ordering;
 
-use super::steadiness::steadiness;
+use super::steadiness::{STILL, steadiness};
 use super::tracklet::Tracklet;
 use super::{FrameBlobs, MarkSlot, Sighting};
 use crate::statistics::median;
@@ -91,6 +91,9 @@ pub(super) fn choose(
     let swinging: Vec<u8> = candidates.iter().filter(|c| c.moves_whole).map(|c| c.hue).collect();
     candidates.iter_mut().for_each(|c| {
         c.moves &= c.travel_px > STILL_SHARE * farthest_px && swinging.contains(&c.hue);
+        if !c.moves {
+            c.steadiness = STILL;
+        }
     });
     if let Some(place_px) = hinge_below(&candidates).filter(|_| pivot_px.is_none()) {
         candidates.iter_mut().for_each(|c| c.order = order(&c.path, Some(place_px)));
@@ -216,17 +219,18 @@ pub(super) fn candidates(tracklets: &[Tracklet], window: &[FrameBlobs], pivot_px
             let mut ln_areas: Vec<f64> = areas.iter().flatten().map(|a: &f64| a.ln()).collect();
             let (travel_px, scatter_px) = motion(&path);
             let still_px = STILL_PX + STILL_SCATTERS * scatter_px;
+            let moves = travel_px > still_px;
             Candidate {
                 travel_px,
-                moves: travel_px > still_px,
-                moves_whole: travel_px > still_px && is_no_cover(&path, &areas, (travel_px, still_px)),
+                moves,
+                moves_whole: moves && is_no_cover(&path, &areas, (travel_px, still_px)),
                 tracklet,
                 hue: t.hue,
                 presence: t.sightings.len() as f64 / window.len() as f64,
                 lateness: t.sightings.first().map_or(1.0, |s| s.0 as f64 / window.len() as f64),
                 ln_area: median(&mut ln_areas).unwrap_or(0.0),
                 order: order(&path, pivot_px),
-                steadiness: steadiness(&path),
+                steadiness: if moves { steadiness(&path) } else { STILL },
                 pivot_stretch: pivot_px.map_or(0.0, |p| stretch_of(&vec![Some(p); path.len()], &path, travel_px)),
                 path,
             }
@@ -269,8 +273,7 @@ fn search(
 fn score(kept: &[&Candidate], assignment: &[Option<usize>]) -> f64 {
     let chosen: Vec<&Candidate> = assignment.iter().flatten().map(|i| kept[*i]).collect();
     // of two halves of a track, before a gap and after it, the first: what follows it will be found again
-    let sure = |c: &Candidate| if c.moves { c.steadiness } else { 1.0 };
-    let presence: f64 = chosen.iter().map(|c| c.presence * sure(c) - c.lateness).sum();
+    let presence: f64 = chosen.iter().map(|c| c.presence * c.steadiness - c.lateness).sum();
     // a mark by itself has no distance to another that tells it: of two like pendulums, the one that swings about the pivot
     let from_pivot = match assignment {
         [only] => only.map_or(0.0, |only| kept[only].pivot_stretch),

@@ -173,8 +173,7 @@ fn off_line_px(points: &[[f64; 2]]) -> f64 {
 
 /// More marks are better, seen in every frame, whose past foretells them.
 fn value(things: &[Thing], marks: &[usize]) -> f64 {
-    let of_one = |thing: &Thing| thing.presence * if thing.moves { thing.steadiness } else { 1.0 };
-    marks.iter().map(|i| of_one(&things[*i])).sum()
+    marks.iter().map(|i| things[*i].presence * things[*i].steadiness).sum()
 }
 
 /// Of things in one place, such as one mark seen by two looks, the first. And of things that are hardly seen side by
@@ -267,13 +266,14 @@ fn hinge(things: &[Thing], belongs: &dyn Fn(&Thing) -> bool, arc: &Arc, first: u
 
 #[cfg(test)]
 mod tests {
+    use super::super::steadiness::{STILL, steadiness};
     use super::*;
 
     fn thing(hue: u8, path: impl Fn(f64) -> [f64; 2], moves: bool) -> Thing {
         let path: Vec<Option<[f64; 2]>> = (0..300).map(|i| Some(path(0.05 * f64::from(i)))).collect();
         let x: Vec<f64> = path.iter().flatten().map(|p| p[0]).collect();
         let travel_px = 0.5 * (x.iter().copied().fold(f64::MIN, f64::max) - x.iter().copied().fold(f64::MAX, f64::min));
-        let steadiness = crate::track::steadiness::steadiness(&path);
+        let steadiness = if moves { steadiness(&path) } else { STILL };
         Thing { hue, presence: 1.0, area_px2: 300.0, travel_px, moves, steadiness, path }
     }
 

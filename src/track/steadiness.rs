@@ -8,6 +8,8 @@
 
 use nalgebra::{DMatrix, DVector};
 
+/// Of what stands still.
+pub(super) const STILL: f64 = 1.0;
 /// Places before the one that they foretell: two for each of two oscillations.
 const ORDER: usize = 4;
 /// What a place that was looked at roughly is off, px.
