@@ -12,14 +12,19 @@ use nalgebra::{DMatrix, DVector};
 pub(super) const STILL: f64 = 1.0;
 /// Places before the one that they foretell: two for each of two oscillations.
 const ORDER: usize = 4;
+/// As few foretold places tell nothing of how well they are: there are nearly as many weights.
+const FEWEST: usize = 2 * ORDER;
 /// What a place that was looked at roughly is off, px.
 const ROUGH_PX: f64 = 0.2;
 /// What is foretold to this part of its motion is as likely a mark as not (training: marks of 40 films miss it by less than 0.011 of it, two by 0.06; spots of
 /// brick and wood by 0.04 to 0.6).
 const UNSTEADY: f64 = 0.03;
 
-/// Of a path; where it was out of sight it begins anew.
+/// Of a path; where it was out of sight it begins anew. A path of fewer than 13 places tells nothing, and stands for steady.
 pub(super) fn steadiness(path: &[Option<[f64; 2]>]) -> f64 {
+    if path.iter().flatten().count() <= ORDER + FEWEST {
+        return STILL;
+    }
     let [mut missed_px2, mut moved_px2] = [0.0; 2];
     for axis in 0..2 {
         let mean_of = |run: &[Option<[f64; 2]>]| {
@@ -39,7 +44,7 @@ pub(super) fn steadiness(path: &[Option<[f64; 2]>]) -> f64 {
                 moved_px2 += (places[ORDER] - own_middle).powi(2) - ROUGH_PX.powi(2);
             }
         }
-        if next.len() <= 2 * ORDER {
+        if next.len() <= FEWEST {
             return 0.0;
         }
         let before = DMatrix::from_row_slice(next.len(), ORDER + 1, &before);
@@ -74,6 +79,8 @@ mod tests {
         let spot = |i: usize| 46.0 * ((0.31 * (i * i) as f64).sin() * 2.0).round();
         let texture: Vec<_> = (0..240).map(|i| place(spot(i), noise(i))).collect();
         assert!(steadiness(&texture) < 0.1);
+        // a fifth of a second of a swing
+        assert_eq!(steadiness(&seen[..12]), STILL);
         // two spots, each for itself at rest
         let two: Vec<_> =
             (0..240).map(|i| place(if i < 120 { 0.0 } else { 90.0 }, noise(i)).filter(|_| i != 120)).collect();
