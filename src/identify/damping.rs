@@ -5,6 +5,11 @@ use serde::Serialize;
 use super::envelope::{Envelope, Step};
 use super::estimate::Estimate;
 
+/// A change of a damping ratio by less than this part is not told (judgement).
+pub(super) const LEAST_CHANGE: f64 = 0.1;
+/// A damping ratio goes with amplitude where it changes by more than this many standard deviations (statistics).
+pub(super) const CHANGES: f64 = 3.0;
+
 /// ξ, or why the data do not tell it.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 #[serde(rename_all = "snake_case")]
@@ -80,7 +85,9 @@ pub enum Trend {
 impl Trend {
     /// Of the steps from window to window: means over fifths of them by amplitude, three standard deviations apart. Every law goes with a power of the amplitude
     /// between that of dry friction, −1, and that of drag, 1: where ξ changes by more than the amplitude does, it is something else, as another mode.
-    pub(super) fn of(envelope: &Envelope) -> Self {
+    ///
+    /// None where ξ changes by no more than what a linear damper's does.
+    pub(super) fn of(envelope: &Envelope, of_linear_damper: f64) -> Option<Self> {
         let mut steps: Vec<_> = envelope.steps.iter().collect();
         steps.sort_by(|a, b| b.amplitude_rad.total_cmp(&a.amplitude_rad));
         let fifth = steps.len().div_ceil(5).max(1);
@@ -92,20 +99,26 @@ impl Trend {
             [sum / weight, f64::recip(weight).sqrt()]
         };
         let means: Vec<[f64; 2]> = steps.chunks(fifth).map(mean).collect();
-        let above = |a: &[f64; 2], b: &[f64; 2]| a[0] - b[0] > 3.0 * a[1].hypot(b[1]);
-        let [large, between @ .., small] = &means[..] else { return Self::Uneven };
+        let above = |a: &[f64; 2], b: &[f64; 2]| {
+            let change = a[0] - b[0];
+            change > CHANGES * a[1].hypot(b[1]).hypot(of_linear_damper * b[0]) && change > LEAST_CHANGE * b[0].abs()
+        };
+        let [large, between @ .., small] = &means[..] else { return Some(Self::Uneven) };
         let amplitudes = steps.first().zip(steps.last()).map(|(a, b)| a.amplitude_rad / b.amplitude_rad);
         let most = means.iter().map(|m| m[0] - 2.0 * m[1]).fold(0.0, f64::max);
         let least = means.iter().map(|m| m[0] + 2.0 * m[1]).fold(f64::INFINITY, f64::min);
         if amplitudes.is_none_or(|ratio| most > ratio * least) {
-            return Self::Uneven;
+            return Some(Self::Uneven);
         }
-        match between.iter().min_by(|a, b| a[0].total_cmp(&b[0])) {
+        if !means.iter().any(|a| means.iter().any(|b| above(a, b))) {
+            return None;
+        }
+        Some(match between.iter().min_by(|a, b| a[0].total_cmp(&b[0])) {
             Some(least) if above(large, least) && above(small, least) => Self::LeastBetween,
             _ if above(large, small) => Self::GrowsWithAmplitude,
             _ if above(small, large) => Self::FallsWithAmplitude,
             _ => Self::Uneven,
-        }
+        })
     }
 
     /// For a sentence about ξ.

@@ -164,7 +164,7 @@ impl Estimators {
         let law = envelope.and_then(|e| e.frequency.filter(|f| sound(e, f)).map(|f| (e, f)));
         match law {
             Some((envelope, law)) if felt || self.residual_excess > 1.0 => Choice {
-                frequency_hz: relatively_blurred(law.f0_hz, omitted[0]),
+                frequency_hz: relatively_blurred(law.f0_hz, omitted[0].hypot(of_losses(envelope, duration_s))),
                 // a range over the record extrapolates to no amplitude
                 damping_ratio: envelope
                     .linear_damping()
@@ -230,6 +230,14 @@ impl Choice {
             ..self
         }
     }
+}
+
+/// What losses that go with amplitude do to the frequency of windows, relative to it: to second order in ξ as a linear damper's, and the lag of dry
+/// friction, 3δ/πA with δ/A = πξ/2, over the record.
+fn of_losses(envelope: &Envelope, duration_s: f64) -> f64 {
+    let Estimate { low, high, .. } = envelope.damping_over_the_record();
+    let turned_rad = std::f64::consts::TAU * envelope.steps.first().map_or(1.0, |s| s.frequency_hz.value) * duration_s;
+    (0.25 * (high * high - low * low)).hypot(1.5 * (high - low) / turned_rad)
 }
 
 fn relatively_blurred(estimate: Estimate, relative: f64) -> Estimate {

@@ -6,6 +6,7 @@
 //! | [`half_power`] | bandwidth at half power (paper Eq. 28) |
 //! | [`decrement`] | logarithmic decrement over all peaks (Eq. 27) |
 //! | [`sinusoids`], [`pencil`], [`modes`] | damped sinusoids beside a drift by least squares, started from a matrix pencil; one mode or two |
+//! | `close_pair` | two modes that are one line of the spectrum |
 //! | [`tumbling`] | a motion that is no swing about rest: no modes |
 //! | [`windows`], [`envelope`], [`decay_law`] | frequency and damping as functions of amplitude |
 //! | [`modulated`], `slow_flow` | the same over a record that is too short for many windows |
@@ -14,6 +15,7 @@
 //! | [`mod@floor`] | the frequency below which nothing hung can swing |
 //! | [`consistency`] | whether the estimators agree |
 
+mod close_pair;
 pub mod consistency;
 pub mod damping;
 pub mod decay_law;
@@ -230,10 +232,7 @@ impl Identification {
         self.drift_rad = fit.drift_ranges_rad(recorded);
         let signal = &fit.without_drift(recorded);
         let windows = Windows::of(signal, &fit);
-        let modulated = match &windows {
-            Ok(windows) if windows.are_many() => None,
-            _ => Modulated::of(recorded, &fit, self.record.measured),
-        };
+        let modulated = Modulated::of(recorded, &fit, self.record.measured);
         self.record.noise_rad = match (&windows, &modulated) {
             (_, Some(modulated)) => modulated.noise_rad.clone(),
             (Ok(windows), _) => windows.noise_rad.clone(),

@@ -92,7 +92,10 @@ impl Mode {
             rms_rad: whole.fit.strength(mode, duration_s).sqrt(),
             damping_trend: match whole.modulated {
                 Some(own) => own.trend,
-                None => envelope.as_ref().filter(changes).map(Trend::of),
+                None => envelope
+                    .as_ref()
+                    .filter(changes)
+                    .and_then(|e| Trend::of(e, of_linear_damper(e, Bounds::of(mode == 0, whole.measured), whole.measured))),
             },
             expected_kappa_per_rad2: match whole.measured {
                 Measured::Angles => expected_kappa(&shape, whole.fit.poles[mode].frequency_hz(), chain, gravity_m_s2),
@@ -245,7 +248,8 @@ impl Mode {
         if let Damping::NotIdentifiable { reason, .. } = &self.damping {
             return Some(format!("damping not identifiable: {reason}"));
         }
-        let p_viscous = self.envelope.as_ref().and_then(|e| e.decay).map_or(1.0, |d| d.p_viscous);
+        let changes = |_: &Trend| self.envelope.as_ref().and_then(|e| e.decay).map(|d| d.p_viscous);
+        let p_viscous = self.damping_trend.as_ref().and_then(changes).unwrap_or(1.0);
         let trend = self.damping_trend.map_or("not the same over the record", Trend::words);
         match self.damping_consistency.filter(|t| !t.agree) {
             Some(test) => {
@@ -268,6 +272,19 @@ impl Mode {
             None => None,
         }
     }
+}
+
+/// What amplitude may do to the ξ of a linear damper, relative to it.
+fn of_linear_damper(envelope: &Envelope, bounds: Bounds, measured: Measured) -> f64 {
+    let amplitude_rad2 = envelope.steps.iter().map(|step| step.amplitude_rad.powi(2)).fold(0.0, f64::max);
+    let amplitude_rad2 = match measured {
+        Measured::Angles => amplitude_rad2,
+        // of a pendulum, whose κ tells it
+        Measured::Displacement => {
+            envelope.frequency.map_or(0.0, |law| law.kappa_per_rad2.value.abs() * amplitude_rad2 / PENDULUM)
+        }
+    };
+    bounds.lambda[1] * amplitude_rad2 + bounds.fourth[1] * amplitude_rad2.powi(2)
 }
 
 /// The mode's history in the windows of all modes; where those cannot show it, in windows of its own cycles.

@@ -2,8 +2,10 @@
 
 use serde::Serialize;
 
+use super::close_pair::close_pair;
 use super::estimate::{f_tail, probability};
 use super::excess::residual_excess;
+use super::modulated::Modulated;
 use super::pencil::matrix_pencil;
 use super::pole::{FEWEST_CYCLES, Pole};
 use super::signal::Signal;
@@ -73,12 +75,27 @@ pub fn choose_modes(signal: &Signal, spectrum: &Spectrum, measured: Measured) ->
     let damped = |p: &Pole| p.damping_ratio() < 0.4 && p.damping_ratio() > -0.02;
     let faster_than_drift = |p: &Pole| p.frequency_hz() > slowest_hz;
     let sound = |fit: &SinusoidFit| apart(&fit.poles) && fit.poles.iter().all(|p| damped(p) && faster_than_drift(p));
-    match best(signal, &starts, drift_terms, sound) {
-        Some(two) => Ok(decide(signal, spectrum, measured, one, two)),
+    let chosen = match best(signal, &starts, drift_terms, sound) {
+        Some(two) => decide(signal, spectrum, measured, one, two),
         None => {
             let statement = "one mode; no second one is seen".to_owned();
-            Ok(Chosen { fit: one, count: ModeCount { modes: 1, bic_gain: None, p_value: None, statement } })
+            Chosen { fit: one, count: ModeCount { modes: 1, bic_gain: None, p_value: None, statement } }
         }
+    };
+    Ok(chosen.separated(signal, measured))
+}
+
+impl Chosen {
+    /// With two modes in the place of one that beats.
+    fn separated(self, signal: &Signal, measured: Measured) -> Self {
+        let Some(pair) = close_pair(signal, &self.fit, measured) else { return self };
+        let bic_gain = self.fit.criterion(signal) - pair.criterion(signal);
+        let apart_hz = (pair.poles[0].frequency_hz() - pair.poles[1].frequency_hz()).abs();
+        let statement = format!(
+            "two modes {apart_hz:.4} Hz apart, a beat of {:.3} s: the second lowers the information criterion by {bic_gain:.0}",
+            apart_hz.recip()
+        );
+        Self { fit: sorted(pair, signal), count: ModeCount { modes: 2, bic_gain: Some(bic_gain), p_value: None, statement } }
     }
 }
 
@@ -163,6 +180,15 @@ impl Improvement<'_> {
     }
 }
 
+/// Whether one oscillation whose frequency and damping go with its amplitude, with its harmonics, describes the record as well as two modes do.
+fn one_has_it(signal: &Signal, one: &SinusoidFit, two: &SinusoidFit, measured: Measured) -> bool {
+    let averaged = &signal.averaged(one.poles[0].omega_rad_s);
+    let drift_terms = two.links.first().map_or(0, |l| l.drift_rad.len());
+    let of_two = SinusoidFit::with_drift(averaged, two.origin_s, &two.poles, drift_terms);
+    let of_two = of_two.map(|fit| fit.criterion(averaged));
+    Modulated::criterion(averaged, one, measured).is_some_and(|own| of_two.is_none_or(|two| own <= two))
+}
+
 /// F-test and information criterion.
 fn decide(signal: &Signal, spectrum: &Spectrum, measured: Measured, one: SinusoidFit, two: SinusoidFit) -> Chosen {
     let more = (two.parameters() - one.parameters()) as f64;
@@ -180,8 +206,9 @@ fn decide(signal: &Signal, spectrum: &Spectrum, measured: Measured, one: Sinusoi
         // of whatever angle up to a radian
         Measured::Displacement => large,
     };
-    let most = noise_rad.max(0.05 * cube);
-    let harmonic = (times - times.round()).abs() < 0.03 && times.round() >= 2.0 && small < most;
+    let is_small = small < noise_rad.max(0.05 * cube);
+    let is_multiple = (times - times.round()).abs() < 0.03 && times.round() >= 2.0;
+    let harmonic = is_multiple && (is_small || one_has_it(signal, &one, &two, measured));
     let modes = if p_value < LEAST_P && bic_gain > 10.0 && !harmonic { 2 } else { 1 };
     let statement = if harmonic {
         format!(

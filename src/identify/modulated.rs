@@ -9,7 +9,7 @@ use std::iter;
 use nalgebra::{DMatrix, DVector};
 use serde::Serialize;
 
-use super::damping::Trend;
+use super::damping::{CHANGES, LEAST_CHANGE, Trend};
 use super::envelope::{Bounds, FrequencyLaw, PENDULUM, THEORY_TOLERANCE};
 use super::estimate::{Estimate, f_tail};
 use super::excess::excess_power;
@@ -22,10 +22,6 @@ use crate::series::Measured;
 const ANY_K: [f64; 2] = [0.0, 0.1];
 /// A fall of the deviance by which a recording contradicts a prior (statistics: three standard deviations).
 const CONTRADICTS: f64 = 9.0;
-/// A change of a damping ratio by less than this part is not told (judgement).
-const LEAST_CHANGE: f64 = 0.1;
-/// A damping ratio goes with amplitude where it changes by more than this many standard deviations (statistics).
-const CHANGES: f64 = 3.0;
 
 /// What the fit says.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -44,21 +40,43 @@ impl Modulated {
     /// Of a recording with one mode, of which these damped sinusoids are known; `None` where it is no weakly nonlinear oscillation, or leaves more than noise.
     pub(super) fn of(recorded: &Signal, sinusoids: &SinusoidFit, measured: Measured) -> Option<Self> {
         let [pole] = sinusoids.poles[..] else { return None };
-        let prior = prior_of_k(recorded, sinusoids.amplitude_rad(0), measured);
-        let noise_rad: Vec<f64> = sinusoids.links.iter().map(|link| link.noise_rad).collect();
-        let drifts = sinusoids.links.first().map_or(0, |link| link.drift_rad.len());
-        let of_terms = |terms| SlowFlow::at(recorded, pole, (prior, measured), terms, &noise_rad).solved(SETS[0]);
-        let viscous = iter::once(0).chain((drifts > 0).then_some(drifts)).filter_map(of_terms);
-        let best = viscous.flat_map(with_others).min_by(|a, b| a.criterion().total_cmp(&b.criterion()))?;
-        // where the recording contradicts what hung bodies allow, it is right
-        let best =
-            best.with_prior(ANY_K).filter(|open| best.deviance() - open.deviance() > CONTRADICTS).unwrap_or(best);
+        let values = recorded.values() as f64;
+        let recorded = &recorded.averaged(pole.omega_rad_s);
+        let own = Self::of_averaged(recorded, sinusoids, measured)?;
+        let averaged = (values / recorded.values() as f64).sqrt();
+        Some(Self { noise_rad: own.noise_rad.iter().map(|noise| noise * averaged).collect(), ..own })
+    }
+
+    fn of_averaged(recorded: &Signal, sinusoids: &SinusoidFit, measured: Measured) -> Option<Self> {
+        let best = best_flow(recorded, sinusoids, measured)?;
         best.is_weakly_nonlinear().then_some(())?;
         let Some(until_s) = best.sticks_from_s() else { return Told::of(&best)?.modulated() };
         let swing = recorded.between(recorded.span_s[0], until_s);
-        pole.is_seen_to_swing(swing.duration_s()).then_some(())?;
+        sinusoids.poles[0].is_seen_to_swing(swing.duration_s()).then_some(())?;
         Told::of(&best.over(&swing)?)?.modulated()
     }
+
+    /// The Bayesian information criterion of one such oscillation, up to the constant that [`SinusoidFit::criterion`] leaves out.
+    pub(super) fn criterion(recorded: &Signal, sinusoids: &SinusoidFit, measured: Measured) -> Option<f64> {
+        let best = best_flow(recorded, sinusoids, measured)?;
+        // its noise is that of an unbiased estimate
+        let values = recorded.values() as f64;
+        Some(best.criterion() + values * (best.degrees_of_freedom() / values).ln())
+    }
+}
+
+/// The slow flow that describes the whole recording best.
+fn best_flow<'a>(recorded: &'a Signal, sinusoids: &SinusoidFit, measured: Measured) -> Option<SlowFlow<'a>> {
+    let [pole] = sinusoids.poles[..] else { return None };
+    let prior = prior_of_k(recorded, sinusoids.amplitude_rad(0), measured);
+    let noise_rad: Vec<f64> = sinusoids.links.iter().map(|link| link.noise_rad).collect();
+    let drifts = sinusoids.links.first().map_or(0, |link| link.drift_rad.len());
+    let of_terms = |terms| SlowFlow::at(recorded, pole, (prior, measured), terms, &noise_rad).solved(SETS[0]);
+    let viscous = iter::once(0).chain((drifts > 0).then_some(drifts)).filter_map(of_terms);
+    let best = viscous.flat_map(with_others).min_by(|a, b| a.criterion().total_cmp(&b.criterion()))?;
+    // where the recording contradicts what hung bodies allow, it is right
+    let open = best.with_prior(ANY_K).filter(|open| best.deviance() - open.deviance() > CONTRADICTS);
+    Some(open.unwrap_or(best))
 }
 
 /// With one set of losses after the other.
@@ -124,19 +142,21 @@ impl<'f, 'a> Told<'f, 'a> {
         self.estimate((dry / a + viscous + drag * a) / omega, slope)
     }
 
-    /// The square of the angle's amplitude, midway.
+    /// The square of the angle's first amplitude.
     fn amplitude_rad2(&self) -> f64 {
         match self.flow.measured {
-            Measured::Angles => self.amplitude_rad.powi(2) * self.last,
+            Measured::Angles => self.amplitude_rad.powi(2),
             // of a pendulum, whose k tells it
-            Measured::Displacement => (self.own.k.abs() + self.k_sd()) / PENDULUM * self.last,
+            Measured::Displacement => (self.own.k.abs() + self.k_sd()) / PENDULUM,
         }
     }
 
     /// What amplitude may do to the ξ of a linear damper.
     fn of_linear_damper(&self) -> f64 {
         let bound = Bounds::of(true, self.flow.measured).lambda[1];
-        bound * self.amplitude_rad2() * self.damping_ratio(1.0).value.abs()
+        // least squares sees a² weighed by a²
+        let seen = 0.5 * (1.0 + self.last.powi(2));
+        bound * seen * self.amplitude_rad2() * self.damping_ratio(1.0).value.abs()
     }
 
     /// Whether ξ at one amplitude is above that at another, by more than a linear damper's.
@@ -176,7 +196,7 @@ impl<'f, 'a> Told<'f, 'a> {
             Measured::Displacement => k > -2.0 * self.k_sd(),
         };
         let fourth = Bounds::of(true, self.flow.measured).fourth[0];
-        let next = if is_pendulum { fourth * self.amplitude_rad2().powi(2) } else { (k * last).powi(2) };
+        let next = if is_pendulum { fourth * (self.last * self.amplitude_rad2()).powi(2) } else { (k * last).powi(2) };
         // the second order in δ/A is a part of the phase
         let of_friction = (self.own.shift() / last).powi(2) / (omega * self.flow.signal.duration_s());
         // of what drag makes of the frequency the equivalent linear damper tells only the order

@@ -5,6 +5,8 @@ use crate::statistics::median_step_s;
 
 /// Longest distance between neighbours, in median steps, that is interpolated across.
 pub const BRIDGE_STEPS: f64 = 3.05;
+/// Means over runs of samples keep at least so many a cycle: five of its third harmonic.
+const VALUES_A_CYCLE: f64 = 16.0;
 
 /// What was measured of one link.
 #[derive(Debug, Clone, PartialEq)]
@@ -190,6 +192,36 @@ impl Signal {
             link.t_s.iter().zip(&link.theta_rad).map(|(t, a)| a - offset - slope * at(t)).collect()
         };
         self.with_values(self.links.iter().map(level).collect())
+    }
+
+    /// Means over runs of samples that are a sixteenth of an oscillation's cycle or less, at the mean of their time stamps; what is left over at a gap is left
+    /// out. A run flattens the oscillation, by the mean of cos ω(t − t̄): that is taken out again.
+    #[must_use]
+    pub fn averaged(&self, omega_rad_s: f64) -> Self {
+        let count = ((std::f64::consts::TAU / (omega_rad_s * self.step_s * VALUES_A_CYCLE)) as usize).max(1);
+        if count == 1 {
+            return self.clone();
+        }
+        let of_link = |link: &LinkSamples| {
+            let middle_rad = link.mean_rad();
+            let (mut t_s, mut theta_rad) = (Vec::new(), Vec::new());
+            let mut from = 0;
+            while let Some(run) = link.t_s.get(from..from + count) {
+                if let Some(gap) = run.windows(2).position(|t| t[1] - t[0] > 1.5 * self.step_s) {
+                    from += gap + 1;
+                    continue;
+                }
+                let mean = |of: &dyn Fn(usize) -> f64| (from..from + count).map(of).sum::<f64>() / count as f64;
+                let mean_s = mean(&|i| link.t_s[i]);
+                let flattened = mean(&|i| (omega_rad_s * (link.t_s[i] - mean_s)).cos());
+                t_s.push(mean_s);
+                theta_rad.push(middle_rad + mean(&|i| link.theta_rad[i] - middle_rad) / flattened);
+                from += count;
+            }
+            LinkSamples { t_s, theta_rad }
+        };
+        let step_s = count as f64 * self.step_s;
+        Self { links: self.links.iter().map(of_link).collect(), span_s: self.span_s, step_s }
     }
 
     /// The same time stamps with other values, for example residuals.

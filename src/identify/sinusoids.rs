@@ -276,6 +276,11 @@ impl SinusoidFit {
         self.links.iter().map(|l| l.amplitudes_rad[mode].norm()).fold(0.0, f64::max)
     }
 
+    /// The Bayesian information criterion, up to a constant.
+    pub fn criterion(&self, signal: &Signal) -> f64 {
+        self.deviance + self.parameters() as f64 * (signal.values() as f64).ln()
+    }
+
     /// Number of parameters: poles, amplitudes, offsets.
     pub fn parameters(&self) -> usize {
         let drift = self.links.first().map_or(0, |l| l.drift_rad.len());

@@ -14,6 +14,8 @@ use crate::statistics::median;
 
 /// Cycles of the slowest mode in a window.
 const WINDOW_CYCLES: f64 = 4.0;
+/// Beats of the slowest mode with its neighbour in a window: over fewer of them the amplitudes of both are not told apart.
+const WINDOW_BEATS: f64 = 2.0;
 /// Windows that show a law of three terms.
 pub const FEWEST_OF_A_LAW: usize = 6;
 /// An amplitude must exceed this many of its standard deviations, or its phase cannot be followed.
@@ -62,9 +64,18 @@ impl Windows {
     /// # Errors
     /// In words, when there are fewer than three windows, or fewer than three can be fitted.
     pub fn of(signal: &Signal, fit: &SinusoidFit) -> Result<Self, String> {
-        let slowest = fit.poles.iter().map(|p| p.omega_rad_s).fold(f64::INFINITY, f64::min);
+        let of_poles = fit.poles.iter().map(|p| p.omega_rad_s);
+        let slowest = of_poles.clone().fold(f64::INFINITY, f64::min);
         let cycles = signal.duration_s() * slowest / std::f64::consts::TAU;
-        let count = (cycles / WINDOW_CYCLES).floor();
+        let apart = of_poles.fold(f64::INFINITY, |d, w| if w > slowest { d.min(w - slowest) } else { d });
+        let beats = signal.duration_s() * apart / std::f64::consts::TAU;
+        let count = (cycles / WINDOW_CYCLES).min(beats / WINDOW_BEATS).floor();
+        if beats < 3.0 * WINDOW_BEATS {
+            return Err(format!(
+                "{beats:.1} beats of two modes are too few to see an amplitude change; record at least {:.0} beats",
+                3.0 * WINDOW_BEATS
+            ));
+        }
         if count < 3.0 {
             return Err(format!(
                 "{cycles:.1} cycles are too few to see an amplitude change; record at least {:.0} cycles",
@@ -111,11 +122,6 @@ impl Windows {
         }
         windows.fits = fits;
         Ok(windows)
-    }
-
-    /// Whether they show a law of the decay by themselves.
-    pub fn are_many(&self) -> bool {
-        self.fits.len() >= FEWEST_OF_A_LAW
     }
 
     /// One mode alone in windows of its own cycles, every other one taken away as the whole record's fit has it.
