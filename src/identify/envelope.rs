@@ -119,8 +119,7 @@ impl Envelope {
         let regression = Regression::of(moments, &others, bounds);
         let frequency = regression.frequency_law(&phases, damping_ratio.value);
         // at small amplitude, as the damping ratio is
-        let natural_rad_s =
-            frequency.map_or(omega.hypot(b1.value), |law| std::f64::consts::TAU * law.f0_hz.value);
+        let natural_rad_s = frequency.map_or(omega.hypot(b1.value), |law| std::f64::consts::TAU * law.f0_hz.value);
         let squares: f64 = moments.iter().map(|m| m.amplitude_rad().powi(2)).sum();
         Ok(Self {
             windows: moments.len(),

@@ -92,10 +92,9 @@ impl Mode {
             rms_rad: whole.fit.strength(mode, duration_s).sqrt(),
             damping_trend: match whole.modulated {
                 Some(own) => own.trend,
-                None => envelope
-                    .as_ref()
-                    .filter(changes)
-                    .and_then(|e| Trend::of(e, of_linear_damper(e, Bounds::of(mode == 0, whole.measured), whole.measured))),
+                None => envelope.as_ref().filter(changes).and_then(|e| {
+                    Trend::of(e, of_linear_damper(e, Bounds::of(mode == 0, whole.measured), whole.measured))
+                }),
             },
             expected_kappa_per_rad2: match whole.measured {
                 Measured::Angles => expected_kappa(&shape, whole.fit.poles[mode].frequency_hz(), chain, gravity_m_s2),
@@ -172,9 +171,11 @@ impl Mode {
             None
         } else if !agrees {
             // no scale of the angles makes a frequency rise with amplitude that gravity makes fall
-            let times = (k.value / expected).max(0.0).sqrt();
-            let scale = if times > 0.0 {
-                format!(", or the true angles are about {times:.2} × the stated ones")
+            let times = |kappa: f64| (kappa / expected).max(0.0).sqrt();
+            let scale = if k.low > 0.0 {
+                format!(", or the true angles are about {:.2} × the stated ones", times(k.value))
+            } else if k.high > 0.0 {
+                format!(", or the true angles are less than {:.2} × the stated ones", times(k.high))
             } else {
                 String::new()
             };

@@ -95,7 +95,10 @@ impl Chosen {
             "two modes {apart_hz:.4} Hz apart, a beat of {:.3} s: the second lowers the information criterion by {bic_gain:.0}",
             apart_hz.recip()
         );
-        Self { fit: sorted(pair, signal), count: ModeCount { modes: 2, bic_gain: Some(bic_gain), p_value: None, statement } }
+        Self {
+            fit: sorted(pair, signal),
+            count: ModeCount { modes: 2, bic_gain: Some(bic_gain), p_value: None, statement },
+        }
     }
 }
 

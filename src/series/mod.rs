@@ -2,6 +2,7 @@
 //!
 //! Only `t_s` and `theta1_rad`, `theta2_rad`, … are needed, in any order among any other columns. An empty field is a missing value.
 
+mod clock;
 mod columns;
 
 use std::ops::Range;
@@ -113,8 +114,10 @@ impl AngleSeries {
             tracked: header.iter().any(|name| name == "m1_x_px"),
             warnings: Vec::new(),
         };
+        let mut decimals = 0;
         for record in reader.records() {
             let record = record.map_err(|e| table.refuse(e.position().map(csv::Position::line), &e.to_string()))?;
+            decimals = decimals.max(record.get(columns.t).map_or(0, decimals_of));
             series.push(&Row { record: &record, header: &header, table: &table }, &columns)?;
         }
         series.check(&table, columns.measured)?;
@@ -123,6 +126,14 @@ impl AngleSeries {
             series.theta_rad.iter_mut().chain(&mut series.sd_rad).flatten().flatten().for_each(|px| *px /= PX_PER_RAD);
         }
         series.warnings.extend(series.slow_clock());
+        if let Some(step_s) = clock::set_even(&mut series.t_s, decimals) {
+            series.warnings.push(format!(
+                "{}: t_s is rounded to {} s; rows that lie an even {:.4} ms apart explain it and are used",
+                path.display(),
+                10f64.powi(-(decimals as i32)),
+                1e3 * step_s
+            ));
+        }
         Ok((series, columns.measured))
     }
 
@@ -311,6 +322,13 @@ impl AngleSeries {
             warnings: self.warnings.clone(),
         }
     }
+}
+
+/// Decimals of a number as it is written.
+fn decimals_of(number: &str) -> usize {
+    let (digits, power) = number.split_once(['e', 'E']).unwrap_or((number, "0"));
+    let after = digits.split_once('.').map_or(0, |(_, after)| after.len()) as i64;
+    (after - power.parse::<i64>().unwrap_or(0)).clamp(0, 15) as usize
 }
 
 /// The size of a swing that no hanging chain makes in radians, if the values hold it.
