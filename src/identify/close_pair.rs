@@ -23,6 +23,8 @@ const APART: f64 = 5.0;
 /// By how much the Bayesian information criterion of a pair lies below that of one oscillation (very strong evidence: Kass and Raftery, J. Am. Stat. Assoc. 90
 /// (1995) 773).
 const VERY_STRONG: f64 = 10.0;
+/// The higher frequency over the lower one, at most: what lies further apart has a line of its own.
+const FARTHEST: f64 = 1.3;
 /// A damping ratio of a mode lies between these (an oscillation that grows more is none of a free swing).
 const DAMPING_RATIOS: [f64; 2] = [-1e-3, 0.2];
 
@@ -63,6 +65,8 @@ impl SinusoidFit {
         let variance = c[(0, 0)] + c[(2, 2)] - 2.0 * c[(0, 2)];
         let distance = (self.poles[0].omega_rad_s - self.poles[1].omega_rad_s).abs();
         let widest = self.poles.iter().map(|pole| 2.0 * pole.decay_per_s).fold(0.0, f64::max);
-        damped && seen && distance > widest && distance > APART * variance.max(0.0).sqrt()
+        let close =
+            distance < (FARTHEST - 1.0) * self.poles.iter().map(|p| p.omega_rad_s).fold(f64::INFINITY, f64::min);
+        damped && seen && close && distance > widest && distance > APART * variance.max(0.0).sqrt()
     }
 }

@@ -183,8 +183,12 @@ impl Improvement<'_> {
     }
 }
 
-/// Whether one oscillation whose frequency and damping go with its amplitude, with its harmonics, describes the record as well as two modes do.
+/// Whether one oscillation whose frequency and damping go with its amplitude, with its harmonics, describes the record as well as two modes do. Of a chain
+/// that tells nothing: one of its modes may lie at the multiple, and a harmonic drives it.
 fn one_has_it(signal: &Signal, one: &SinusoidFit, two: &SinusoidFit, measured: Measured) -> bool {
+    if signal.links.len() > 1 {
+        return false;
+    }
     let averaged = &signal.averaged(one.poles[0].omega_rad_s);
     let drift_terms = two.links.first().map_or(0, |l| l.drift_rad.len());
     let of_two = SinusoidFit::with_drift(averaged, two.origin_s, &two.poles, drift_terms);
