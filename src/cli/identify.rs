@@ -79,7 +79,7 @@ impl IdentifyArgs {
         let (from_s, until_s) = (self.from.unwrap_or(f64::NEG_INFINITY), self.until.unwrap_or(f64::INFINITY));
         super::check_span(from_s, until_s)?;
         let stretch = series.slice(series.rows(from_s, until_s));
-        let [first, last] = [series.t_s[0], series.t_s[series.len() - 1]];
+        let [first, last] = [0, series.len() - 1].map(|row| (1e6 * series.t_s[row]).round() / 1e6 + 0.0);
         let refused = |what: String| Error::Option {
             option: "--from, --until".to_owned(),
             message: format!("the stretch {what} (the table runs from {first} s to {last} s)"),

@@ -7,6 +7,7 @@
 //! | [`decrement`] | logarithmic decrement over all peaks (Eq. 27) |
 //! | [`sinusoids`], [`pencil`], [`modes`] | damped sinusoids beside a drift by least squares, started from a matrix pencil; one mode or two |
 //! | `close_pair` | two modes that are one line of the spectrum |
+//! | `rest` | an end in which nothing swings any more |
 //! | [`tumbling`] | a motion that is no swing about rest: no modes |
 //! | [`windows`], [`envelope`], [`decay_law`] | frequency and damping as functions of amplitude |
 //! | [`modulated`], `slow_flow` | the same over a record that is too short for many windows |
@@ -34,6 +35,7 @@ pub mod pencil;
 pub mod pole;
 mod numerics;
 mod projection;
+mod rest;
 pub mod signal;
 pub mod sinusoids;
 mod slow_flow;
@@ -109,6 +111,8 @@ pub struct Identification {
     pub spectrum: Spectrum,
     /// Until when it is held still at first, as by a hand; only what follows is identified.
     pub held_until_s: Option<f64>,
+    /// From when on nothing swings any more, where that is a part of the record; only what precedes is identified.
+    pub rests_from_s: Option<f64>,
     /// What keeps it from being a swing; then there are no modes.
     pub tumbling: Option<Tumbling>,
     /// How far each link's resting angle moves over the record, no part of any mode; zero where the data do not ask for a drift.
@@ -189,6 +193,7 @@ impl Identification {
             schema: "freeswing.identify/1",
             summary: String::new(),
             held_until_s: None,
+            rests_from_s: None,
             tumbling: None,
             drift_rad: Vec::new(),
             swing_mode: None,
@@ -203,6 +208,11 @@ impl Identification {
     }
 
     fn with_modes(mut self, signal: Signal, body: Option<&Body>) -> Self {
+        self.rests_from_s = rest::rests_from_s(&signal);
+        let signal = self.rests_from_s.map_or_else(|| signal.clone(), |rest_s| signal.until(rest_s));
+        if self.rests_from_s.is_some() {
+            self.spectrum = Spectrum::of(&signal.levelled(), self.record.irregular_share);
+        }
         match self.swing_of(signal) {
             Ok((signal, chosen)) => self.add_modes(&signal, chosen, body),
             Err(reason) => self.notes.push(format!("{}{reason}", summary::NOTHING)),

@@ -165,6 +165,14 @@ impl Signal {
         part
     }
 
+    /// The stretch from the beginning to a time, the sample there included.
+    #[must_use]
+    pub fn until(&self, until_s: f64) -> Self {
+        let mut part = self.between(f64::NEG_INFINITY, until_s + 0.5 * self.step_s);
+        part.span_s = [self.span_s[0], until_s];
+        part
+    }
+
     /// With gaps of a missing frame or two filled by interpolation: for sums over the samples, never for least squares.
     #[must_use]
     pub fn bridged(&self) -> Self {

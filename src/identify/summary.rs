@@ -27,8 +27,11 @@ pub(super) fn summary(found: &Identification) -> String {
     let held = found.held_until_s.map(|held_s| {
         format!(" — held still until t = {held_s:.2} s; only what follows is used, as with `--from {held_s:.2}`")
     });
+    let rest = found.rests_from_s.map(|rest_s| {
+        format!(" — at rest from t = {rest_s:.2} s on; only what precedes is used, as with `--until {rest_s:.2}`")
+    });
     let part = found.tumbling.iter().map(|t| format!(" — {}", t.statement));
-    modes.join("; ") + &held.into_iter().chain(part).chain(doubts).chain(floor).collect::<String>()
+    modes.join("; ") + &held.into_iter().chain(rest).chain(part).chain(doubts).chain(floor).collect::<String>()
 }
 
 fn of_mode(mode: &Mode) -> String {

@@ -6,8 +6,8 @@
 
 /// Fewest stamps that show that they are even.
 const FEWEST: usize = 20;
-/// A unit finer than this part of a step is not worth it.
-const FINE: f64 = 1e-6;
+/// A unit finer than this part of a step is not worth it (judgement).
+const FINE: f64 = 1e-4;
 /// A unit beyond this part of a step is told (judgement).
 const TOLD: f64 = 0.02;
 
