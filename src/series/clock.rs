@@ -8,6 +8,8 @@
 const FEWEST: usize = 20;
 /// A unit finer than this part of a step is not worth it (judgement).
 const FINE: f64 = 1e-4;
+/// What is off the line by less than this part of the unit is even as it stands (judgement).
+const EVEN: f64 = 0.01;
 /// A unit beyond this part of a step is told (judgement).
 const TOLD: f64 = 0.02;
 
@@ -33,6 +35,9 @@ pub(super) fn set_even(t_s: &mut [f64], decimals: usize) -> Option<f64> {
     };
     let line = line(t_s, &by_row(), unit_s).or_else(|| line(t_s, &by_step()?, unit_s))?;
     let Line { step_s, even_s } = line;
+    if t_s.iter().zip(&even_s).all(|(t, even)| (t - even).abs() < EVEN * unit_s) {
+        return None;
+    }
     t_s.copy_from_slice(&even_s);
     (unit_s > TOLD * step_s).then_some(step_s)
 }
