@@ -12,7 +12,7 @@ use super::modulated::Modulated;
 use super::signal::Signal;
 use super::sinusoids::SinusoidFit;
 use super::spectrum::Spectrum;
-use super::windows::Windows;
+use super::windows::{Windows, frequencies_over_hz};
 use crate::series::Measured;
 
 /// A way to a frequency or a damping ratio.
@@ -125,6 +125,14 @@ impl Estimators {
         Consistency::of(&others.chain([own]).collect::<Vec<_>>())
     }
 
+    /// A frequency with an interval that holds those of the record's stretches, where no law of one oscillation describes a record too short for windows: two
+    /// modes too close to be told apart, frames that are missing though the stamps go on, a push.
+    fn over_stretches(&self, whole: &Whole, frequency_hz: Estimate) -> Estimate {
+        let unexplained = whole.modulated.is_none() && whole.windows.is_err();
+        let range = frequencies_over_hz(whole.signal, whole.fit).filter(|_| unexplained);
+        range.map_or(frequency_hz, |[low, high]| frequency_hz.covering(low, high))
+    }
+
     /// The laws at small amplitude; the damped sinusoids where the amplitude does not matter or its effect cannot be followed.
     pub fn choose(&self, whole: &Whole, envelope: Option<&Envelope>, amplitudes_rad: &[f64], mode: usize) -> Choice {
         let (duration_s, known) = (whole.signal.duration_s(), whole.measured == Measured::Angles);
@@ -174,14 +182,14 @@ impl Estimators {
                 at_small_amplitude: true,
             },
             None if felt || self.residual_excess > 1.0 => Choice {
-                frequency_hz: frequency_hz.blurred(changed_hz),
+                frequency_hz: self.over_stretches(whole, frequency_hz.blurred(changed_hz)),
                 damping_ratio: damping_ratio.blurred(changed_xi),
                 frequency_at_rad: felt.then(|| amplitudes_rad[mode] * weighed(decays).sqrt()),
                 basis: "damped sinusoids over the whole record; widened for what amplitude may have changed".to_owned(),
                 at_small_amplitude: false,
             },
             _ => Choice {
-                frequency_hz,
+                frequency_hz: self.over_stretches(whole, frequency_hz),
                 damping_ratio,
                 frequency_at_rad: None,
                 basis: "damped sinusoids over the whole record".to_owned(),

@@ -208,12 +208,12 @@ fn decide(signal: &Signal, spectrum: &Spectrum, measured: Measured, one: Sinusoi
     let (large, small) = (two.amplitude_rad(strong), two.amplitude_rad(weak));
     // sin θ gives a third harmonic of A³/192, a chain a few times that; an error that goes with the place in the picture gives others, no larger than what a value errs
     let noise_rad = two.links.iter().map(|link| link.noise_rad).fold(0.0, f64::max);
-    let cube = match measured {
-        Measured::Angles => large.powi(3),
-        // of whatever angle up to a radian
-        Measured::Displacement => large,
+    let of_swing = match measured {
+        Measured::Angles => 0.05 * large.powi(3),
+        // of whatever angle up to a right one: J₃(π/2)/J₁(π/2)
+        Measured::Displacement => 0.12 * large,
     };
-    let is_small = small < noise_rad.max(0.05 * cube);
+    let is_small = small < noise_rad.max(of_swing);
     let is_multiple = (times - times.round()).abs() < 0.03 && times.round() >= 2.0;
     let harmonic = is_multiple && (is_small || one_has_it(signal, &one, &two, measured));
     let modes = if p_value < LEAST_P && bic_gain > 10.0 && !harmonic { 2 } else { 1 };

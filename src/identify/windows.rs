@@ -16,6 +16,8 @@ use crate::statistics::median;
 const WINDOW_CYCLES: f64 = 4.0;
 /// Beats of the slowest mode with its neighbour in a window: over fewer of them the amplitudes of both are not told apart.
 const WINDOW_BEATS: f64 = 2.0;
+/// Cycles of a stretch that shows a frequency, at least.
+const STRETCH_CYCLES: f64 = 2.2;
 /// Windows that show a law of three terms.
 pub const FEWEST_OF_A_LAW: usize = 6;
 /// An amplitude must exceed this many of its standard deviations, or its phase cannot be followed.
@@ -155,6 +157,23 @@ impl Windows {
         }
         alone
     }
+}
+
+/// From the lowest to the highest frequency of a mode alone in stretches of a record that is too short for windows; where it is clear of the noise in two
+/// of them.
+pub(super) fn frequencies_over_hz(signal: &Signal, fit: &SinusoidFit) -> Option<[f64; 2]> {
+    let [pole] = fit.poles[..] else { return None };
+    let cycles = signal.duration_s() * pole.omega_rad_s / std::f64::consts::TAU;
+    let count = (cycles / STRETCH_CYCLES).floor();
+    let stretch_s = signal.duration_s() / count;
+    let of_stretch = |k: usize| {
+        let from_s = signal.span_s[0] + k as f64 * stretch_s;
+        let stretch = signal.between(from_s, from_s + stretch_s);
+        window_fit(&stretch, from_s + 0.5 * stretch_s, &fit.poles, &fit.poles)
+    };
+    let local: Vec<f64> = (0..count as usize).filter_map(of_stretch).map(|fit| fit.poles[0].frequency_hz()).collect();
+    let ends = local.iter().fold([f64::INFINITY, 0.0], |[low, high], f| [f.min(low), f.max(high)]);
+    (local.len() >= 2).then_some(ends)
 }
 
 /// Fits a window with all modes, or with fewer when the weaker ones have died away.
