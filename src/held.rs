@@ -3,6 +3,8 @@
 //! What is let go at rest stays within 4 % of its range for 0.064 of a period, and passes its middle 0.186 of a period later: 0.34 times that. Let go 2° from the top it stays as long as it then takes to
 //! fall (1.06). What stays half as long again was held.
 
+use std::cmp::Ordering;
+
 use crate::statistics::median;
 
 /// Part of the range within which a hand holds still.
@@ -15,28 +17,39 @@ const FIRST: usize = 5;
 const FEWEST_VALUES: usize = 30;
 const FEWEST_PASSES: usize = 3;
 
-/// When what moves farthest of some paths, each of times and values, is let go.
+/// When the first of some paths, each of times and values, is let go.
 pub fn released_of(paths: impl Iterator<Item = (Vec<f64>, Vec<f64>)>) -> Option<f64> {
-    let range = |(_, values): &(Vec<f64>, Vec<f64>)| {
-        values.iter().copied().fold(f64::MIN, f64::max) - values.iter().copied().fold(f64::MAX, f64::min)
-    };
-    let (t_s, values) = paths.max_by(|a, b| range(a).total_cmp(&range(b)))?;
-    released_s(&t_s, &values)
+    let paths: Vec<(Vec<f64>, Vec<f64>)> = paths.filter(|(t_s, values)| t_s.len() == values.len()).collect();
+    // what moves less than the farthest one's noise tells nothing of when it is let go
+    let range = paths.iter().filter_map(|(_, values)| range_of(values)).fold(0.0, f64::max);
+    let left = |(t_s, values): &(Vec<f64>, Vec<f64>)| leaves_at(values, range).map(|place| t_s[place]);
+    let first = paths.iter().filter(|path| left(path).is_some());
+    let (t_s, values) = first.min_by(|a, b| left(a).partial_cmp(&left(b)).unwrap_or(Ordering::Equal))?;
+    released_s(t_s, values, range)
 }
 
-/// When it is let go: the time of the first value from which on it moves; `None` where it is not held at first.
-fn released_s(t_s: &[f64], values: &[f64]) -> Option<f64> {
-    if values.len() < FEWEST_VALUES || t_s.len() != values.len() {
+/// From the lowest to the highest value, a fiftieth of them apart.
+fn range_of(values: &[f64]) -> Option<f64> {
+    let mut sorted = values.to_vec();
+    sorted.sort_unstable_by(f64::total_cmp);
+    let last = sorted.len().checked_sub(1)?;
+    Some(sorted[last * 49 / 50] - sorted[last / 50])
+}
+
+/// The first value that is away from where it is held.
+fn leaves_at(values: &[f64], range: f64) -> Option<usize> {
+    if values.len() < FEWEST_VALUES {
         return None;
     }
     let held = median(&mut values[..FIRST].to_vec())?;
-    let mut sorted = values.to_vec();
-    sorted.sort_unstable_by(f64::total_cmp);
-    let last = sorted.len() - 1;
-    let range = sorted[last * 49 / 50] - sorted[last / 50];
     let is_away = |value: &f64| (value - held).abs() > STILL * range;
     // one value alone may be wrong
-    let leaves = values.windows(2).position(|pair| pair.iter().all(is_away))?;
+    values.windows(2).position(|pair| pair.iter().all(is_away))
+}
+
+/// When it is let go: the time of the first value from which on it moves; `None` where it is not held at first.
+fn released_s(t_s: &[f64], values: &[f64], range: f64) -> Option<f64> {
+    let leaves = leaves_at(values, range)?;
     let middle = median(&mut values[leaves..].to_vec())?;
     let passes: Vec<f64> = (leaves + 1..values.len())
         .filter(|k| (values[*k] > middle) != (values[k - 1] > middle))
@@ -57,7 +70,8 @@ mod tests {
 
     fn released(at_s: f64, value: impl Fn(f64) -> f64) -> Option<f64> {
         let t_s: Vec<f64> = (0..360).map(|k| at_s + f64::from(k) / 30.0).collect();
-        released_s(&t_s, &t_s.iter().map(|t| value(*t)).collect::<Vec<_>>())
+        let values = t_s.iter().map(|t| value(*t)).collect();
+        released_of(std::iter::once((t_s, values)))
     }
 
     #[test]
@@ -78,6 +92,15 @@ mod tests {
     }
 
     #[test]
+    fn where_one_link_moves_nothing_is_held() {
+        let t_s: Vec<f64> = (0..360).map(|k| f64::from(k) / 30.0).collect();
+        let path = |value: &dyn Fn(f64) -> f64| (t_s.clone(), t_s.iter().map(|t| value(*t)).collect::<Vec<_>>());
+        let [upper, lower] = [path(&|t| 0.5 * swing(t, 0.0)), path(&|t| swing(t, 0.8))];
+        assert!(released_of([lower.clone()].into_iter()).is_some());
+        assert_eq!(released_of([lower, upper].into_iter()), None);
+    }
+
+    #[test]
     fn what_falls_from_near_the_top_is_not_held() {
         let (mut angle, mut rate) = (178f64.to_radians(), 0.0);
         let mut angles = Vec::new();
@@ -89,6 +112,6 @@ mod tests {
             }
         }
         let t_s: Vec<f64> = (0..600).map(|k| f64::from(k) / 30.0).collect();
-        assert_eq!(released_s(&t_s, &angles), None);
+        assert_eq!(released_of(std::iter::once((t_s, angles))), None);
     }
 }

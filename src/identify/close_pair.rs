@@ -4,7 +4,7 @@
 //! limit of resolution but the noise: two damped sinusoids are fitted from poles on both sides of the line. The same beat, over less than a period of it, can
 //! be one oscillation whose frequency and damping go with its amplitude; what is told is therefore
 //!
-//! - no pair that leaves more than noise near its lines, whose frequencies differ by less than they are known, or by less than a half-power bandwidth: two
+//! - no pair that leaves more than noise near its lines, unless one oscillation leaves ten times its power (a wide swing has amplitudes that act on both); none whose frequencies differ by less than they are known, or by less than a half-power bandwidth: two
 //!   modes that overlap so far are not told from one that is no sinusoid;
 //! - no pair where one such oscillation describes the record as well ([`super::modulated`], by the Bayesian information criterion).
 
@@ -23,6 +23,8 @@ const APART: f64 = 5.0;
 /// By how much the Bayesian information criterion of a pair lies below that of one oscillation (very strong evidence: Kass and Raftery, J. Am. Stat. Assoc. 90
 /// (1995) 773).
 const VERY_STRONG: f64 = 10.0;
+/// Where a pair leaves more than noise, the most of one oscillation's residual that it leaves, in power (judgement).
+const MOST_LEFT: f64 = 0.1;
 /// The higher frequency over the lower one, at most: what lies further apart has a line of its own.
 const FARTHEST: f64 = 1.3;
 /// A damping ratio of a mode lies between these (an oscillation that grows more is none of a free swing).
@@ -40,11 +42,13 @@ pub(super) fn close_pair(signal: &Signal, one: &SinusoidFit, measured: Measured)
     let pencil = matrix_pencil(&one.without_drift(signal), 2, 1.5 * pole.frequency_hz());
     let fits = starts.chain([pencil]).filter(|start| start.len() == 2).filter_map(fit);
     let pair = fits.min_by(|a, b| a.deviance.total_cmp(&b.deviance))?;
-    let better = |than: f64| pair.criterion(averaged) + VERY_STRONG < than;
-    let is_told = pair.is_two_modes() && leaves_noise(averaged, &pair);
+    pair.is_two_modes().then_some(())?;
+    let (own, values) = (pair.criterion(averaged), averaged.values() as f64);
+    let least = if leaves_noise(averaged, &pair) { VERY_STRONG } else { -values * MOST_LEFT.ln() };
+    let better = |than: f64| own + least < than;
     let is_better = better(fit(vec![pole])?.criterion(averaged))
         && Modulated::criterion(averaged, one, measured).is_none_or(better);
-    let pair = (is_told && is_better).then_some(pair)?;
+    let pair = is_better.then_some(pair)?;
     SinusoidFit::with_drift(signal, one.origin_s, &pair.poles, drift_terms)
 }
 

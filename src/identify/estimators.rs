@@ -146,11 +146,12 @@ impl Estimators {
         let damping_ratio = sinusoids.and_then(|e| e.damping_ratio).unwrap_or(self.raw[1]);
         // what amplitude may have changed, by the bounds on κ and λ
         let decays = std::f64::consts::TAU * frequency_hz.value * damping_ratio.value * duration_s;
-        let [changed_hz, changed_xi] = unfollowed(amplitudes_rad, decays, mode);
-        let (changed_hz, changed_xi) = (changed_hz * frequency_hz.value, changed_xi * damping_ratio.value);
+        let [changed, changed_xi] = unfollowed(amplitudes_rad, decays, mode);
+        let (changed_hz, changed_xi) = (changed * frequency_hz.value, changed_xi * damping_ratio.value);
         let squares: f64 = lawful_rad.iter().map(|a| a * a).sum();
         let omitted = Bounds::of(mode == 0, whole.measured).fourth.map(|bound| bound * squares * squares);
-        let is_told = |law: &FrequencyLaw| known || law.f0_hz.half() < WIDEST_LAW * frequency_hz.half();
+        // of the slowest mode of hung angles it is known how amplitude acts
+        let is_told = |law: &FrequencyLaw| (known && mode == 0) || law.f0_hz.half() < WIDEST_LAW * frequency_hz.half();
         if let Some(own) = whole.modulated.filter(|own| is_told(&own.frequency)) {
             return Choice {
                 frequency_hz: own.frequency.f0_hz,
@@ -163,10 +164,11 @@ impl Estimators {
         }
         // what angle a displacement is of nobody knows, nor therefore what amplitude has changed
         let felt = !known || changed_hz > 0.3 * frequency_hz.sd;
-        // a law that reaches far beyond the steps it was laid through tells nothing at its end
+        // a law that reaches far beyond the steps it was laid through tells nothing at its end; of a faster mode, beyond what amplitudes do
+        let farthest = if mode == 0 { FARTHEST_LAW } else { FARTHEST_LAW.min(3.0 * changed) };
         let sound = |e: &Envelope, law: &FrequencyLaw| {
-            e.steps.iter().any(|s| (law.f0_hz.value / s.frequency_hz.value - 1.0).abs() < FARTHEST_LAW)
-                && law.f0_hz.half() < FARTHEST_LAW * law.f0_hz.value
+            e.steps.iter().any(|s| (law.f0_hz.value / s.frequency_hz.value - 1.0).abs() < farthest)
+                && law.f0_hz.half() < farthest * law.f0_hz.value
                 && is_told(law)
         };
         let law = envelope.and_then(|e| e.frequency.filter(|f| sound(e, f)).map(|f| (e, f)));

@@ -249,29 +249,22 @@ impl Mode {
         if let Damping::NotIdentifiable { reason, .. } = &self.damping {
             return Some(format!("damping not identifiable: {reason}"));
         }
-        let changes = |_: &Trend| self.envelope.as_ref().and_then(|e| e.decay).map(|d| d.p_viscous);
-        let p_viscous = self.damping_trend.as_ref().and_then(changes).unwrap_or(1.0);
-        let trend = self.damping_trend.map_or("not the same over the record", Trend::words);
-        match self.damping_consistency.filter(|t| !t.agree) {
-            Some(test) => {
-                let meaning = if p_viscous < 0.01 {
-                    format!("the damping depends on amplitude: friction or drag, not one ξ ({trend})")
-                } else {
-                    "the decay is no exponential; look at the envelope before using one ξ".to_owned()
-                };
-                Some(format!(
-                    "the damping ratios disagree (χ² = {:.0} of {}, {}): {meaning}",
-                    test.chi2,
-                    test.estimators - 1,
-                    probability(test.p_value)
-                ))
-            }
-            None if p_viscous < 0.01 => Some(format!(
-                "the damping depends on amplitude ({}): friction or drag, not one ξ ({trend})",
-                probability(p_viscous)
-            )),
-            None => None,
-        }
+        let meaning = match self.damping_trend {
+            Some(trend) => format!("the damping depends on amplitude: friction or drag, not one ξ ({})", trend.words()),
+            // what one oscillation describes needs no other reason
+            None if self.modulated.is_some() => return None,
+            None => "the decay is no exponential; look at the envelope before using one ξ".to_owned(),
+        };
+        let disagree = self.damping_consistency.filter(|t| !t.agree);
+        let said = disagree.map(|test| {
+            format!(
+                "the damping ratios disagree (χ² = {:.0} of {}, {}): {meaning}",
+                test.chi2,
+                test.estimators - 1,
+                probability(test.p_value)
+            )
+        });
+        said.or_else(|| self.damping_trend.map(|_| meaning))
     }
 }
 

@@ -168,9 +168,14 @@ impl<'f, 'a> Told<'f, 'a> {
         change > CHANGES * sd.hypot(self.of_linear_damper()) && change > LEAST_CHANGE * low.abs()
     }
 
-    fn trend(&self) -> Option<Trend> {
+    /// The amplitude at which dry friction and drag together are least, over the first one.
+    fn least_at(&self) -> f64 {
         let [dry, _, drag] = self.own.losses_per_s;
-        let (first, last, least_at) = (1.0, self.last, (dry / drag).sqrt());
+        (dry / drag).sqrt()
+    }
+
+    fn trend(&self) -> Option<Trend> {
+        let (first, last, least_at) = (1.0, self.last, self.least_at());
         let is_between = last < least_at && least_at < first;
         if is_between && self.is_above(last, least_at) && self.is_above(first, least_at) {
             Some(Trend::LeastBetween)
@@ -219,6 +224,10 @@ impl<'f, 'a> Told<'f, 'a> {
             },
             damping_ratio: match trend {
                 None => small.blurred(self.of_linear_damper()),
+                Some(Trend::LeastBetween) => {
+                    let least = self.damping_ratio(self.least_at());
+                    large.covering(small.low, small.high).covering(least.low, least.high)
+                }
                 Some(_) => large.covering(small.low, small.high),
             },
             trend,

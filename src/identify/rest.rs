@@ -1,16 +1,24 @@
 //! An end in which nothing swings any more.
 //!
 //! A recording that goes on long after the swing has died away, or after friction has stopped it, has a spectrum of noise. What precedes the rest is used. It is
-//! a rest where the last fifth of the record is white noise, or one and the same value: the mean square of successive differences is then twice the variance
-//! (von Neumann, Ann. Math. Stat. 12 (1941) 367), and next to nothing for an oscillation.
+//! a rest where the last fifth of the record is white noise, by its autocorrelations ρ, or one and the same value:
+//!
+//! ```text
+//! Q = n Σₖ ρₖ²,   k = 1 … m,   χ² of m degrees of freedom of white noise   (Box and Pierce, J. Am. Stat. Assoc. 65 (1970) 1509)
+//! ```
 
+use super::estimate::chi_squared_tail;
 use super::signal::{LinkSamples, Signal};
 use crate::statistics::median;
 
 /// Part of the record that shows whether it ends at rest.
 const LAST: f64 = 0.2;
-/// Half the mean square of successive differences over the variance, at least: 1 of white noise; π²/n² per cycle of an oscillation of n values.
-const WHITE: f64 = 0.6;
+/// Autocorrelations that noise makes in fewer records are a motion's (statistics).
+const LEAST_P: f64 = 1e-3;
+/// Lags at most: some cycles of all that is sampled well.
+const MOST_LAGS: usize = 60;
+/// A scatter below this part of the whole range is the rounding of one and the same value.
+const CONSTANT: f64 = 1e-9;
 /// Standard deviations of the noise beyond which two values in a row are a motion (statistics).
 const MOVES: f64 = 4.5;
 /// A rest shorter than this part of the record does no harm.
@@ -34,8 +42,8 @@ fn last_motion_s(link: &LinkSamples, [from_s, until_s]: [f64; 2]) -> Option<f64>
     }
     let mean = last.iter().sum::<f64>() / last.len() as f64;
     let variance = last.iter().map(|a| (a - mean).powi(2)).sum::<f64>() / last.len() as f64;
-    let successive = last.windows(2).map(|pair| (pair[1] - pair[0]).powi(2)).sum::<f64>() / (last.len() - 1) as f64;
-    if successive < 2.0 * WHITE * variance {
+    let is_constant = variance.sqrt() < CONSTANT * link.range_rad();
+    if !is_constant && !is_white(last, mean, variance) {
         return None;
     }
     let rest_rad = median(&mut last.to_vec())?;
@@ -46,14 +54,27 @@ fn last_motion_s(link: &LinkSamples, [from_s, until_s]: [f64; 2]) -> Option<f64>
     Some(link.t_s[place])
 }
 
+fn is_white(values: &[f64], mean: f64, variance: f64) -> bool {
+    let (n, lags) = (values.len(), MOST_LAGS.min(values.len() / 4));
+    let correlation = |lag: usize| {
+        let products = values.iter().zip(&values[lag..]).map(|(a, b)| (a - mean) * (b - mean));
+        products.sum::<f64>() / (n as f64 * variance)
+    };
+    let squares = (1..=lags).map(|lag| correlation(lag).powi(2)).sum::<f64>();
+    chi_squared_tail(n as f64 * squares, lags as f64) > LEAST_P
+}
+
 #[cfg(test)]
 mod tests {
+    use rand::rngs::Xoshiro256PlusPlus;
+    use rand::{RngExt as _, SeedableRng as _};
+
     use super::*;
 
     fn signal(value: impl Fn(f64) -> f64) -> Signal {
-        let noise = |k: u32| 2e-6 * (f64::from(k * k) * 0.754_877).fract() * 1e3 - 1e-3;
+        let mut rng = Xoshiro256PlusPlus::seed_from_u64(7);
         let t_s: Vec<f64> = (0..1500).map(|k| f64::from(k) / 30.0).collect();
-        let theta_rad = (0..1500).zip(&t_s).map(|(k, t)| value(*t) + noise(k)).collect();
+        let theta_rad = t_s.iter().map(|t| value(*t) + rng.random_range(-1e-3..1e-3)).collect();
         Signal { span_s: [0.0, t_s[1499]], links: vec![LinkSamples { t_s, theta_rad }], step_s: 1.0 / 30.0 }
     }
 
@@ -68,8 +89,8 @@ mod tests {
 
     #[test]
     fn a_swing_that_goes_on_has_no_rest() {
-        for decay in [0.0, 0.01, 0.1] {
-            assert_eq!(rests_from_s(&signal(|t| 0.1 * f64::exp(-decay * t) * (6.0 * t).cos())), None);
+        for (decay, rate) in [(0.0, 6.0), (0.01, 6.0), (0.1, 6.0), (0.02, 36.0), (0.1, 45.0)] {
+            assert_eq!(rests_from_s(&signal(|t| 0.1 * f64::exp(-decay * t) * f64::cos(rate * t))), None);
         }
         // nothing swings at all
         assert_eq!(rests_from_s(&signal(|_| 0.0)), None);
