@@ -180,6 +180,15 @@ fn recordings(
                 kept = rest;
             }
         }
+        // an end that was asked for stays
+        if let Some((rest_s, swing)) = kept.before_standstill().filter(|_| until_s.is_infinite()) {
+            console.warning(format!(
+                "{}: no angle changes from t = {rest_s:.2} s on: equal readings of a rest are one reading; left out, as with --until {:.2}",
+                series.path.display(),
+                swing.t_s[swing.len() - 1]
+            ));
+            kept = swing;
+        }
         Record::of(&kept, marks)
     };
     all.iter().map(record).collect()

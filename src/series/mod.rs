@@ -5,6 +5,7 @@
 mod clock;
 mod columns;
 mod plausible;
+mod standstill;
 
 use std::ops::Range;
 use std::path::{Path, PathBuf};
