@@ -79,6 +79,8 @@ pub struct Verdict {
     pub ratio: Vec<f64>,
     /// Part of each angle's variance that the model explains; negative where it adds to it.
     pub explained: Vec<f64>,
+    /// Mean of each angle's residual where that is most of it.
+    pub offset_rad: Vec<Option<f64>>,
     /// Why even a residual at the noise is no proof.
     pub doubt: Option<Doubt>,
 }
@@ -167,7 +169,8 @@ impl Verdict {
         let explained: Vec<f64> = residuals.values.iter().map(|values| explained(values)).collect();
         let peaks = residuals.values.iter().map(|values| peaks(values)).collect();
         let doubt = doubt(residuals, &explained);
-        Self { departs, peaks, windows, ratio, explained, doubt }
+        let offset_rad = residuals.values.iter().map(|values| offset_rad(values)).collect();
+        Self { departs, peaks, windows, ratio, explained, offset_rad, doubt }
     }
 
     /// The same of a fit, which may have been given up, or have bent what nobody may bend.
@@ -219,8 +222,14 @@ impl Verdict {
             }
             _ => String::new(),
         };
+        let offset = self.offset_rad[link].map_or(String::new(), |offset_rad| {
+            format!(
+                " Most of it is a constant offset of {:.1} mrad: a tilted camera (camera_tilt), a side force (side_force), or angles that are not counted from the vertical.",
+                1e3 * offset_rad
+            )
+        });
         format!(
-            "not reproduced: from {from_s:.2} s on, at an amplitude of {amplitude_rad:.3} rad, θ{} differs by {:.2} mrad rms; {:.0} % of the windows from there on exceed the noise.{drift}{little}",
+            "not reproduced: from {from_s:.2} s on, at an amplitude of {amplitude_rad:.3} rad, θ{} differs by {:.2} mrad rms; {:.0} % of the windows from there on exceed the noise.{drift}{little}{offset}",
             link + 1,
             1e3 * rms_rad,
             1e2 * share,
@@ -236,6 +245,14 @@ impl Verdict {
 /// A share in per cent that never rounds to all of it.
 fn share(of: f64) -> String {
     if of > 0.9999 { "more than 99.99 %".to_owned() } else { format!("{:.2} %", 1e2 * of) }
+}
+
+/// Mean of the residuals, where its square is most of theirs.
+fn offset_rad(values: &[super::Residual]) -> Option<f64> {
+    let n = values.len().max(1) as f64;
+    let mean = values.iter().map(super::Residual::left_rad).sum::<f64>() / n;
+    let square = values.iter().map(|r| r.left_rad().powi(2)).sum::<f64>() / n;
+    (mean * mean > 0.5 * square).then_some(mean)
 }
 
 /// Part of the variance about the mean that the model explains.
