@@ -3,8 +3,6 @@
 //! What is let go at rest stays within 4 % of its range for 0.064 of a period, and passes its middle 0.186 of a period later: 0.34 times that. Let go 2° from the top it stays as long as it then takes to
 //! fall (1.06). What stays half as long again was held.
 
-use std::cmp::Ordering;
-
 use crate::statistics::median;
 
 /// Part of the range within which a hand holds still.
@@ -22,10 +20,9 @@ pub fn released_of(paths: impl Iterator<Item = (Vec<f64>, Vec<f64>)>) -> Option<
     let paths: Vec<(Vec<f64>, Vec<f64>)> = paths.filter(|(t_s, values)| t_s.len() == values.len()).collect();
     // what moves less than the farthest one's noise tells nothing of when it is let go
     let range = paths.iter().filter_map(|(_, values)| range_of(values)).fold(0.0, f64::max);
-    let left = |(t_s, values): &(Vec<f64>, Vec<f64>)| leaves_at(values, range).map(|place| t_s[place]);
-    let first = paths.iter().filter(|path| left(path).is_some());
-    let (t_s, values) = first.min_by(|a, b| left(a).partial_cmp(&left(b)).unwrap_or(Ordering::Equal))?;
-    released_s(t_s, values, range)
+    let left = paths.iter().filter_map(|(t_s, values)| Some((t_s, values, leaves_at(values, range)?)));
+    let (t_s, values, leaves) = left.min_by(|(a, _, i), (b, _, k)| a[*i].total_cmp(&b[*k]))?;
+    released_s(t_s, values, leaves)
 }
 
 /// From the lowest to the highest value, a fiftieth of them apart.
@@ -48,8 +45,7 @@ fn leaves_at(values: &[f64], range: f64) -> Option<usize> {
 }
 
 /// When it is let go: the time of the first value from which on it moves; `None` where it is not held at first.
-fn released_s(t_s: &[f64], values: &[f64], range: f64) -> Option<f64> {
-    let leaves = leaves_at(values, range)?;
+fn released_s(t_s: &[f64], values: &[f64], leaves: usize) -> Option<f64> {
     let middle = median(&mut values[leaves..].to_vec())?;
     let passes: Vec<f64> = (leaves + 1..values.len())
         .filter(|k| (values[*k] > middle) != (values[k - 1] > middle))

@@ -238,6 +238,19 @@ fn two_modes_of_any_ratio_of_strength_are_found() {
 }
 
 #[test]
+fn two_modes_closer_than_the_spectrum_separates_are_told_apart() {
+    for (seed, (duration_s, times)) in [(12.0, 1.06), (12.0, 1.15), (60.0, 1.03)].into_iter().enumerate() {
+        let swings = vec![one_link(1.1, 0.004, 0.15), one_link(1.1 * times, 0.003, 0.1)];
+        let found = Table { duration_s, ..Table::of(swings) }.identified(seed as u64);
+        let what = format!("{times} in {duration_s} s: {found}");
+        assert_eq!(found.modes.len(), 2, "{what}");
+        for frequency_hz in [1.1, 1.1 * times] {
+            assert!(found.modes.iter().any(|mode| mode.frequency_hz.holds(frequency_hz)), "{what}");
+        }
+    }
+}
+
+#[test]
 fn a_growing_amplitude_has_no_damping_ratio() {
     let found = Table::of(vec![one_link(1.1, -0.003, 0.05)]).identified(4);
     assert_bounded(&found, "growing");

@@ -136,11 +136,12 @@ impl<'a> Search<'a, '_> {
         // stretches that a model cannot follow may lead astray from values that were near
         let stated = [problem.start_values()?, shot.x[self.free.len()..].to_vec()].concat();
         let from_stretches = descend(&problem, &robust, shot.x.clone());
-        let astray = from_stretches.as_ref().is_none_or(|end| {
+        let is_astray = |end: &Outcome| {
             // a stop has a false minimum at every turn: no end is worse than where it could have begun
             end.cost > ASTRAY * end.residuals() as f64 || problem.cost(&stated) < end.cost
-        });
-        let from_stated = if astray && !self.free.is_empty() { descend(&problem, &robust, stated) } else { None };
+        };
+        let again = !self.free.is_empty() && from_stretches.as_ref().is_none_or(is_astray);
+        let from_stated = if again { descend(&problem, &robust, stated) } else { None };
         let ends = [from_stretches, from_stated].into_iter().flatten();
         let best = ends.min_by(|a, b| a.cost.total_cmp(&b.cost));
         Ok(best.map(|outcome| End { problem, outcome, shot, begun: experiment.clone() }))

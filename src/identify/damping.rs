@@ -6,9 +6,15 @@ use super::envelope::{Envelope, Step};
 use super::estimate::Estimate;
 
 /// A change of a damping ratio by less than this part is not told (judgement).
-pub(super) const LEAST_CHANGE: f64 = 0.1;
+const LEAST_CHANGE: f64 = 0.1;
 /// A damping ratio goes with amplitude where it changes by more than this many standard deviations (statistics).
-pub(super) const CHANGES: f64 = 3.0;
+const CHANGES: f64 = 3.0;
+
+/// Whether one damping ratio is above another, by more than the standard deviation of their difference allows, and by enough to be told.
+pub(super) fn is_above(high: f64, low: f64, sd: f64) -> bool {
+    let change = high - low;
+    change > CHANGES * sd && change > LEAST_CHANGE * low.abs()
+}
 
 /// ξ, or why the data do not tell it.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -99,10 +105,7 @@ impl Trend {
             [sum / weight, f64::recip(weight).sqrt()]
         };
         let means: Vec<[f64; 2]> = steps.chunks(fifth).map(mean).collect();
-        let above = |a: &[f64; 2], b: &[f64; 2]| {
-            let change = a[0] - b[0];
-            change > CHANGES * a[1].hypot(b[1]).hypot(of_linear_damper * b[0]) && change > LEAST_CHANGE * b[0].abs()
-        };
+        let above = |a: &[f64; 2], b: &[f64; 2]| is_above(a[0], b[0], a[1].hypot(b[1]).hypot(of_linear_damper * b[0]));
         let [large, between @ .., small] = &means[..] else { return Some(Self::Uneven) };
         let amplitudes = steps.first().zip(steps.last()).map(|(a, b)| a.amplitude_rad / b.amplitude_rad);
         let most = means.iter().map(|m| m[0] - 2.0 * m[1]).fold(0.0, f64::max);

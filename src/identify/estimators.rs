@@ -29,7 +29,7 @@ pub enum Method {
     Sinusoids,
     /// Amplitudes and phases of windows; frequency and damping at small amplitude.
     Envelope,
-    /// One oscillation whose frequency and damping go with its amplitude, where the record is too short for many windows.
+    /// One oscillation whose frequency and damping go with its amplitude, where that describes the record.
     Modulated,
 }
 
@@ -68,7 +68,7 @@ pub(super) struct Whole<'a> {
     pub spectrum: &'a Spectrum,
     pub fit: &'a SinusoidFit,
     pub windows: &'a Result<Windows, String>,
-    /// Where the record is too short for many windows.
+    /// Where one oscillation describes the record.
     pub modulated: Option<&'a Modulated>,
     pub noise_rad: &'a [f64],
     pub measured: Measured,
@@ -128,9 +128,11 @@ impl Estimators {
     /// A frequency with an interval that holds those of the record's stretches, where no law of one oscillation describes a record too short for windows: two
     /// modes too close to be told apart, frames that are missing though the stamps go on, a push.
     fn over_stretches(&self, whole: &Whole, frequency_hz: Estimate) -> Estimate {
-        let unexplained = whole.modulated.is_none() && whole.windows.is_err();
-        let range = frequencies_over_hz(whole.signal, whole.fit).filter(|_| unexplained);
-        range.map_or(frequency_hz, |[low, high]| frequency_hz.covering(low, high))
+        if whole.modulated.is_some() || whole.windows.is_ok() {
+            return frequency_hz;
+        }
+        frequencies_over_hz(whole.signal, whole.fit)
+            .map_or(frequency_hz, |[low, high]| frequency_hz.covering(low, high))
     }
 
     /// The laws at small amplitude; the damped sinusoids where the amplitude does not matter or its effect cannot be followed.

@@ -10,7 +10,7 @@
 //! | `rest` | an end in which nothing swings any more |
 //! | [`tumbling`] | a motion that is no swing about rest: no modes |
 //! | [`windows`], [`envelope`], [`decay_law`] | frequency and damping as functions of amplitude |
-//! | [`modulated`], `slow_flow` | the same over a record that is too short for many windows |
+//! | [`modulated`], `slow_flow` | the same over the whole record at once, where one oscillation describes it |
 //! | [`estimators`], [`damping`], [`Mode`] | all of them side by side, and which to take |
 //! | [`equivalents`] | K_eq, C_eq (Eq. 29, 30) |
 //! | [`mod@floor`] | the frequency below which nothing hung can swing |
@@ -209,16 +209,22 @@ impl Identification {
 
     fn with_modes(mut self, signal: Signal, body: Option<&Body>) -> Self {
         self.rests_from_s = rest::rests_from_s(&signal);
-        let signal = self.rests_from_s.map_or_else(|| signal.clone(), |rest_s| signal.until(rest_s));
-        if self.rests_from_s.is_some() {
-            self.spectrum = Spectrum::of(&signal.levelled(), self.record.irregular_share);
-        }
+        let signal = match self.rests_from_s {
+            None => signal,
+            Some(rest_s) => self.only(signal.until(rest_s)),
+        };
         match self.swing_of(signal) {
             Ok((signal, chosen)) => self.add_modes(&signal, chosen, body),
             Err(reason) => self.notes.push(format!("{}{reason}", summary::NOTHING)),
         }
         self.summary = summary::summary(&self);
         self
+    }
+
+    /// A part of the record, whose spectrum is then the one that counts.
+    fn only(&mut self, part: Signal) -> Signal {
+        self.spectrum = Spectrum::of(&part.levelled(), self.record.irregular_share);
+        part
     }
 
     /// The part of the record that is a swing, with its modes; or why there is none.
@@ -228,9 +234,7 @@ impl Identification {
             Some(tumbling) => {
                 let from_s = tumbling.swings_from_s.ok_or_else(|| tumbling.statement.clone())?;
                 self.notes.push(tumbling.statement.clone());
-                let rest = signal.from(from_s);
-                self.spectrum = Spectrum::of(&rest.levelled(), self.record.irregular_share);
-                rest
+                self.only(signal.from(from_s))
             }
         };
         let chosen = modes::choose_modes(&signal, &self.spectrum, self.record.measured)?;

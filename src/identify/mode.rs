@@ -60,7 +60,7 @@ pub struct Mode {
     pub damping_consistency: Option<Consistency>,
     /// Frequency and damping against amplitude, from window to window.
     pub envelope: Option<Envelope>,
-    /// The same over the whole record at once, where it is too short for many windows.
+    /// The same over the whole record at once, where one oscillation describes it.
     pub modulated: Option<Modulated>,
     /// κ that a swing of this shape has without any missing physics.
     pub expected_kappa_per_rad2: Option<f64>,

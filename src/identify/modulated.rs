@@ -1,7 +1,6 @@
 //! One oscillation whose frequency and damping go with its amplitude, over the whole record at once.
 //!
-//! Where a record is too short to be cut into many [`super::windows`], the slow flow (`slow_flow`) still shows how the phase bends as the swing becomes
-//! smaller. Which losses there are, and whether the resting angle drifts, the Bayesian information criterion says. What hung bodies allow of κ enters as an
+//! The slow flow (`slow_flow`) shows how the phase bends as the swing becomes smaller, also where a record is too short to be cut into [`super::windows`]. Which losses there are, and whether the resting angle drifts, the Bayesian information criterion says. What hung bodies allow of κ enters as an
 //! observation, as in [`super::envelope`]; of a displacement nobody knows what angle it is of, and k = κA² is open up to that of a swing of some 70°.
 
 use std::iter;
@@ -9,7 +8,7 @@ use std::iter;
 use nalgebra::{DMatrix, DVector};
 use serde::Serialize;
 
-use super::damping::{CHANGES, LEAST_CHANGE, Trend};
+use super::damping::{Trend, is_above};
 use super::envelope::{Bounds, FrequencyLaw, PENDULUM, THEORY_TOLERANCE};
 use super::estimate::{Estimate, f_tail};
 use super::excess::excess_power;
@@ -163,9 +162,8 @@ impl<'f, 'a> Told<'f, 'a> {
     fn is_above(&self, a: f64, b: f64) -> bool {
         let omega = self.own.omega_rad_s;
         let sd = self.sd([0.0, 0.0, (1.0 / a - 1.0 / b) / omega, 0.0, (a - b) / omega]);
-        let low = self.damping_ratio(b).value;
-        let change = self.damping_ratio(a).value - low;
-        change > CHANGES * sd.hypot(self.of_linear_damper()) && change > LEAST_CHANGE * low.abs()
+        let [high, low] = [a, b].map(|amplitude| self.damping_ratio(amplitude).value);
+        is_above(high, low, sd.hypot(self.of_linear_damper()))
     }
 
     /// The amplitude at which dry friction and drag together are least, over the first one.
@@ -248,15 +246,15 @@ mod tests {
 
     const F0_HZ: f64 = 0.8;
 
-    /// Ten cycles of a pendulum, 60 values a second, with these losses of the angular acceleration, and no noise but that of four digits.
-    fn swing(amplitude_rad: f64, loss: impl Fn(f64) -> f64) -> AngleSeries {
+    /// So many cycles of a pendulum, 60 values a second, with these losses of the angular acceleration, and no noise but that of four digits.
+    fn swing(cycles: f64, amplitude_rad: f64, loss: impl Fn(f64) -> f64) -> AngleSeries {
         let omega = std::f64::consts::TAU * F0_HZ;
         let slope = |[theta, rate]: [f64; 2]| [rate, -omega * omega * theta.sin() - loss(rate)];
         let (steps, dt) = (200, 1.0 / 60.0);
         let h = dt / f64::from(steps);
         let mut y = [amplitude_rad, 0.0];
         let mut rows = Vec::new();
-        for k in 0..(10.0 / F0_HZ / dt) as usize {
+        for k in 0..(cycles / F0_HZ / dt) as usize {
             rows.push((k as f64 * dt, (1e4 * y[0]).round() / 1e4));
             for _ in 0..steps {
                 y = runge_kutta(y, h, slope);
@@ -276,7 +274,7 @@ mod tests {
         ];
         for (name, loss, trend) in losses {
             for amplitude_rad in [0.1, 0.4, 0.8] {
-                let found = identify(&swing(amplitude_rad, loss), None).unwrap();
+                let found = identify(&swing(10.0, amplitude_rad, loss), None).unwrap();
                 let mode = &found.modes[0];
                 let (f, case) = (mode.frequency_hz, format!("{name}, {amplitude_rad} rad: {found}"));
                 assert!(mode.modulated.is_some() && mode.frequency_at_amplitude_rad.is_none(), "{case}");
@@ -289,8 +287,26 @@ mod tests {
     }
 
     #[test]
+    fn sixty_cycles_of_a_viscous_swing_have_one_damping_ratio_and_that_of_drag_and_friction_its_least() {
+        let omega = std::f64::consts::TAU * F0_HZ;
+        let viscous = identify(&swing(60.0, 0.4, |v| 0.02 * v), None).unwrap();
+        let mode = &viscous.modes[0];
+        assert!(mode.frequency_hz.holds(F0_HZ) && mode.frequency_hz.half() < 1e-4 * F0_HZ, "{viscous}");
+        assert!(mode.damping.estimate().unwrap().holds(0.01 / omega) && mode.damping_trend.is_none(), "{viscous}");
+        let (drag, dry) = (0.08, 0.03);
+        let both = identify(&swing(25.0, 0.4, |v| drag * v * v.abs() + dry * (v / 1e-3).tanh()), None).unwrap();
+        let mode = &both.modes[0];
+        assert_eq!(mode.damping_trend, Some(Trend::LeastBetween), "{both}");
+        // of drag 4qA/3π, of friction 2d/πω²A: least where they are alike
+        let pi = std::f64::consts::PI;
+        let least = 2.0 * (4.0 * drag / (3.0 * pi) * 2.0 * dry / (pi * omega * omega)).sqrt();
+        let told = mode.damping.estimate().unwrap();
+        assert!((told.low / least - 1.0).abs() < 0.05, "{least}: {both}");
+    }
+
+    #[test]
     fn a_swing_that_friction_stops_at_once_has_no_slow_flow() {
-        let found = identify(&swing(0.05, |v| 0.15 * (v / 1e-3).tanh()), None).unwrap();
+        let found = identify(&swing(10.0, 0.05, |v| 0.15 * (v / 1e-3).tanh()), None).unwrap();
         assert!(found.modes.iter().all(|mode| mode.modulated.is_none()), "{found}");
     }
 }

@@ -29,8 +29,8 @@ pub(super) fn set_even(t_s: &mut [f64], decimals: usize) -> Option<f64> {
     let by_row = || (0..rows).map(|k| k as f64).collect::<Vec<_>>();
     // where stamps are as coarse as their steps, and rows are left out, the usual step is only nearly theirs
     let usual_s = median_step_s(t_s)?;
-    let steps_s = (0..STEPS_TRIED).map(|k| usual_s * (1.5 - 0.01 * f64::from(k)));
-    let left_out = || steps_s.filter_map(|step_s| line(t_s, &rows_of(t_s, step_s), unit_s)).next();
+    let tried = |k: u32| line(t_s, &rows_of(t_s, usual_s * (1.5 - 0.01 * f64::from(k))), unit_s);
+    let left_out = || (0..STEPS_TRIED).find_map(tried);
     let line = line(t_s, &by_row(), unit_s).or_else(left_out)?;
     let Line { step_s, even_s } = line;
     if t_s.iter().zip(&even_s).all(|(t, even)| (t - even).abs() < EVEN * unit_s) {
