@@ -48,6 +48,7 @@ impl Case {
             t_s,
             theta_rad,
             in_step: 0.0,
+            rounding: 0.0,
             continues: false,
         }
     }

@@ -38,7 +38,8 @@ pub struct FitArgs {
     /// Write measured and simulated angles, and what is left, row by row, as CSV; `-` for standard output.
     #[arg(long, value_name = "FILE")]
     curves: Option<Target>,
-    /// Let a parameter or effect free that the file does not name; may be repeated.
+    /// Let a parameter or effect free that the file does not name, as hinge_coulomb, or links.1.com_m where a length or a mass is not known to a thousandth; may be
+    /// repeated.
     #[arg(long, value_name = "ID")]
     free: Vec<String>,
     /// Keep a parameter at its value in the file; may be repeated.
@@ -64,7 +65,7 @@ impl FitArgs {
         let experiment = super::read_experiment(&self.config, console)?;
         let model = ForwardModel::of(&experiment)?;
         let marks = model.chain().groups().len();
-        let records = super::recordings(&self.angles, marks, (self.from, self.until), console)?;
+        let records = super::recordings(&self.angles, (marks, &experiment), (self.from, self.until), console)?;
         let free = free_parameters(&experiment, marks, &self.free, &self.fix)?;
         if experiment.model.effects.dropped_frames.is_some() {
             let id = Parameter::DroppedFrames.id();
@@ -215,6 +216,14 @@ impl Report<'_> {
         if self.fitted.fit.coloured {
             text.push_str(&paragraph("  ", "The residuals are correlated in time; the intervals are widened for it."));
         }
+        let line = match self.fitted.verdicts.iter().all(Verdict::is_reproduced) {
+            true => "The intervals hold if nothing else acts: what is fitted takes up a force that is left out.",
+            false => {
+                "The intervals do not hold: the recording is not reproduced, and what is fitted takes up what the model lacks."
+            }
+        };
+        let line = &format!("{line} `freeswing diagnose` looks for it.");
+        text.push_str(&paragraph("  ", line));
     }
 
     fn strong_correlations(&self) -> Vec<([&'static str; 2], f64)> {

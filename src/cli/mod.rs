@@ -33,6 +33,7 @@ use words::Target;
 
 use crate::experiment::Experiment;
 use crate::fit::Record;
+use crate::fit::horizon::foretold;
 use crate::output::OutputFile;
 use crate::series::AngleSeries;
 
@@ -154,7 +155,7 @@ fn heard(experiment: Experiment, console: &Console) -> crate::Result<Experiment>
 /// The tables of some recordings, from one stamp until another.
 fn recordings(
     paths: &[PathBuf],
-    marks: usize,
+    (marks, experiment): (usize, &Experiment),
     (from_s, until_s): (f64, f64),
     console: &Console,
 ) -> crate::Result<Vec<Record>> {
@@ -181,6 +182,13 @@ fn recordings(
             }
         }
         // an end that was asked for stays
+        if let Some((caught_s, swing)) = kept.caught().filter(|_| until_s.is_infinite()) {
+            console.warning(format!(
+                "{}: what swings is held still from t = {caught_s:.2} s on, as by a hand, which no model knows of: left out, as with --until {caught_s:.2}",
+                series.path.display()
+            ));
+            kept = swing;
+        }
         if let Some((rest_s, swing)) = kept.before_standstill().filter(|_| until_s.is_infinite()) {
             console.warning(format!(
                 "{}: no angle changes from t = {rest_s:.2} s on: equal readings of a rest are one reading; left out, as with --until {:.2}",
@@ -189,7 +197,24 @@ fn recordings(
             ));
             kept = swing;
         }
-        Record::of(&kept, marks)
+        let record = Record::of(&kept, marks)?;
+        let Some(rows) = foretold(&record, experiment) else { return Ok(record) };
+        let [first_s, last_s] = [record.t_s[rows.start], record.t_s[rows.end - 1]];
+        let (when, option) = match rows.start {
+            0 => (format!("from t = {last_s:.2} s on"), format!("--until {last_s:.2}")),
+            _ => (format!("before t = {first_s:.2} s"), format!("--from {first_s:.2}")),
+        };
+        let lost = format!(
+            "{}: {when} no model can follow this motion: the noise of a few values grows into another motion, as it does where a chain tumbles",
+            series.path.display()
+        );
+        // what was asked for stays
+        if from_s.is_finite() || until_s.is_finite() {
+            console.warning(format!("{lost}; leave that out with {option}"));
+            return Ok(record);
+        }
+        console.warning(format!("{lost}: left out, as with {option}"));
+        Ok(record.rows(rows))
     };
     all.iter().map(record).collect()
 }

@@ -117,6 +117,7 @@ mod tests {
             theta_rad: vec![vec![Some(0.1); 30]; 2],
             relative_sd: vec![vec![1.0; 30]; 2],
             in_step: 0.0,
+            rounding: 0.0,
             continues: false,
         };
         let mut experiment = Experiment::default();

@@ -3,6 +3,7 @@
 use super::effect::{Acts, Effect, Place};
 use super::linearisation::motion_at;
 use super::refit::Refit;
+use crate::fit::problem::switch_on;
 use crate::model::{Parameter, Partials};
 
 /// Root mean square of the torque that the laws added to the base model exert, on all links together (N·m). A support that moves is no law: its
@@ -34,6 +35,19 @@ pub fn energy_shares(fit: &Refit<'_>) -> [f64; 3] {
     }
     let total: f64 = work_j.iter().map(|w| w.max(0.0)).sum();
     if total > 0.0 { work_j.map(|w| w.max(0.0) / total) } else { [0.0; 3] }
+}
+
+/// Energy that a unit of a law would take along a fitted motion, all recordings together (J); the law need not be in the model.
+pub fn work_of_unit_j(fit: &Refit<'_>, parameter: Parameter) -> f64 {
+    let mut with = fit.clone();
+    switch_on(&mut with.problem.experiment, parameter);
+    let mut work_j = 0.0;
+    for record in 0..fit.problem.records.len() {
+        along(&with, record, &[parameter], |step_s, torques, rate| {
+            work_j -= torques[0].iter().zip(rate).map(|(q, omega)| q * omega).sum::<f64>() * step_s;
+        });
+    }
+    work_j
 }
 
 /// Energy that a fitted model dissipates through a recording at hinge, joint and air (J).

@@ -139,6 +139,7 @@ mod tests {
             relative_sd: vec![vec![1.0; 30]; 2],
             t_s,
             in_step: 0.0,
+            rounding: 0.0,
             continues: false,
         }];
         let scatter = Scatter { of_values: 5.0, of_all: 5.0 };

@@ -81,6 +81,8 @@ impl<'a> Findings<'a> {
     pub fn place(&self) -> Option<Place> {
         match self.verdict.status {
             Status::Adequate => None,
+            // a law that has been proven acts where it does
+            Status::Unknown if self.learnt.is_some() => self.learnt.as_ref().and_then(Learnt::place),
             _ => self.unknown_at.or_else(|| self.named_effects().first().map(|effect| effect.place())),
         }
     }

@@ -4,8 +4,8 @@
 //! a · place × state × shape × modulation
 //! place       hinge, joint, strip, tip
 //! state       the angle there, its rate, the wind across the strip
-//! shape       |u|^p sgn u (p = 0 … 3), u², one-sided, with play, a bump, a sign that fades with speed
-//! modulation  1, growing with time, fading with time, from an instant on; of friction also with the angle
+//! shape       |u|^p sgn u (p = 0 … 3), u², constant, one-sided, with play, a bump, a sign that fades with speed
+//! modulation  1, growing with time, fading with time, from an instant on; of what goes with a rate also with the angle, as of a magnet at the lowest point
 //! ```
 //!
 //! Each term has the amplitude `a` and at most two further coefficients, whose starts are parts of the largest state that the recordings visit.
@@ -88,8 +88,9 @@ const POWERS: [Shape; 5] = [
     plain("one-sided", "max(u, 0)", 1),
 ];
 /// Of an angle.
-const OF_ANGLE: [Shape; 3] = [
+const OF_ANGLE: [Shape; 4] = [
     plain("square", "u ^ 2", 2),
+    plain("constant", "1", 0),
     Shape { words: "with play", formula: "sign(u) * max(abs(u) - b, 0)", power: 1, starts: &[&[0.15], &[0.4], &[0.7]] },
     Shape {
         words: BUMP,
@@ -111,9 +112,9 @@ const OF_RATE: [Shape; 1] = [Shape {
 /// How an amplitude changes.
 struct Modulation {
     words: &'static str,
-    /// What the shape is multiplied by; d is a time.
+    /// What the shape is multiplied by; d is a time, or an angle.
     formula: &'static str,
-    /// Starts of d, as parts of the recordings' length.
+    /// Starts of d, as parts of the recordings' length, or of the largest angle.
     starts: &'static [f64],
     /// The powers of rad and s that it has.
     powers: [i32; 2],
@@ -125,9 +126,16 @@ const WITH_TIME: [Modulation; 3] = [
     Modulation { words: "fading with time", formula: "exp(-t / d)", starts: &[0.3], powers: [0, 0] },
     Modulation { words: "from an instant on", formula: "step(t - d)", starts: &[0.35, 0.65], powers: [0, 0] },
 ];
-/// Of a friction, with the angle.
-const WITH_ANGLE: Modulation =
-    Modulation { words: "growing with the square of the angle", formula: "angle ^ 2", starts: &[], powers: [2, 0] };
+/// Of what goes with a rate, with the angle.
+const WITH_ANGLE: [Modulation; 2] = [
+    Modulation { words: "growing with the square of the angle", formula: "angle ^ 2", starts: &[], powers: [2, 0] },
+    Modulation {
+        words: "strongest at the middle",
+        formula: "exp(-(angle / d) ^ 2)",
+        starts: &[0.15, 0.5],
+        powers: [0, 0],
+    },
+];
 
 /// Every term at a place.
 pub fn terms(place: LawPlace, largest: Largest) -> Vec<Term> {
@@ -152,9 +160,10 @@ fn of_state(place: LawPlace, state: &'static str, largest: Largest) -> Vec<Term>
         // what changes is plain: a damper, a spring, a dry friction
         let is_plain = shape.starts.is_empty() && shape.words != "one-sided";
         let of_time = WITH_TIME.iter().filter(|_| is_plain && shape.power < 2);
-        let of_angle = std::iter::once(&WITH_ANGLE).filter(|_| is_plain && state == "rate");
-        for modulation in of_time.chain(of_angle) {
-            let times = modulation.starts.iter().map(|part| Some(part * largest.time_s));
+        let of_angle = WITH_ANGLE.iter().filter(|_| is_plain && state == "rate");
+        let of_time = of_time.map(|modulation| (modulation, largest.time_s));
+        for (modulation, most) in of_time.chain(of_angle.map(|modulation| (modulation, largest.angle))) {
+            let times = modulation.starts.iter().map(|part| Some(part * most));
             let times: Vec<Option<f64>> = if modulation.starts.is_empty() { vec![None] } else { times.collect() };
             all.extend(times.into_iter().map(|d| term(place, state, (shape, &[]), Some((modulation, d)))));
         }
@@ -172,7 +181,8 @@ fn term(
     let coefficient = |start: f64, min: Option<f64>, unit: &str| Coefficient { start, min, unit: unit.to_owned() };
     let times = changes.map_or(String::new(), |(modulation, _)| format!(" * {}", modulation.formula));
     let of_its_state = with_words(shape.formula, |word| (word == "u").then(|| state.to_owned()));
-    let formula = format!("-a * {of_its_state}{times}");
+    let of_its_state = if shape.formula == "1" { String::new() } else { format!(" * {of_its_state}") };
+    let formula = format!("-a{of_its_state}{times}");
     let of_state = match state {
         "angle" => "rad",
         "rate" => "rad/s",
@@ -187,7 +197,8 @@ fn term(
         parameters.insert(name.to_owned(), coefficient(*start, least, of_state));
     }
     if let Some(d) = changes.and_then(|(_, d)| d) {
-        parameters.insert("d".to_owned(), coefficient(d, Some(1e-3 * d), "s"));
+        let unit = if times.contains("angle") { "rad" } else { "s" };
+        parameters.insert("d".to_owned(), coefficient(d, Some(1e-3 * d), unit));
     }
     let law = Law { name: "learnt".to_owned(), place, formula, parameters };
     let modulation = changes.map_or("none", |(modulation, _)| modulation.words);
@@ -289,6 +300,8 @@ mod tests {
         assert_eq!(unit(LawPlace::Joint, "-a * angle ^ 2"), "N m/rad2");
         assert_eq!(unit(LawPlace::Hinge, "-a * angle * t"), "N m/rad/s");
         assert_eq!(unit(LawPlace::Hinge, "-a * sign(rate) * angle ^ 2"), "N m/rad2");
+        assert_eq!(unit(LawPlace::Hinge, "-a"), "N m");
+        assert_eq!(unit(LawPlace::Hinge, "-a * rate * exp(-(angle / d) ^ 2)"), "N m s/rad");
         assert_eq!(unit(LawPlace::Strip, "-a * wind * abs(wind)"), "N/m s2/m2");
     }
 }

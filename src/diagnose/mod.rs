@@ -6,7 +6,7 @@
 //! | 2 | the base model is fitted | [`taken`], [`base`], [`context`], [`refit`], [`descents`], [`noise`], [`learnt_noise`] |
 //! | 3 | what it lacks is sought: effects are proposed, fitted, kept | [`mod@search`], [`screen`], [`stretches`], [`misfit`], [`laws`] |
 //! | 4 | a strip's rods are counted; where two links are found to be a strip, what it lacks is sought | [`rods`], [`mod@search`] |
-//! | 5 | the hypotheses are weighed, beside something that is not in the table | [`posterior`], [`evidence`], [`bag`], [`unknowns`], [`latent`], [`basis_law`] |
+//! | 5 | the hypotheses are weighed, beside something that is not in the table | [`posterior`], [`evidence`], [`bag`], [`unknowns`], [`rounding`], [`latent`], [`basis_law`] |
 //! | 6 | in doubt the search goes on, in pieces of the recordings where these are long enough, and they are weighed again | [`mod@search`], [`preparation`], [`search::horizon`] |
 //! | 7 | what was not fitted is predicted | [`heldout`] |
 //! | 8 | what the names leave is learnt, as a law that no table holds | [`learnt`], [`grammar`] |
@@ -46,6 +46,7 @@ pub mod quantity;
 pub mod refit;
 pub mod report;
 pub mod rods;
+pub mod rounding;
 pub mod screen;
 pub mod search;
 pub mod settings;

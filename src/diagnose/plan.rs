@@ -75,6 +75,7 @@ fn recorded(experiment: &Experiment, plan: &Plan) -> Result<Record> {
         relative_sd: vec![vec![1.0; rows]; marks],
         t_s,
         in_step: 0.0,
+        rounding: 0.0,
         continues: false,
     })
 }

@@ -9,8 +9,10 @@ use super::latent::{Assumed, Latent};
 use super::laws::law_of;
 use super::misfit::{leaves_more_than_noise, most_of_noise, needs};
 use super::refit::{self, Refit};
+use super::rounding::rounded;
 use super::settings::Settings;
 use super::unknowns::unknowns;
+use crate::fit::Record;
 use crate::fit::whitening::RecordNoise;
 
 /// Probabilities below this change nothing.
@@ -78,8 +80,10 @@ pub fn weigh<'a>(fits: Vec<Refit<'a>>, effects: usize, compared: &Compared, sett
     let best = (0..fits.len()).max_by(|a, b| posterior[*a].total_cmp(&posterior[*b])).unwrap_or(0);
     let latents = unknowns(&fits[best], fits[best].chi2 / values as f64, Assumed::BESIDE);
     let law_error_n_m = law_error_n_m(&fits[best], added_torque_n_m(&fits[best]));
-    let gain = unknown_gain(&latents, law_error_n_m, slow_errors_rad(&fits[best]), settings.noise.coloured)
-        .max(gain_over_a_failed_fit(&fits[best], scatter, settings));
+    let coloured = settings.noise.coloured;
+    let gain = (unknown_gain(&latents, law_error_n_m, slow_errors_rad(&fits[best]), coloured)
+        - gain_of_rounding(&fits[best], law_error_n_m, coloured))
+    .max(gain_over_a_failed_fit(&fits[best], scatter, settings));
     posterior.push(posterior[best] + settings.prior.unknown.ln() + gain);
     let rivals = uncertified_within_reach(&fits, best, settings);
     let mut at_best = posterior.clone();
@@ -213,10 +217,12 @@ fn law_error_n_m(fit: &Refit<'_>, added_n_m: f64) -> f64 {
     fit.hypothesis.effects.iter().map(part).fold(0.0, f64::max) * added_n_m
 }
 
-/// The errors that tracked angles may have from one swing to the next, as large as those in step with it.
+/// The errors that tracked or rounded angles may have from one swing to the next, as large as those in step with it.
 fn slow_errors_rad(fit: &Refit<'_>) -> f64 {
-    let of_record = |noise: &RecordNoise| noise.in_step * noise.sd_rad.iter().copied().fold(0.0, f64::max);
-    fit.problem.noise.iter().map(of_record).fold(0.0, f64::max)
+    let of_record = |(noise, record): (&RecordNoise, &Record)| {
+        noise.in_step.max(record.rounding) * noise.sd_rad.iter().copied().fold(0.0, f64::max)
+    };
+    fit.problem.noise.iter().zip(fit.problem.records).map(of_record).fold(0.0, f64::max)
 }
 
 /// How much likelier an unknown of any size makes the recordings than one that a law's own error, or the tracker's, allows.
@@ -233,6 +239,17 @@ fn unknown_gain(latents: &[Latent], law_error_n_m: f64, slow_errors_rad: f64, co
     // any size is as likely as any other, at any place
     let looks: usize = latents.iter().map(|l| l.tried.len()).sum();
     latents.iter().map(of).fold(f64::NEG_INFINITY, f64::max) - (looks.max(1) as f64).ln()
+}
+
+/// The same of an encoder's rounding of the fit itself: so much an unknown gains where there is none.
+fn gain_of_rounding(fit: &Refit<'_>, law_error_n_m: f64, coloured: f64) -> f64 {
+    let gain = |records: Vec<Record>| {
+        let (mut made, values) = (fit.clone(), fit.values() as f64);
+        made.problem.records = &records;
+        let latents = unknowns(&made, fit.chi2 / values, Assumed::BESIDE);
+        unknown_gain(&latents, law_error_n_m, slow_errors_rad(&made), coloured)
+    };
+    rounded(fit).into_iter().map(gain).fold(0.0, f64::max)
 }
 
 /// How much likelier anything that leaves only noise makes the recordings than a fit that failed: one that leaves far more, being out of step with a recording, shows no

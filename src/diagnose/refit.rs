@@ -279,6 +279,7 @@ mod tests {
             theta_rad,
             relative_sd: vec![vec![1.0; 30]; 2],
             in_step: 0.0,
+            rounding: 0.0,
             continues: false,
         }];
         let met = |own: f64, other: f64| {

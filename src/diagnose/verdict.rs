@@ -3,7 +3,6 @@
 use super::effect::Effect;
 use super::heldout::HeldOut;
 use super::posterior::{Candidate, Posterior, left_of_excess};
-use super::refit::Refit;
 use super::settings::Settings;
 
 /// What the recordings say.
@@ -46,6 +45,8 @@ pub struct Verdict {
     pub effects: Vec<Effect>,
     /// Every effect that the recordings do not tell from them.
     pub class: Vec<Effect>,
+    /// Those of the class that may only be at work beside the names, in the place of none.
+    pub companions: Vec<Effect>,
     /// Of the answer as it is given.
     pub probability: f64,
     /// That the truth is one of the hypotheses that make up the class.
@@ -67,6 +68,7 @@ impl Verdict {
             status,
             effects: Vec::new(),
             class: Vec::new(),
+            companions: Vec::new(),
             probability,
             class_probability: probability,
             unknown,
@@ -80,19 +82,18 @@ impl Verdict {
             let predicts = proof.is_some_and(|proof| proof.leaves() <= settings.verdict.proven);
             let inclusions = posterior.inclusions(settings);
             let is_likely = inclusions.iter().any(|own| own.1 > settings.verdict.even);
-            // where another law takes the place of the name that explains most, the others may complete what is not there
-            let leading = posterior.by_what_they_explain(best).first().copied();
-            let is_replaced =
-                posterior.needed.iter().any(|own| Some(own.0) == leading && own.1 < settings.verdict.even);
-            let stand = is_likely && !is_replaced && (leaves_little || predicts);
+            let stand = is_likely && replaced(posterior, settings).is_none() && (leaves_little || predicts);
             return if stand {
-                Self::standing(&inclusions, best, marks, settings)
+                Self::standing(&inclusions, posterior, marks, settings)
             } else {
                 nothing(Status::Unknown, unknown)
             };
         }
         if adequate >= named {
             return nothing(Status::Adequate, adequate);
+        }
+        if let Some(replaced) = replaced(posterior, settings) {
+            return nothing(Status::Unknown, replaced);
         }
         Self::naming(weighed, |w| w.probability, unknown, marks, settings)
     }
@@ -105,7 +106,8 @@ impl Verdict {
 
     /// Names beside which something remains: the effects that are more probable than not, which is the median probability model (Barbieri and Berger, Annals of
     /// Statistics 32 (2004) 870), that of all sets predicts best where none takes all; and the class of what the recordings do not tell from them.
-    fn standing(inclusions: &[(Effect, f64)], best: &Refit<'_>, marks: usize, settings: &Settings) -> Self {
+    fn standing(inclusions: &[(Effect, f64)], posterior: &Posterior<'_>, marks: usize, settings: &Settings) -> Self {
+        let best = posterior.best();
         let from = |least: f64| inclusions.iter().filter(move |own| own.1 > least);
         let least = from(settings.verdict.even).map(|own| own.1).fold(1.0, f64::min);
         let is_clear = least >= settings.verdict.alone && best.is_certified(&settings.certificate);
@@ -114,11 +116,14 @@ impl Verdict {
         if !is_clear {
             class.extend(from(settings.verdict.told_apart).map(|own| own.0).filter(|effect| !effects.contains(effect)));
         }
+        let companions =
+            companions(&posterior.candidates, |w| w.in_layers, (&effects, &class), settings.verdict.told_apart);
         Self {
             status: if is_clear { Status::Identified } else { Status::Ambiguous },
-            to_decide: to_decide(&effects, &class, marks),
+            to_decide: to_decide(&effects, &without(&class, &companions), marks),
             effects,
             class,
+            companions,
             probability: least,
             class_probability: least,
             unknown: 1.0 - least,
@@ -141,11 +146,40 @@ impl Verdict {
         if status == Status::Identified {
             class.clone_from(&effects);
         }
-        let to_decide = to_decide(&effects, &class, marks);
+        let companions = companions(weighed, &probability, (&effects, &class), settings.verdict.told_apart);
+        let to_decide = to_decide(&effects, &without(&class, &companions), marks);
         let within = |w: &&&Candidate<'_>| w.fit.hypothesis.effects.iter().all(|c| class.contains(c));
         let class_probability = named.iter().filter(within).map(|w| probability(w)).sum();
-        Self { status, effects, class, probability: probability(best), class_probability, unknown, to_decide }
+        let probability = probability(best);
+        Self { status, effects, class, companions, probability, class_probability, unknown, to_decide }
     }
+}
+
+/// Where another law takes the place of the name that explains most, how likely that is: the other names may complete what is not there.
+fn replaced(posterior: &Posterior<'_>, settings: &Settings) -> Option<f64> {
+    let leading = posterior.by_what_they_explain(posterior.best()).first().copied()?;
+    let needed = posterior.needed.iter().find(|own| own.0 == leading).map(|own| own.1)?;
+    (needed < settings.verdict.even).then_some(1.0 - needed)
+}
+
+/// Those of a class that no likely hypothesis has in the place of one of the names.
+fn companions(
+    weighed: &[Candidate<'_>],
+    probability: impl Fn(&Candidate<'_>) -> f64,
+    (names, class): (&[Effect], &[Effect]),
+    told_apart: f64,
+) -> Vec<Effect> {
+    let best = with_names(weighed).map(&probability).fold(0.0, f64::max);
+    let has_all = |w: &Candidate<'_>| names.iter().all(|name| w.fit.hypothesis.has(*name));
+    let instead = |effect: Effect| {
+        let mut likely = with_names(weighed).filter(|w| probability(w) > told_apart * best && !has_all(w));
+        likely.any(|w| w.fit.hypothesis.has(effect))
+    };
+    class.iter().copied().filter(|effect| !names.contains(effect) && !instead(*effect)).collect()
+}
+
+fn without(class: &[Effect], some: &[Effect]) -> Vec<Effect> {
+    class.iter().copied().filter(|effect| !some.contains(effect)).collect()
 }
 
 /// The hypotheses that have effects, likeliest first.

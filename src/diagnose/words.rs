@@ -2,7 +2,7 @@
 
 use std::fmt::Write;
 
-use super::effect::{Effect, Place};
+use super::effect::{Effect, Phase, Place};
 use super::findings::Findings;
 use super::grammar::Term;
 use super::misfit::is_beyond_noise;
@@ -37,8 +37,12 @@ impl Findings<'_> {
                 format!("Missing: {} ({percent:.0} %).{}{}", words(&verdict.effects), self.remark(), self.more())
             }
             Status::Ambiguous => {
-                let others = if verdict.class.len() > verdict.effects.len() {
-                    format!(", but the recording does not tell it from others: {}", names(&verdict.class, ""))
+                let rivals: Vec<Effect> =
+                    verdict.class.iter().copied().filter(|effect| !verdict.companions.contains(effect)).collect();
+                let others = if rivals.len() > verdict.effects.len() {
+                    format!(", but the recording does not tell it from others: {}", names(&rivals, ""))
+                } else if !verdict.companions.is_empty() {
+                    format!(", perhaps together with others: {}", names(&verdict.companions, ""))
                 } else {
                     format!(", or something outside the table that it resembles ({:.0} %)", 1e2 * verdict.unknown)
                 };
@@ -198,20 +202,26 @@ impl Findings<'_> {
             Place::Camera if self.verdict.class.iter().any(|effect| effect.place() != Place::Camera) => {
                 "It is an error of the camera, or a cause that the recording does not tell from one"
             }
+            Place::Camera if self.verdict.status == Status::Unknown => {
+                "It looks like an error of what measures the angles rather than of the model"
+            }
             Place::Camera => "It is an error of the camera, not of the model",
         }
         .to_owned();
-        if let Some(phase) = self.phase().filter(|_| place != Place::Camera) {
+        let phase = self.phase().filter(|_| place != Place::Camera);
+        if let Some(phase) = phase {
             let _ = write!(statement, ", in phase with the {}", phase.id());
         }
         if let (Some([from_s, until_s]), Some([least, most])) = (departure.time_s, departure.amplitude_rad) {
             let _ = write!(
                 statement,
-                "; the base model departs from {from_s:.2} s to {until_s:.2} s, at amplitudes of {least:.3} to {most:.3} rad"
+                "; the base model departs from {:.2} s to {until_s:.2} s, at amplitudes of {least:.3} to {most:.3} rad",
+                // no stamp of next to nothing is said to be less than that
+                if from_s.abs() < 5e-3 { 0.0 } else { from_s }
             );
         }
-        if let Some(torque) = self.missing_torque.as_ref().filter(|t| t.place != Place::Camera) {
-            let _ = write!(statement, ". {}", words_of_torque(torque));
+        if let Some(torque) = self.missing_torque.as_ref().filter(|t| t.place != Place::Camera && t.place == place) {
+            let _ = write!(statement, ". {}", words_of_torque(torque, phase));
         }
         let shares = energy_shares;
         if shares.iter().sum::<f64>() > 0.0 {
@@ -252,13 +262,14 @@ fn in_place(place: Place) -> &'static str {
 }
 
 /// What the smoothed torque says by itself.
-fn words_of_torque(torque: &MissingTorque) -> String {
+fn words_of_torque(torque: &MissingTorque, phase: Option<Phase>) -> String {
     let place = in_place(torque.place);
     let mut words = format!("A torque without a law would do {place}, of {} N m rms", number(torque.rms, 2));
     if let Some(hz) = torque.frequency_hz {
         let _ = write!(words, ", strongest at {hz:.2} Hz");
     }
-    if let Some(share) = torque.energy_share {
+    // what goes with the position takes and gives back
+    if let Some(share) = torque.energy_share.filter(|_| phase != Some(Phase::Position)) {
         let does = if share < 0.0 { "puts in as much as" } else { "takes" };
         // it is estimated beside the energy lost, and nothing takes more than all of it
         let _ = write!(words, ", that {does} {:.0} % of the energy lost", 1e2 * share.abs().min(1.0));

@@ -7,6 +7,7 @@
 //! | [`noise`] | its noise, from the angles alone |
 //! | [`seen`] | its modes, without the model |
 //! | [`pace`] | how fast it swings beside the specimen: wrong lengths, clocks and units |
+//! | [`horizon`] | how far a motion can be foretold |
 //! | [`predict`] | what the model says the camera sees |
 //! | [`problem`] | what is fitted to what |
 //! | [`begin`] | where a fit begins: with the seen modes |
@@ -24,6 +25,7 @@
 pub mod base;
 pub mod begin;
 pub mod descent;
+pub mod horizon;
 pub mod interval;
 pub mod noise;
 pub mod pace;

@@ -49,19 +49,48 @@ pub fn least_noise_rad(records: &[Record], record: usize, link: usize) -> f64 {
 
 /// Of an angle that is known in steps of q, as an encoder's is, q/√12, however often it stays the same.
 fn least_rad(angles: &[Option<f64>]) -> f64 {
+    step_rad(angles).map_or(LEAST_RAD, |step_rad| (step_rad / 12f64.sqrt()).max(LEAST_RAD))
+}
+
+/// In which an angle is known, where it is in steps.
+pub fn step_rad(angles: &[Option<f64>]) -> Option<f64> {
     let mut values: Vec<f64> = angles.iter().flatten().copied().collect();
     let rows = values.len();
     values.sort_unstable_by(f64::total_cmp);
     let mut gaps: Vec<f64> = values.windows(2).map(|pair| pair[1] - pair[0]).filter(|gap| *gap > LEAST_RAD).collect();
     if rows < ROWS_OF_A_VALUE * (gaps.len() + 1) || gaps.is_empty() {
-        return LEAST_RAD;
+        return None;
     }
     gaps.sort_unstable_by(f64::total_cmp);
-    let step_rad = gaps[(BETWEEN_STEPS * gaps.len() as f64) as usize];
-    (step_rad / 12f64.sqrt()).max(LEAST_RAD)
+    Some(gaps[(BETWEEN_STEPS * gaps.len() as f64) as usize])
 }
 
-fn of_angle(t_s: &[f64], angles: &[Option<f64>]) -> f64 {
+/// The part of an encoder's rounding that is in step with the swing, over all of its noise: the largest of the angles'; 0 where none is in steps.
+///
+/// Of a swing of amplitude A about a step q of the encoder the rounding error has, at the swing's frequency, the amplitude (Widrow and Kollár, Quantization Noise,
+/// 2008, app. G)
+///
+/// ```text
+/// |Σₖ (−1)ᵏ 2q/πk J₁(2πkA/q) exp(−2π²k²σ²/q²)|  ≲  2q/π √(q/A)/π exp(−2π²σ²/q²)      σ: noise before it is rounded
+/// ```
+///
+/// and as much at each odd multiple up to 2πA/q.
+pub fn rounding_in_step(t_s: &[f64], theta_rad: &[Vec<Option<f64>>]) -> f64 {
+    let of = |angles: &Vec<Option<f64>>| {
+        let step_rad = step_rad(angles)?;
+        let ends = angles.iter().flatten().fold([f64::INFINITY, f64::NEG_INFINITY], |[l, h], a| [l.min(*a), h.max(*a)]);
+        let steps = (0.5 * (ends[1] - ends[0]) / step_rad).max(1.0);
+        let noise2 = (of_angle(t_s, angles) / step_rad).powi(2);
+        let before2 = (noise2 - 1.0 / 12.0).max(0.0);
+        let pi2 = std::f64::consts::PI.powi(2);
+        let rms = 2f64.sqrt() / (pi2 * steps.sqrt()) * (-2.0 * pi2 * before2).exp();
+        Some(rms / noise2.sqrt())
+    };
+    theta_rad.iter().filter_map(of).fold(0.0, f64::max)
+}
+
+/// Standard deviation of one angle's noise.
+pub fn of_angle(t_s: &[f64], angles: &[Option<f64>]) -> f64 {
     let step_s = median_step_s(t_s).unwrap_or(1.0);
     let differences = ORDERS.filter_map(|order| Differences::of(t_s, angles, step_s, order));
     let Some(neighbours) = differences.min_by(|a, b| a.sd.total_cmp(&b.sd)) else { return least_rad(angles) };
@@ -184,6 +213,7 @@ mod tests {
             t_s,
             theta_rad,
             in_step: 0.0,
+            rounding: 0.0,
             continues: false,
         }
     }
@@ -226,6 +256,34 @@ mod tests {
         record.theta_rad[0] = record.t_s.iter().map(stepped).collect();
         let found = noise_rad(&record)[0];
         assert!((found / step_rad * 12f64.sqrt() - 1.0).abs() < 0.2, "{found}");
+    }
+
+    #[test]
+    fn the_rounding_of_an_encoder_is_in_step_with_a_small_swing() {
+        let step_rad = 6e-3;
+        let t_s: Vec<f64> = (0..3000).map(|i| f64::from(i) / 100.0).collect();
+        let share = |amplitude_rad: f64| {
+            // rounded at amplitudes around this one, as a swing has them that decays
+            let projected = |k: usize| {
+                let amplitude_rad = amplitude_rad + step_rad * k as f64 / 40.0;
+                let phase = |t: &f64| 5.3 * t;
+                let errors = t_s.iter().map(|t| {
+                    let angle = amplitude_rad * phase(t).sin();
+                    ((angle / step_rad).round() * step_rad - angle) * phase(t).sin()
+                });
+                (errors.sum::<f64>() / t_s.len() as f64 * 2f64.sqrt() / (step_rad / 12f64.sqrt())).powi(2)
+            };
+            let found = vec![
+                t_s.iter().map(|t| Some((amplitude_rad * (5.3 * t).sin() / step_rad).round() * step_rad)).collect(),
+            ];
+            (rounding_in_step(&t_s, &found), ((0..80).map(projected).sum::<f64>() / 80.0).sqrt())
+        };
+        for amplitude_rad in [0.05, 0.1, 0.3] {
+            // the envelope of the first term is √2/√ζ(3) times the root of the mean square of all
+            let (told, usual) = share(amplitude_rad);
+            assert!((told / usual / (2.0f64 / 1.202).sqrt() - 1.0).abs() < 0.15, "{amplitude_rad}: {told} {usual}");
+        }
+        assert_eq!(rounding_in_step(&t_s, &[t_s.iter().map(|t| Some((5.3 * t).sin())).collect()]), 0.0);
     }
 
     #[test]

@@ -9,8 +9,10 @@ use crate::experiment::Experiment;
 
 /// Below this share the air that swings along, a joint or a clock may be the reason: it is said beside them.
 const LARGE: f64 = 0.15;
-/// Below this share a difference is no news.
-const SMALL: f64 = 0.005;
+/// Below this share a difference is no news: half a millimetre in a quarter of a metre.
+const SMALL: f64 = 0.001;
+/// Below this share it is told to five digits.
+const NEAR: f64 = 0.1;
 /// Beyond this ratio no motion of the model can follow the recording at all, and its least squares mean nothing. Units differ by more: a square root of 39 for
 /// inches, of 100 and of 1000 for centimetres and millimetres.
 const HOPELESS: f64 = 5.0;
@@ -82,9 +84,11 @@ impl Pace {
         let ratio = self.ratio();
         let (times, way) = if ratio > 1.0 { (ratio, "faster") } else { (1.0 / ratio, "slower") };
         let body = if self.links == 1 { "a pendulum" } else { "a specimen" };
+        // a small difference needs more digits
+        let digits = |value: f64| significant(value, if times - 1.0 < NEAR { 5 } else { 3 });
+        let by = digits(times);
         let mut text = format!(
-            "The recording swings {} times {way} than {body} of {} m as the file describes it ({:.4} Hz, {:.4} Hz): ",
-            digits(times),
+            "The recording swings {by} times {way} than {body} of {} m as the file describes it ({:.4} Hz, {:.4} Hz): ",
             digits(self.length_m),
             self.seen_hz,
             self.model_hz
@@ -191,12 +195,12 @@ fn agm(mut a: f64, mut b: f64) -> f64 {
     a
 }
 
-/// Three significant digits.
-fn digits(value: f64) -> String {
+/// So many significant digits.
+fn significant(value: f64, digits: i32) -> String {
     let magnitude = value.abs().max(1e-12).log10().floor() as i32;
     if !(-4..6).contains(&magnitude) {
         return format!("{value:.2e}");
     }
-    let text = format!("{value:.*}", (2 - magnitude).max(0) as usize);
+    let text = format!("{value:.*}", (digits - 1 - magnitude).max(0) as usize);
     if text.contains('.') { text.trim_end_matches('0').trim_end_matches('.').to_owned() } else { text }
 }

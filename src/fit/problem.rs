@@ -314,7 +314,8 @@ pub fn stacked(blocks: &[Block], variables: usize) -> (DVector<f64>, DMatrix<f64
     (residual, slopes)
 }
 
-fn switch_on(experiment: &mut Experiment, parameter: Parameter) {
+/// Switches a law on with a coefficient of zero, where it is off.
+pub fn switch_on(experiment: &mut Experiment, parameter: Parameter) {
     let effects = &mut experiment.model.effects;
     let on = |effect: &mut Option<f64>| {
         effect.get_or_insert(0.0);

@@ -3,6 +3,7 @@
 use std::ops::Range;
 use std::path::PathBuf;
 
+use super::noise::rounding_in_step;
 use crate::error::{Error, Result};
 use crate::series::AngleSeries;
 use crate::statistics::median;
@@ -24,6 +25,9 @@ pub struct Record {
     pub relative_sd: Vec<Vec<f64>>,
     /// Errors in step with the swing that each angle may have, as a share of its noise: none where the table holds nothing but angles.
     pub in_step: f64,
+    /// The part of an encoder's rounding that is in step with the swing, as a share of its noise ([`rounding_in_step`]). The recorded angles, rounded themselves, do
+    /// not show where it is.
+    pub rounding: f64,
     /// Whether it goes on where the record before it ends: a piece of the same recording, with a start of its own.
     pub continues: bool,
 }
@@ -50,6 +54,7 @@ impl Record {
             theta_rad: series.theta_rad.clone(),
             relative_sd,
             in_step: if series.tracked { TRACKED_IN_STEP } else { 0.0 },
+            rounding: if series.tracked { 0.0 } else { rounding_in_step(&series.t_s, &series.theta_rad) },
             continues: false,
         })
     }
@@ -60,14 +65,22 @@ impl Record {
         self.rows(0..row)
     }
 
+    /// The rows from one on.
+    #[must_use]
+    pub fn from_row(&self, row: usize) -> Self {
+        self.rows(row..self.len())
+    }
+
     /// Some rows.
-    fn rows(&self, rows: Range<usize>) -> Self {
+    #[must_use]
+    pub fn rows(&self, rows: Range<usize>) -> Self {
         Self {
             path: self.path.clone(),
             t_s: self.t_s[rows.clone()].to_vec(),
             theta_rad: self.theta_rad.iter().map(|column| column[rows.clone()].to_vec()).collect(),
             relative_sd: self.relative_sd.iter().map(|column| column[rows.clone()].to_vec()).collect(),
             in_step: self.in_step,
+            rounding: self.rounding,
             continues: self.continues,
         }
     }
@@ -207,6 +220,7 @@ mod tests {
             theta_rad: vec![(0..rows).map(|row| (row % 7 > 0).then_some(row as f64)).collect(); 2],
             relative_sd: vec![vec![1.0; rows]; 2],
             in_step: 0.25,
+            rounding: 0.0,
             continues: false,
         }
     }

@@ -95,7 +95,7 @@ fn modes_of_degrees(series: &AngleSeries) -> Vec<SeenMode> {
 
 /// The modes of a known frequency, slowest first.
 fn clear_modes(found: &Identification) -> Vec<SeenMode> {
-    let mut modes: Vec<SeenMode> = found.modes.iter().map(SeenMode::of).collect();
+    let mut modes: Vec<SeenMode> = found.modes.iter().chain(&found.may_be_harmonics).map(SeenMode::of).collect();
     modes.retain(|mode| mode.frequency_hz > 0.0 && mode.vague < VAGUE);
     modes.sort_by(|a, b| a.frequency_hz.total_cmp(&b.frequency_hz));
     modes

@@ -278,6 +278,7 @@ mod tests {
                 theta_rad,
                 relative_sd: vec![vec![1.0; rows]; 2],
                 in_step: 0.0,
+                rounding: 0.0,
                 continues: false,
             },
             states,

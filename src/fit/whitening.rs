@@ -246,6 +246,7 @@ mod tests {
             relative_sd: vec![vec![1.0; 200]; 2],
             t_s,
             in_step: 0.25,
+            rounding: 0.0,
             continues: false,
         }
     }

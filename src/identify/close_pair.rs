@@ -9,6 +9,7 @@
 //! - no pair where one such oscillation describes the record as well ([`super::modulated`], by the Bayesian information criterion).
 
 use super::excess::residual_excess;
+use super::mode::Mode;
 use super::modulated::Modulated;
 use super::pencil::matrix_pencil;
 use super::pole::Pole;
@@ -50,6 +51,19 @@ pub(super) fn close_pair(signal: &Signal, one: &SinusoidFit, measured: Measured)
         && Modulated::criterion(averaged, one, measured).is_none_or(better);
     let pair = is_better.then_some(pair)?;
     SinusoidFit::with_drift(signal, one.origin_s, &pair.poles, drift_terms)
+}
+
+/// What two modes so close of a single link mean, which in one plane has but one.
+pub(super) fn of_one_link(modes: &[Mode]) -> Option<String> {
+    let [a, b] = modes else { return None };
+    let [low_hz, high_hz] =
+        [a.frequency_hz.value.min(b.frequency_hz.value), a.frequency_hz.value.max(b.frequency_hz.value)];
+    (high_hz < FARTHEST * low_hz).then(|| {
+        format!(
+            "one link has one mode in one plane, and two are seen {:.1} % apart: it swings in two planes and is seen from one side, as a string whose ellipse turns, or a neighbour swings along; look at it from below, or let it swing on two strings, before using either damping ratio",
+            100.0 * (high_hz / low_hz - 1.0)
+        )
+    })
 }
 
 fn leaves_noise(signal: &Signal, fit: &SinusoidFit) -> bool {

@@ -130,7 +130,7 @@ impl Trend {
             Self::GrowsWithAmplitude => "grows with amplitude, as drag does",
             Self::FallsWithAmplitude => "grows as the swing becomes small, as dry friction does",
             Self::LeastBetween => "least at a middle amplitude: dry friction below it, drag above",
-            Self::Uneven => "not the same over the record",
+            Self::Uneven => "changing as neither friction nor drag makes it",
         }
     }
 }

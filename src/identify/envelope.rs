@@ -155,6 +155,12 @@ impl Envelope {
         self.damping.filter(|law| law.p_value >= 0.01).map(|law| law.xi0)
     }
 
+    /// A frequency with an interval that holds those of the steps.
+    pub(super) fn over_steps(&self, frequency_hz: Estimate) -> Estimate {
+        let steps = self.steps.iter().map(|s| s.frequency_hz.value);
+        steps.fold(frequency_hz, |range, f_hz| range.covering(f_hz, f_hz))
+    }
+
     /// ξ as if there were a linear damper, stretched to what the steps show that tell it to a tenth.
     pub fn damping_over_the_record(&self) -> Estimate {
         let certain = |s: &&Step| s.damping_ratio.sd < 0.1 * s.damping_ratio.value;

@@ -3,6 +3,7 @@
 use serde::Serialize;
 
 use super::consistency::Consistency;
+use super::damping::Trend;
 use super::decrement::Decrement;
 use super::envelope::{Bounds, Envelope, FrequencyLaw};
 use super::estimate::Estimate;
@@ -136,7 +137,17 @@ impl Estimators {
     }
 
     /// The laws at small amplitude; the damped sinusoids where the amplitude does not matter or its effect cannot be followed.
-    pub fn choose(&self, whole: &Whole, envelope: Option<&Envelope>, amplitudes_rad: &[f64], mode: usize) -> Choice {
+    ///
+    /// Where no law of one oscillation describes how the swing decays, none takes its frequency to small amplitude either: the interval then holds the frequencies
+    /// of the windows.
+    pub fn choose(
+        &self,
+        whole: &Whole,
+        envelope: Option<&Envelope>,
+        trend: Option<Trend>,
+        amplitudes_rad: &[f64],
+        mode: usize,
+    ) -> Choice {
         let (duration_s, known) = (whole.signal.duration_s(), whole.measured == Measured::Angles);
         let mut lawful_rad = amplitudes_rad.to_vec();
         // of a mode alone, what the laws leave out acts with the windows' amplitudes; another mode's share in it is not followed
@@ -176,7 +187,10 @@ impl Estimators {
         let law = envelope.and_then(|e| e.frequency.filter(|f| sound(e, f)).map(|f| (e, f)));
         match law {
             Some((envelope, law)) if felt || self.residual_excess > 1.0 => Choice {
-                frequency_hz: relatively_blurred(law.f0_hz, omitted[0].hypot(of_losses(envelope, duration_s))),
+                frequency_hz: {
+                    let f0_hz = relatively_blurred(law.f0_hz, omitted[0].hypot(of_losses(envelope, duration_s)));
+                    if trend == Some(Trend::Uneven) { envelope.over_steps(f0_hz) } else { f0_hz }
+                },
                 // a range over the record extrapolates to no amplitude
                 damping_ratio: envelope
                     .linear_damping()
@@ -216,7 +230,7 @@ const HARMONIC_BAND: f64 = 0.06;
 ///
 /// sin θ and the turning of the links give a swing of amplitude A a harmonic of up to about A³/20 in a chain, more where the mode resonates with it;
 /// within windows of a few cycles it cannot be told from the mode, whose frequency and damping are then neither's.
-fn harmonic_share(fit: &SinusoidFit, mode: usize) -> f64 {
+pub(super) fn harmonic_share(fit: &SinusoidFit, mode: usize) -> f64 {
     let times = fit.poles[mode].omega_rad_s / fit.poles[0].omega_rad_s;
     if mode == 0 || (times / 3.0 - 1.0).abs() > HARMONIC_BAND {
         return 0.0;
@@ -337,8 +351,8 @@ fn sinusoids([f, xi]: [Estimate; 2], excess: f64, envelope: Option<&Envelope>) -
     let (mut f, mut xi) = (widen(f), widen(xi));
     let misfits = excess > 1.0;
     if let Some(envelope) = envelope.filter(|_| misfits) {
+        f = envelope.over_steps(f);
         for step in &envelope.steps {
-            f = f.covering(step.frequency_hz.value, step.frequency_hz.value);
             xi = xi.covering(step.damping_ratio.value, step.damping_ratio.value);
         }
     }

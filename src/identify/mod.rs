@@ -34,6 +34,7 @@ pub mod modulated;
 pub mod pencil;
 pub mod pole;
 mod numerics;
+mod outliers;
 mod projection;
 mod rest;
 pub mod signal;
@@ -63,7 +64,7 @@ use estimators::Whole;
 use floor::Floor;
 use modes::{Chosen, ModeCount};
 use modulated::Modulated;
-use signal::Signal;
+use signal::{LinkSamples, Signal};
 use spectrum::Spectrum;
 use tumbling::Tumbling;
 use windows::Windows;
@@ -127,6 +128,9 @@ pub struct Identification {
     pub floor: Option<Floor>,
     /// Needs the experiment file.
     pub equivalents: Option<Equivalents>,
+    /// Lines that only a forward model tells from harmonics of the slowest mode: a fit may begin with them.
+    #[serde(skip)]
+    pub may_be_harmonics: Vec<Mode>,
     /// What the reader should know.
     pub notes: Vec<String>,
 }
@@ -139,9 +143,12 @@ pub fn identify(series: &AngleSeries, experiment: Option<&Experiment>) -> Result
     let body = experiment.map(|e| Ok(Body { experiment: e, chain: Chain::of(&e.specimen)? })).transpose()?;
     let let_go = series.let_go();
     let series = let_go.as_ref().map_or(series, |(_, rest)| rest);
+    let caught = series.caught();
+    let series = caught.as_ref().map_or(series, |(_, swing)| swing);
     let (signal, wrapped) = Signal::of(series).unwrapped();
     let mut found = Identification::of_record(series, &signal, Measured::Angles);
     found.held_until_s = let_go.as_ref().map(|(held_s, _)| *held_s);
+    found.rests_from_s = caught.as_ref().map(|(caught_s, _)| *caught_s);
     for link in wrapped {
         found.notes.push(format!("θ{} jumps by full turns, as wrapped angles do: taken out", link + 1));
     }
@@ -153,10 +160,13 @@ pub fn identify(series: &AngleSeries, experiment: Option<&Experiment>) -> Result
 pub fn identify_displacement(series: &AngleSeries) -> Identification {
     let let_go = series.let_go();
     let series = let_go.as_ref().map_or(series, |(_, rest)| rest);
+    let caught = series.caught();
+    let series = caught.as_ref().map_or(series, |(_, swing)| swing);
     let signal = Signal::of(series);
     let found = Identification::of_record(series, &signal, Measured::Displacement);
     let held_until_s = let_go.as_ref().map(|(held_s, _)| *held_s);
-    Identification { held_until_s, ..found }.with_modes(signal, None)
+    let rests_from_s = caught.as_ref().map(|(caught_s, _)| *caught_s);
+    Identification { held_until_s, rests_from_s, ..found }.with_modes(signal, None)
 }
 
 impl Identification {
@@ -202,17 +212,19 @@ impl Identification {
             spectrum,
             mode_count: None,
             modes: Vec::new(),
+            may_be_harmonics: Vec::new(),
             floor: None,
             equivalents: None,
         }
     }
 
     fn with_modes(mut self, signal: Signal, body: Option<&Body>) -> Self {
-        self.rests_from_s = rest::rests_from_s(&signal);
-        let signal = match self.rests_from_s {
+        let rests_from_s = rest::rests_from_s(&signal);
+        let signal = match rests_from_s {
             None => signal,
             Some(rest_s) => self.only(signal.until(rest_s)),
         };
+        self.rests_from_s = rests_from_s.or(self.rests_from_s);
         match self.swing_of(signal) {
             Ok((signal, chosen)) => self.add_modes(&signal, chosen, body),
             Err(reason) => self.notes.push(format!("{}{reason}", summary::NOTHING)),
@@ -237,8 +249,19 @@ impl Identification {
                 self.only(signal.from(from_s))
             }
         };
+        let signal = self.without_outliers(signal);
         let chosen = modes::choose_modes(&signal, &self.spectrum, self.record.measured)?;
         Ok((signal, chosen))
+    }
+
+    fn without_outliers(&mut self, signal: Signal) -> Signal {
+        let Some((kept, counts)) = signal.without_outliers() else { return signal };
+        for (link, count) in counts.iter().enumerate().filter(|(_, count)| **count > 0) {
+            let stand = if *count == 1 { "value stands" } else { "values stand" };
+            let name = self.record.measured.name(link);
+            self.notes.push(format!("{name}: {count} {stand} apart from the neighbours: left out"));
+        }
+        self.only(kept)
     }
 
     fn add_modes(&mut self, recorded: &Signal, chosen: Chosen, body: Option<&Body>) {
@@ -267,6 +290,14 @@ impl Identification {
         let mut modes: Vec<Mode> =
             (0..fit.poles.len()).map(|m| Mode::of(&whole, m, same_links, gravity_m_s2)).collect();
         modes.sort_by(|a, b| b.rms_rad.total_cmp(&a.rms_rad));
+        let (harmonics, modes): (Vec<Mode>, Vec<Mode>) = modes.into_iter().partition(|mode| mode.may_be_harmonic);
+        self.notes.extend(harmonics.iter().map(|mode| {
+            format!(
+                "the line at {:.3} Hz lies on the third harmonic of the slowest mode and is no stronger than that may be: only a forward model tells whether a mode is there, or a smaller swing, as with --from",
+                mode.frequency_hz.value
+            )
+        }));
+        self.may_be_harmonics = harmonics;
         let (modes, open): (Vec<Mode>, Vec<Mode>) = modes.into_iter().partition(Mode::is_resolved);
         let alone = if modes.is_empty() { summary::NOTHING } else { "" };
         self.notes.extend(open.iter().map(|mode| {
@@ -277,6 +308,14 @@ impl Identification {
         }));
         if modes.is_empty() {
             return;
+        }
+        // a wide swing is no sum of a few sinusoids: what they leave is more than noise
+        let of_values = |link: &LinkSamples| {
+            crate::fit::noise::of_angle(&link.t_s, &link.theta_rad.iter().copied().map(Some).collect::<Vec<_>>())
+        };
+        if modes.iter().any(|mode| mode.residual_excess > 1.0) {
+            let least = signal.links.iter().map(of_values);
+            self.record.noise_rad.iter_mut().zip(least).for_each(|(noise, least)| *noise = noise.min(least));
         }
         self.modes = modes.into_iter().enumerate().map(|(k, mode)| mode.numbered(k + 1)).collect();
         self.mode_count = Some(count);
@@ -296,6 +335,9 @@ impl Identification {
         }
         let findings = self.modes.iter().flat_map(|m| m.notes.iter().cloned());
         self.notes.extend(findings);
+        if signal.links.len() == 1 {
+            self.notes.extend(close_pair::of_one_link(&self.modes));
+        }
     }
 }
 

@@ -7,7 +7,7 @@ use super::consistency::Consistency;
 use super::damping::{Damping, Trend};
 use super::envelope::{Bounds, Envelope, FrequencyLaw, PENDULUM, THEORY_TOLERANCE};
 use super::estimate::{Estimate, probability};
-use super::estimators::{Estimator, Estimators, Whole};
+use super::estimators::{Estimator, Estimators, Whole, harmonic_share};
 use super::floor::amplitude_dependence;
 use super::modulated::Modulated;
 use super::windows::Windows;
@@ -18,6 +18,11 @@ use crate::series::Measured;
 const SLOWEST_SWING_HZ: f64 = 0.05;
 /// A pendulum that swings faster is less than 1 mm long.
 const FASTEST_SWING_HZ: f64 = 15.8;
+
+/// A line this near three times the slowest frequency, in each window, goes with it (judgement: a mode's frequency depends on amplitude otherwise).
+const LOCKED: f64 = 0.06;
+/// The third harmonic of a swing of amplitude A is at most this times A³: twice the 1/20 of a chain without resonance (judgement).
+const MOST_OF_HARMONIC: f64 = 0.1;
 
 /// One link's part in a mode.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
@@ -69,6 +74,9 @@ pub struct Mode {
     /// Whether a constant ξ is meant at small amplitude.
     #[serde(skip)]
     pub at_small_amplitude: bool,
+    /// Whether it lies on the third harmonic of the slowest mode, and is no larger than that may be.
+    #[serde(skip)]
+    pub may_be_harmonic: bool,
     /// In what its sizes are told.
     #[serde(skip)]
     pub measured: Measured,
@@ -82,22 +90,25 @@ impl Mode {
         let shape = shape(whole, mode);
         let amplitudes_rad: Vec<f64> = (0..whole.fit.poles.len()).map(|m| whole.fit.amplitude_rad(m)).collect();
         let duration_s = whole.signal.duration_s();
-        let choice =
-            estimators.choose(whole, envelope.as_ref(), &amplitudes_rad, mode).beside_harmonic(whole.fit, mode);
-        let raw = estimators.raw;
         let changes =
             |e: &&Envelope| e.decay.is_some_and(|d| d.p_viscous < 0.01) || e.damping.is_some_and(|d| d.p_value < 0.01);
+        let damping_trend = match whole.modulated {
+            Some(own) => own.trend,
+            None => envelope
+                .as_ref()
+                .filter(changes)
+                .and_then(|e| Trend::of(e, of_linear_damper(e, Bounds::of(mode == 0, whole.measured), whole.measured))),
+        };
+        let choice = estimators
+            .choose(whole, envelope.as_ref(), damping_trend, &amplitudes_rad, mode)
+            .beside_harmonic(whole.fit, mode);
+        let raw = estimators.raw;
         Self {
             number: mode + 1,
             rms_rad: whole.fit.strength(mode, duration_s).sqrt(),
-            damping_trend: match whole.modulated {
-                Some(own) => own.trend,
-                None => envelope.as_ref().filter(changes).and_then(|e| {
-                    Trend::of(e, of_linear_damper(e, Bounds::of(mode == 0, whole.measured), whole.measured))
-                }),
-            },
+            damping_trend,
             expected_kappa_per_rad2: match whole.measured {
-                Measured::Angles => expected_kappa(&shape, whole.fit.poles[mode].frequency_hz(), chain, gravity_m_s2),
+                Measured::Angles => expected_kappa(&shape, choice.frequency_hz.value, chain, gravity_m_s2),
                 // nobody knows what angle it is of
                 Measured::Displacement => None,
             },
@@ -107,6 +118,7 @@ impl Mode {
             damping: Damping::of(choice.damping_ratio, &raw[1], duration_s),
             basis: choice.basis,
             at_small_amplitude: choice.at_small_amplitude,
+            may_be_harmonic: may_be_harmonic(whole, mode),
             shape,
             residual_excess: estimators.residual_excess,
             frequency_consistency: estimators.compare(raw[0], |e| e.frequency_hz),
@@ -167,7 +179,7 @@ impl Mode {
         let measured = format!("κ = {:.4} ± {:.4} /rad²", k.value, k.half());
         let tolerance = THEORY_TOLERANCE * expected.abs();
         let agrees = k.low - tolerance <= expected && expected <= k.high + tolerance;
-        if self.constant_though_wide() {
+        if self.constant_though_wide() || self.is_no_swing_of_its_own() {
             None
         } else if !agrees {
             // no scale of the angles makes a frequency rise with amplitude that gravity makes fall
@@ -180,7 +192,7 @@ impl Mode {
                 String::new()
             };
             Some(format!(
-                "f = f₀(1 − κA²) has {measured}, gravity alone makes {expected:.4}: a nonlinear stiffness is at work{scale}"
+                "f = f₀(1 − κA²) has {measured}, gravity alone makes {expected:.4}: a nonlinear stiffness is at work, or a swing in a second plane{scale}"
             ))
         } else if !k.holds(0.0) && k.half() < 0.5 * expected.abs() {
             Some(format!("the frequency falls with amplitude as gravity makes it ({measured}, expected {expected:.4})"))
@@ -198,6 +210,11 @@ impl Mode {
     fn constant_though_wide(&self) -> bool {
         let Some((law, expected)) = self.frequency_law().zip(self.expected_kappa_per_rad2) else { return false };
         self.amplitude_rad() > 0.8 && expected > 0.03 && law.kappa_per_rad2.high < 0.3 * expected
+    }
+
+    /// Whether its decay follows no law of damping: what changes its amplitude then changes its frequency, too.
+    fn is_no_swing_of_its_own(&self) -> bool {
+        self.damping_trend == Some(Trend::Uneven)
     }
 
     /// A doubt of what the table's columns hold, where the motion would be strange for a hung body.
@@ -232,7 +249,8 @@ impl Mode {
 
     fn of_frequency(&self) -> Option<String> {
         let test = self.frequency_consistency.filter(|t| !t.agree)?;
-        let meaning = if self.frequency_law().is_some_and(|l| l.p_constant < 0.01) {
+        let lawful = !self.is_no_swing_of_its_own();
+        let meaning = if lawful && self.frequency_law().is_some_and(|l| l.p_constant < 0.01) {
             "the frequency depends on amplitude, which each estimator weighs differently; take f₀"
         } else {
             "amplitude does not explain it; look for dropped frames, a neighbouring mode or forcing"
@@ -250,6 +268,7 @@ impl Mode {
             return Some(format!("damping not identifiable: {reason}"));
         }
         let meaning = match self.damping_trend {
+            Some(Trend::Uneven) => "the damping ratio changes as neither friction nor drag makes it: look for a swing in a second plane, a neighbour that swings along, a draught or a hand".to_owned(),
             Some(trend) => format!("the damping depends on amplitude: friction or drag, not one ξ ({})", trend.words()),
             // what one oscillation describes needs no other reason
             None if self.modulated.is_some() => return None,
@@ -293,6 +312,20 @@ fn envelope_of(whole: &Whole, mode: usize) -> Result<Envelope, String> {
     Ok(Envelope::of(&own, 0, bounds)?.beside_unfollowed(others))
 }
 
+/// Whether a mode is on the third harmonic of the slowest one throughout, and in the end no larger than that harmonic may be; where there are no windows, by the whole
+/// record's fit.
+fn may_be_harmonic(whole: &Whole, mode: usize) -> bool {
+    let Ok(windows) = whole.windows else { return harmonic_share(whole.fit, mode) >= 1.0 };
+    let (own, slowest) = (&windows.moments[mode], &windows.moments[0]);
+    let last = own.last().and_then(|last| Some((last, slowest.iter().find(|moment| moment.t_s == last.t_s)?)));
+    let Some((last, beside)) = last.filter(|_| mode > 0) else { return false };
+    let is_locked = own.iter().all(|moment| {
+        let beside = slowest.iter().find(|beside| beside.t_s == moment.t_s);
+        beside.is_some_and(|beside| (moment.omega_rad_s / beside.omega_rad_s / 3.0 - 1.0).abs() < LOCKED)
+    });
+    is_locked && last.amplitude_rad() < MOST_OF_HARMONIC * beside.amplitude_rad().powi(3)
+}
+
 fn shape(whole: &Whole, mode: usize) -> Vec<LinkMotion> {
     let fit = whole.fit;
     let first = fit.links[0].amplitudes_rad[mode];
@@ -309,8 +342,10 @@ fn shape(whole: &Whole, mode: usize) -> Vec<LinkMotion> {
                 )
             }
         };
+        // the sinusoids of a wide swing, which decays otherwise, begin higher than it does
+        let farthest_rad = 0.5 * whole.signal.links[link].range_rad();
         LinkMotion {
-            amplitude_rad: own.amplitudes_rad[mode].norm(),
+            amplitude_rad: own.amplitudes_rad[mode].norm().min(farthest_rad),
             ratio_to_first: Estimate::new(ratio.norm(), sd, fit.degrees_of_freedom),
             phase_to_first_rad: Estimate::new(
                 ratio.arg(),

@@ -1,12 +1,13 @@
 //! The slow flow of one oscillation: its amplitude and phase over a record, and the least-squares problem in what they depend on.
 //!
 //! ```text
-//! θᵢ(t) = oᵢ + Σₖ dᵢₖ cos(πkτ/T) + Σₕ Re[cᵢₕ aʰ e^{ihφ}],   h = 1, 2, 3,  τ = t − t₀,  a(t₀) = 1,  φ(t₀) = 0
+//! θᵢ(t) = oᵢ + pᵢa² + Σₖ dᵢₖ cos(πkτ/T) + Σₕ Re[cᵢₕ aʰ e^{ihφ}],   h = 1, 2, 3,  τ = t − t₀,  a(t₀) = 1,  φ(t₀) = 0
 //! dφ/dt = ω₀ (1 − k a² + k²a⁴/4 − ξ²/2)    k = κA₀², ξ = (β₁ + β₂a)/ω₀, A₀ the first amplitude of the link that moves most
 //! da/dt = −(β₀ + β₁a + β₂a²)               dry friction, viscous, quadratic drag
 //! ```
 //!
-//! It is that of a weakly nonlinear oscillator (Nayfeh and Mook, Nonlinear Oscillations, 1979, ch. 2). Offsets, drifts, shapes and harmonics enter linearly and
+//! It is that of a weakly nonlinear oscillator (Nayfeh and Mook, Nonlinear Oscillations, 1979, ch. 2). A spring that is stiffer to one side moves the middle of
+//! the swing by a part that goes with a², as its second harmonic does. Offsets, drifts, shapes and harmonics enter linearly and
 //! are eliminated (variable projection). k has a prior, one more observation.
 //!
 //! Dry friction lets each half swing go about a centre that is shifted by δ against the motion, so that the oscillation lags a little more the smaller it is:
@@ -85,7 +86,7 @@ fn flattened(kappa_a2: f64) -> f64 {
     1.0 - 2.0 * q + 4.0 / 3.0 * q.powi(2) - 4.0 / 9.0 * q.powi(3)
 }
 
-/// What is left of one link, and its coefficients: offset, drifts, cosine and sine of each harmonic.
+/// What is left of one link, and its coefficients: offset, drifts, what goes with a², cosine and sine of each harmonic.
 struct Projected {
     residual: DVector<f64>,
     coefficients: DVector<f64>,
@@ -192,12 +193,13 @@ impl<'a> SlowFlow<'a> {
 
     fn projected(&self, values: &[f64; 5]) -> Option<Vec<Projected>> {
         let of_link = |link: &LinkSamples| {
-            let columns = self.columns();
+            let (columns, first) = (self.columns(), self.first_harmonic());
             let lag = 3.0 / std::f64::consts::PI * self.coefficients_of(values).shift();
             let mut basis = DMatrix::from_element(link.t_s.len(), columns, 1.0);
             for (row, ([a, phase], t_s)) in self.course(values, link).into_iter().zip(&link.t_s).enumerate() {
                 let turn = drift_phase(t_s - self.signal.span_s[0], self.signal.duration_s());
                 (1..=self.drift_terms).for_each(|k| basis[(row, k)] = (turn * k as f64).cos());
+                basis[(row, first - 1)] = a * a;
                 let turned = |times: i32| Complex::from_polar(1.0, f64::from(times) * phase);
                 let seen = match self.measured {
                     Measured::Angles => 1.0,
@@ -208,7 +210,7 @@ impl<'a> SlowFlow<'a> {
                 let lagging = -Complex::i() * lag * turned(1);
                 for (i, own) in powers.chain(friction).enumerate() {
                     let own = if i == 0 { own + lagging } else { own };
-                    let column = 1 + self.drift_terms + 2 * i;
+                    let column = first + 2 * i;
                     (basis[(row, column)], basis[(row, column + 1)]) = (own.re, own.im);
                 }
             }
@@ -230,9 +232,14 @@ impl<'a> SlowFlow<'a> {
         self.free.contains(&2)
     }
 
+    /// Place of the fundamental's first coefficient, after offset, drifts and what goes with a².
+    fn first_harmonic(&self) -> usize {
+        2 + self.drift_terms
+    }
+
     /// Linear coefficients of a link.
     fn columns(&self) -> usize {
-        1 + self.drift_terms + 2 * (HARMONICS as usize + usize::from(self.has_friction()))
+        self.first_harmonic() + 2 * (HARMONICS as usize + usize::from(self.has_friction()))
     }
 
     /// Values less coefficients.
@@ -259,7 +266,7 @@ impl<'a> SlowFlow<'a> {
         let changes_slowly = own.losses_per_s.iter().sum::<f64>().abs() < MOST_DAMPING * own.omega_rad_s;
         let Some(links) = self.projected(&self.values) else { return false };
         let size = |link: &Projected, times: usize| {
-            let place = 2 * times - 1 + self.drift_terms;
+            let place = self.first_harmonic() + 2 * (times - 1);
             link.coefficients[place].hypot(link.coefficients[place + 1])
         };
         let sum = |times: usize| links.iter().map(|link| size(link, times)).sum::<f64>();
@@ -313,7 +320,7 @@ impl<'a> SlowFlow<'a> {
 
     /// A₀.
     pub fn amplitude_rad(&self) -> Option<f64> {
-        let first = 1 + self.drift_terms;
+        let first = self.first_harmonic();
         let amplitude = |link: &Projected| link.coefficients[first].hypot(link.coefficients[first + 1]);
         Some(self.projected(&self.values)?.iter().map(amplitude).fold(f64::MIN_POSITIVE, f64::max))
     }

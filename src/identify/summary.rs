@@ -59,9 +59,10 @@ fn of_mode(mode: &Mode) -> String {
     format!("f{index} = {f} Hz{at}, {damping}")
 }
 
-/// `value ± half` with two digits of the half width.
+/// `value ± half` with two digits of the half width; of an interval that reaches farther to one side, that side.
 fn rounded(estimate: &Estimate, factor: f64) -> String {
-    let (value, half) = (factor * estimate.value, factor * estimate.half());
+    let widest = (estimate.high - estimate.value).max(estimate.value - estimate.low);
+    let (value, half) = (factor * estimate.value, factor * widest);
     if value.abs() < 1e-4 {
         return format!("{value:.2e} ± {half:.0e}");
     }

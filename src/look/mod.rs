@@ -246,7 +246,7 @@ fn nothing_swings(path: &Path, seen: &[(usize, Vec<Thing>)], names: &[String], s
         "nothing coloured, dark or light stands out from its surroundings".to_owned()
     } else {
         format!(
-            "of {} lasting spots ({}) {moving} move and {still} stand still, but none swings on an arc like a mark",
+            "of {} lasting spots ({}) {moving} move and {still} stand still, but none swings in the plane of the picture on an arc, as a mark of a hung body does",
             lasting,
             names.join(", ")
         )

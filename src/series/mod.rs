@@ -11,7 +11,7 @@ use std::ops::Range;
 use std::path::{Path, PathBuf};
 
 use crate::error::{Error, Result};
-use crate::held::released_of;
+use crate::held::{caught_of, released_of};
 use crate::statistics::median_step_s;
 use columns::{Columns, Row, Table, not_a_table};
 
@@ -166,18 +166,23 @@ impl AngleSeries {
         }
     }
 
-    /// When it is let go, where it is held still at first, by the angle that varies most.
-    fn released_s(&self) -> Option<f64> {
-        let known = |angles: &Vec<Option<f64>>| -> (Vec<f64>, Vec<f64>) {
-            self.t_s.iter().zip(angles).filter_map(|(t, angle)| Some((*t, (*angle)?))).unzip()
-        };
-        released_of(self.theta_rad.iter().map(known))
+    /// Times and values of each angle where it is known.
+    fn paths(&self) -> impl Iterator<Item = (Vec<f64>, Vec<f64>)> {
+        self.theta_rad
+            .iter()
+            .map(|angles| self.t_s.iter().zip(angles).filter_map(|(t, angle)| Some((*t, (*angle)?))).unzip())
     }
 
-    /// When it is let go, where it is held still at first, and what follows.
+    /// When it is let go, where it is held still before it swings, and what follows.
     pub fn let_go(&self) -> Option<(f64, Self)> {
-        let released_s = self.released_s()?;
+        let released_s = released_of(self.paths())?;
         Some((released_s, self.slice(self.rows(released_s, f64::INFINITY))))
+    }
+
+    /// When it is caught, where it is held still to the end, and what precedes.
+    pub fn caught(&self) -> Option<(f64, Self)> {
+        let caught_s = caught_of(self.paths())?;
+        Some((caught_s, self.slice(self.rows(f64::NEG_INFINITY, caught_s))))
     }
 
     /// Number of links.

@@ -91,7 +91,7 @@ impl DiagnoseArgs {
             return self.plan(&experiment, console);
         }
         let marks = ForwardModel::of(&experiment)?.chain().groups().len();
-        let records = super::recordings(&self.angles, marks, (self.from, self.until), console)?;
+        let records = super::recordings(&self.angles, (marks, &experiment), (self.from, self.until), console)?;
         self.check_border(&records)?;
         let json = self.json.as_deref().map(OutputFile::create).transpose()?;
         let [figure, curves, map] =

@@ -50,9 +50,9 @@ impl Law for MovingSupport {
         !only_leans(fit)
     }
 
-    /// A codec lets a tracked mark wander over seconds, by no more than its errors in step with the swing.
+    /// A codec lets a tracked mark wander over seconds, by no more than its errors in step with the swing; an encoder rounds in step with it.
     fn is_seen(&self, fit: &Refit<'_>, without: &Refit<'_>) -> bool {
-        let share = fit.problem.records.iter().map(|record| record.in_step).fold(0.0, f64::max);
+        let share = fit.problem.records.iter().map(|record| record.in_step.max(record.rounding)).fold(0.0, f64::max);
         without.chi2 - fit.chi2 >= share * share * fit.values() as f64
     }
 
@@ -72,8 +72,9 @@ impl Law for MovingSupport {
         if is_slight && rest.effects.iter().any(|e| e.place() != Place::Camera) {
             return prior.support_beside_a_law;
         }
-        let base = fit_of(&Hypothesis::default());
-        if base.is_some_and(|base| is_in_step(base, hz)) { prior.support_in_step } else { 1.0 }
+        let Some(base) = fit_of(&Hypothesis::default()) else { return 1.0 };
+        let in_step = if is_in_step(base, hz) { prior.support_in_step } else { 1.0 };
+        in_step * chance_of_multiple(base, hz).map_or(1.0, |chance| chance / (1.0 + chance))
     }
 }
 
@@ -157,20 +158,39 @@ fn only_leans(fit: &Refit<'_>) -> bool {
     fit.value(Parameter::SupportFrequency).is_some_and(|hz| hz < LOWEST * swing_hz)
 }
 
+/// Where a support would move at a multiple of the swing's frequency, how likely that is by chance: the part of the frequencies that lie within a resolution of a
+/// multiple. As likely is something that goes with the swing: a sensor off its centre, a spring stiffer to one side.
+fn chance_of_multiple(null: &Refit<'_>, frequency_hz: f64) -> Option<f64> {
+    (0..null.problem.records.len()).find_map(|record| {
+        let (power, span_s) = chord_powers(null, record)?.into_iter().next()?;
+        let highest = (1..power.len() - 1).max_by(|a, b| power[*a].total_cmp(&power[*b]))?;
+        let [before, at, after] = [highest - 1, highest, highest + 1].map(|k| power[k].max(f64::MIN_POSITIVE).ln());
+        let peak = highest as f64 + 0.5 * (after - before) / (2.0 * at - before - after).max(f64::MIN_POSITIVE);
+        let bin = frequency_hz * span_s;
+        let times = (bin / peak).round();
+        (times >= 2.0 && (bin - times * peak).abs() < 1.0).then(|| (2.0 / peak).min(1.0))
+    })
+}
+
 /// Whether a support would move at a frequency at which the base model's own motion has power. Such a support can stand for any torque in step with
 /// the swing, so it names nothing.
 fn is_in_step(null: &Refit<'_>, frequency_hz: f64) -> bool {
     (0..null.problem.records.len()).any(|record| {
-        let Some((model, swing, true_s)) = null.motion(record) else { return false };
-        let chords: Vec<Vec<f64>> =
-            true_s.iter().map(|t| chord_angles_rad(model.chain(), &swing.at(*t).theta_rad)).collect();
-        let span_s = true_s[true_s.len() - 1] - true_s[0];
-        let bin = (frequency_hz * span_s).round() as usize;
-        (0..null.problem.marks()).any(|link| {
-            let power = noise::spectrum(&chords.iter().map(|c| c[link]).collect::<Vec<f64>>());
+        chord_powers(null, record).into_iter().flatten().any(|(power, span_s)| {
+            let bin = (frequency_hz * span_s).round() as usize;
             let strongest = power[1..].iter().copied().fold(0.0, f64::max);
             let near = bin.saturating_sub(1)..(bin + 2).min(power.len());
             power[near.start.min(power.len())..near.end].iter().any(|p| *p > POWER_IN_STEP * strongest)
         })
     })
+}
+
+/// The power of a fit's own motion at each frequency, of each angle, and over which time.
+fn chord_powers(fit: &Refit<'_>, record: usize) -> Option<Vec<(Vec<f64>, f64)>> {
+    let (model, swing, true_s) = fit.motion(record)?;
+    let chords: Vec<Vec<f64>> =
+        true_s.iter().map(|t| chord_angles_rad(model.chain(), &swing.at(*t).theta_rad)).collect();
+    let span_s = true_s[true_s.len() - 1] - true_s[0];
+    let of = |link: usize| noise::spectrum(&chords.iter().map(|c| c[link]).collect::<Vec<f64>>());
+    Some((0..fit.problem.marks()).map(|link| (of(link), span_s)).collect())
 }

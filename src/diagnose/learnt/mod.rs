@@ -52,8 +52,8 @@ pub use proven::Learnt;
 /// How probable each effect is where any law may stand in its place; nothing where that was not asked.
 pub type Needed = Vec<(Effect, f64)>;
 
-/// Learns what the likeliest fit leaves, where that is more than noise, or where one of its names often stands for something else; the effects are those that may be
-/// at work. A strip's fits are too dear for it.
+/// Learns what the likeliest fit leaves, where that is more than noise, where one of its names often stands for something else, or where it takes so many names that one
+/// law may do as well; the effects are those that may be at work. A strip's fits are too dear for it.
 pub fn beside<'a>(
     context: &FitContext<'a>,
     posterior: &Posterior<'a>,
@@ -62,7 +62,8 @@ pub fn beside<'a>(
     from_s: Option<f64>,
 ) -> (Needed, Option<Learnt<'a>>) {
     let settings = context.settings;
-    let remains = posterior.remains > settings.verdict.even || posterior.may_stand_in(settings);
+    let many = posterior.best().hypothesis.effects.len() > settings.search.main_effects;
+    let remains = posterior.remains > settings.verdict.even || posterior.may_stand_in(settings) || many;
     let is_worth = remains && !context.is_strip();
     let found = if is_worth { descriptions(context, posterior, effects) } else { None };
     let Some((order, along)) = found else { return (Needed::new(), None) };

@@ -3,13 +3,14 @@
 use rayon::prelude::*;
 
 use super::super::context::FitContext;
-use super::super::effect::Effect;
+use super::super::effect::{Effect, Place};
 use super::super::grammar::Term;
 use super::super::heldout::{self, HeldOut, Prediction};
 use super::super::refit::Refit;
 use super::along::Along;
 use super::described::Described;
 use super::fitted::with_laws;
+use crate::experiment::LawPlace;
 use crate::model::Parameter;
 
 /// A law that was learnt.
@@ -28,6 +29,16 @@ pub struct Learnt<'a> {
 }
 
 impl Learnt<'_> {
+    /// Where its first term acts.
+    pub fn place(&self) -> Option<Place> {
+        let place = match self.terms.first()?.law.place {
+            LawPlace::Hinge | LawPlace::Support => Place::Hinge,
+            LawPlace::Joint => Place::Joint,
+            LawPlace::Strip | LawPlace::Tip => Place::Air,
+        };
+        Some(place)
+    }
+
     /// The formula with its numbers.
     pub fn formula(&self) -> String {
         formula_of(&self.terms)

@@ -2,6 +2,7 @@
 
 use super::super::context::FitContext;
 use super::super::effect::Effect;
+use super::super::energy::work_of_unit_j;
 use super::super::hypothesis::Hypothesis;
 use super::super::laws::{self, law_of};
 use super::super::refit::{Certificate, Refit};
@@ -12,6 +13,11 @@ use super::horizon;
 use crate::fit::Record;
 use crate::model::Parameter;
 
+/// Two losses that together imitate a viscous damper, one growing as the swing becomes small, the other falling.
+pub const TRADED: [Effect; 2] = [Effect::HingeCoulomb, Effect::AirQuadratic];
+/// What is left of the base model's dampers where they take its place.
+const LEFT_OF_DAMPERS: f64 = 0.1;
+
 /// One thing to fit.
 #[derive(Debug, Clone)]
 pub enum Proposal<'f, 'a> {
@@ -19,6 +25,8 @@ pub enum Proposal<'f, 'a> {
     Beside(Beside<'f, 'a>),
     /// An effect beside a fit, from where its score points.
     Scored(&'f Refit<'a>, Score),
+    /// [`TRADED`] in the place of the base model's dampers: beside them each of the two promises nothing.
+    Traded(&'f Refit<'a>),
     /// An effect beside a fit from wherever it may be.
     Anywhere(&'f Refit<'a>, Effect),
     /// A hypothesis that has a fit, from where another one stands.
@@ -65,6 +73,7 @@ impl<'a> Proposal<'_, 'a> {
                 let fit = context.refit(&score.hypothesis(&base.hypothesis), base, &score.start);
                 fit.map(|fit| laws::settled(context, fit)).into_iter().collect()
             }
+            Self::Traded(base) => traded(context, base).into_iter().collect(),
             Self::Anywhere(base, effect) => law_of(*effect).anywhere(context, base).into_iter().collect(),
             Self::FromLeader { fit, hypothesis, leader } => {
                 from_leader(context, fit, hypothesis, leader).into_iter().collect()
@@ -100,6 +109,23 @@ pub fn exchanged(proposals: &[Proposal<'_, '_>]) -> Vec<Vec<Effect>> {
     let mut whole: Vec<Vec<Effect>> = sets.iter().filter(|set| of(set) == set.len()).map(|set| set.to_vec()).collect();
     whole.dedup();
     whole
+}
+
+/// A fit of two losses that take half of the energy each that the base model's dampers took.
+fn traded<'a>(context: &FitContext<'a>, base: &Refit<'a>) -> Option<Refit<'a>> {
+    let hypothesis = TRADED.iter().fold(base.hypothesis.clone(), |hypothesis, effect| hypothesis.and(*effect, None));
+    let dampers: Vec<(Parameter, f64)> = Effect::losses()
+        .into_iter()
+        .filter_map(|(parameter, _)| Some((parameter, base.value(parameter)?)))
+        .filter(|(_, value)| *value > 0.0)
+        .collect();
+    let of = |parameter: Parameter| work_of_unit_j(base, parameter);
+    let taken_j: f64 = dampers.iter().map(|(parameter, value)| value * of(*parameter)).sum();
+    let new = TRADED.map(|effect| effect.parameters()[0]).map(|parameter| (parameter, 0.5 * taken_j / of(parameter)));
+    let less = dampers.iter().map(|(parameter, value)| (*parameter, LEFT_OF_DAMPERS * value));
+    let start: Vec<(Parameter, f64)> = new.into_iter().chain(less).collect();
+    start.iter().all(|(_, value)| value.is_finite() && *value > 0.0).then_some(())?;
+    context.refit(&hypothesis, base, &start)
 }
 
 /// A fit anew from where another one is, with its own coefficients, if that is a better place to begin from than where it ended.

@@ -11,7 +11,7 @@ use super::super::screen::{Score, Screen};
 use super::super::stretches::asked_for;
 use super::Search;
 use super::beside::Beside;
-use super::proposal::{Proposal, comes_to_rest};
+use super::proposal::{Proposal, TRADED, comes_to_rest};
 
 /// One round.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -299,7 +299,9 @@ impl<'a> Search<'a, '_> {
             *rank < settings.fewest_pairs || pair.0 < settings.promising * least + 100.0
         };
         let kept = pairs.into_iter().enumerate().filter(is_kept);
-        kept.map(|(_, (_, seed, _, score))| Proposal::Scored(seed, score)).collect()
+        let scored = kept.map(|(_, (_, seed, _, score))| Proposal::Scored(seed, score));
+        let traded = TRADED.iter().all(|effect| self.effects.contains(effect)).then_some(Proposal::Traded(base));
+        scored.chain(traded).collect()
     }
 
     /// Where a pair has found a better minimum of a simpler hypothesis, one of its effects being next to nothing, that hypothesis starts anew from it.

@@ -2,24 +2,27 @@
 
 use crate::angles::Angle;
 use crate::experiment::Experiment;
-use crate::held::released_of;
+use crate::held::{caught_of, released_of};
 use crate::measure::{Measurement, Options, Steadying};
 use crate::statistics::median;
 use crate::track::hanging::{LEAST_TURN, MOST_MARKS};
 use crate::track::{Point, Spare};
 
-/// A link whose length scatters by more than this share is no rigid link in the plane of the picture: lenses bend by
-/// less.
-pub const MOST_LENGTH_SPREAD: f64 = 0.01;
-/// And by more than so many times what the marks' scatter explains.
-const LENGTH_SCATTERS: f64 = 4.0;
+mod link;
+
+pub use link::MOST_LENGTH_SPREAD;
+
 /// Frames below which nothing is said about a link or a mark.
 const FEWEST_FRAMES: usize = 30;
-/// A plane of swing turned by less than this share of x does not show.
-const LEAST_SQUEEZE: f64 = 0.03;
 /// Noise of a mark that calls for a word: a quarter of a pixel, and half a hundredth of the mark's width.
 const MOST_NOISE_PX: f64 = 0.25;
 const NOISE_OF_WIDTH: f64 = 0.005;
+/// Steps of a mark that show whether it moves, and the part of its neighbours' that is none; where more than so many, and more than this part of them, are none,
+/// pictures are repeated (from 24 to 30 a second one in five is, from 25 to 30 one in six).
+const LEAST_STEP_PX: f64 = 2.0;
+const STILL_STEP: f64 = 0.15;
+const FEWEST_REPEATS: usize = 5;
+const LEAST_REPEATED: f64 = 0.05;
 /// Share of the marks' own motion from which another thing's is no trembling.
 const LEAST_TRAVEL: f64 = 0.05;
 /// Change of the distance from a still thing, over the motion, up to which that is the hinge.
@@ -48,9 +51,10 @@ pub fn cautions(m: &Measurement, options: &Options) -> Vec<String> {
     cautions.extend(spares(m));
     let first = usize::from(options.rig.pivot_px.is_none());
     for link in 0..m.angles.links.len() {
-        cautions.extend(link_length(m, options, link, first));
+        cautions.extend(link::link_length(m, options, link, first));
         cautions.extend(turns(m, options, link));
     }
+    cautions.extend(link::hangs(m, options));
     let held = held(m);
     for mark in 0..m.tracks.marks.len() {
         // a hand's trembling is no noise of a mark's
@@ -58,10 +62,42 @@ pub fn cautions(m: &Measurement, options: &Options) -> Vec<String> {
         cautions.extend(blur(m, mark));
     }
     cautions.extend(held);
+    cautions.extend(caught(m));
     cautions.extend(pivot(m, options));
     cautions.extend(camera(m, options));
+    cautions.extend(repeats(m));
     cautions.extend(time(m, options));
     cautions
+}
+
+/// Pictures that repeat the one before, as a converter of frame rates makes them: a mark stands still for a step amid motion.
+fn repeats(m: &Measurement) -> Option<String> {
+    let share = m.tracks.marks.iter().filter_map(|points| repeated_share(points)).fold(0.0, f64::max);
+    (share > LEAST_REPEATED).then(|| {
+        format!(
+            "about one picture in {:.0} repeats the one before: a converter has changed the frame rate, and the stamps are not those of the motion; measure the film as it came from the camera, or take the repeats out with `ffmpeg -vf mpdecimate`",
+            share.recip()
+        )
+    })
+}
+
+/// The part of the steps amid motion in which a mark stands still.
+fn repeated_share(points: &[Point]) -> Option<f64> {
+    let steps: Vec<Option<f64>> = points
+        .windows(2)
+        .map(|pair| {
+            let (a, b) = (pair[0].measured?, pair[1].measured?);
+            Some((b.position_px[0] - a.position_px[0]).hypot(b.position_px[1] - a.position_px[1]))
+        })
+        .collect();
+    let amid = |k: usize| {
+        let mut near = [steps[k - 2]?, steps[k - 1]?, steps[k + 1]?, steps[k + 2]?];
+        Some((steps[k]?, median(&mut near)?))
+    };
+    let moving: Vec<(f64, f64)> =
+        (2..steps.len().saturating_sub(2)).filter_map(amid).filter(|(_, near)| *near > LEAST_STEP_PX).collect();
+    let still = moving.iter().filter(|(step, near)| *step < STILL_STEP * near).count();
+    (still >= FEWEST_REPEATS).then(|| still as f64 / moving.len() as f64)
 }
 
 /// A span too short to show a swing, and a true rate that is none of slow motion.
@@ -198,16 +234,29 @@ fn turns(m: &Measurement, options: &Options, link: usize) -> Option<String> {
     })
 }
 
-/// A hand at the beginning covers and holds what swings.
-fn held(m: &Measurement) -> Option<String> {
+/// Times and coordinates of each mark.
+fn paths(m: &Measurement) -> impl Iterator<Item = (Vec<f64>, Vec<f64>)> {
     let along = |points: &Vec<Point>, axis: usize| -> (Vec<f64>, Vec<f64>) {
         let seen = m.file_t_s.iter().zip(points);
         seen.filter_map(|(t, point)| Some((*t, point.measured?.position_px[axis]))).unzip()
     };
-    let paths = m.tracks.marks.iter().flat_map(|points| [0, 1].map(|axis| along(points, axis)));
-    released_of(paths).map(|held_s| {
+    m.tracks.marks.iter().flat_map(move |points| [0, 1].map(|axis| along(points, axis)))
+}
+
+/// A hand at the beginning covers and holds what swings.
+fn held(m: &Measurement) -> Option<String> {
+    released_of(paths(m)).map(|held_s| {
         format!(
             "what swings is held still until t = {held_s:.2} s, as by a hand, which covers marks and belongs to no swing: leave that out with --from {held_s:.2}"
+        )
+    })
+}
+
+/// And one at the end.
+fn caught(m: &Measurement) -> Option<String> {
+    caught_of(paths(m)).map(|caught_s| {
+        format!(
+            "what swings is held still from t = {caught_s:.2} s on, as by a hand: leave that out with --until {caught_s:.2}"
         )
     })
 }
@@ -234,71 +283,6 @@ fn pivot(m: &Measurement, options: &Options) -> Option<String> {
             shift_rad.to_degrees()
         )
     })
-}
-
-/// The ends of a link in every frame that shows both: (Δx, Δy, variance of the distance).
-fn spans(m: &Measurement, options: &Options, link: usize, first: usize) -> Vec<[f64; 3]> {
-    let aspect = options.rig.pixel_aspect.unwrap_or(m.stream.pixel_aspect);
-    let node = |index: usize, frame: usize| -> Option<([f64; 2], f64)> {
-        if first == 0 && index == 0 {
-            return options.rig.pivot_px.map(|p| (p, 0.0));
-        }
-        let point: &Point = &m.tracks.marks[index - (1 - first)][frame];
-        let usual = point.flags == crate::track::Flags::default();
-        let measured = point.measured.filter(|_| usual)?;
-        let c = measured.covariance_px2;
-        Some((measured.position_px, 0.5 * (c[0] + c[1])))
-    };
-    (0..m.tracks.t_s.len())
-        .filter_map(|frame| {
-            let ((p, v), (q, w)) = (node(link, frame)?, node(link + 1, frame)?);
-            Some([aspect * (q[0] - p[0]), q[1] - p[1], v + w])
-        })
-        .collect()
-}
-
-/// A link keeps its length; where it changes with the angle alone, the plane of the swing is turned.
-fn link_length(m: &Measurement, options: &Options, link: usize, first: usize) -> Option<String> {
-    let spans = spans(m, options, link, first);
-    if spans.len() < FEWEST_FRAMES {
-        return None;
-    }
-    let mut lengths: Vec<f64> = spans.iter().map(|s| s[0].hypot(s[1])).collect();
-    let usual = median(&mut lengths)?;
-    let mut off: Vec<f64> = lengths.iter().map(|l| (l - usual).abs()).collect();
-    let spread = 1.4826 * median(&mut off)?;
-    let expected = (spans.iter().map(|s| s[2]).sum::<f64>() / spans.len() as f64).sqrt();
-    if spread <= MOST_LENGTH_SPREAD * usual || spread <= LENGTH_SCATTERS * expected {
-        return None;
-    }
-    let number = link + 1;
-    if let Some(squeeze) = squeeze(&spans).filter(|s| *s < 1.0 - LEAST_SQUEEZE) {
-        let aspect = options.rig.pixel_aspect.unwrap_or(m.stream.pixel_aspect) / squeeze;
-        let turn_deg = squeeze.acos().to_degrees();
-        return Some(format!(
-            "link {number} looks shorter the farther it swings, by {:.1} % of its {usual:.0} px: it swings in a plane turned by about {turn_deg:.0}° out of the picture, and its angles are up to {:.0} % too small; face the camera to the swing, or write pixel_aspect = {aspect:.3} in [rig]",
-            100.0 * spread / usual,
-            100.0 * (1.0 - squeeze),
-        ));
-    }
-    Some(format!(
-        "link {number} is {usual:.1} ± {spread:.1} px long, where the marks' scatter explains ± {expected:.2}: its ends are not on one rigid link, a mark was taken for another, or the pivot is elsewhere; look at --overlay, and name the marks with --markers or --roi"
-    ))
-}
-
-/// The factor c by which x is shortened, from Δy² = L² − Δx²/c² by least squares; `None` where the link does not
-/// swing far enough, or where this does not explain most of the change.
-fn squeeze(spans: &[[f64; 3]]) -> Option<f64> {
-    let n = spans.len() as f64;
-    let mean = |f: &dyn Fn(&[f64; 3]) -> f64| spans.iter().map(f).sum::<f64>() / n;
-    let (mx, my) = (mean(&|s| s[0] * s[0]), mean(&|s| s[1] * s[1]));
-    let xx = mean(&|s| (s[0] * s[0] - mx).powi(2));
-    let xy = mean(&|s| (s[0] * s[0] - mx) * (s[1] * s[1] - my));
-    let slope = xy / xx.max(1e-12);
-    let length2 = my - slope * mx;
-    let rest = |factor: f64, of: f64| mean(&|s| (s[1] * s[1] + factor * s[0] * s[0] - of).powi(2)).sqrt();
-    let explained = rest(-slope, length2) < 0.5 * rest(1.0, mx + my);
-    (slope < -1.0 && explained && mx.sqrt() > 0.05 * length2.max(0.0).sqrt()).then(|| (-1.0 / slope).sqrt())
 }
 
 /// The scatter of a mark, held against its size.
@@ -433,27 +417,4 @@ fn crossing_rate_hz(m: &Measurement) -> Option<f64> {
     let rises: Vec<f64> = rows.windows(2).filter(|w| w[0].1 < middle && w[1].1 >= middle).map(|w| w[1].0).collect();
     let (first, last) = (rises.first()?, rises.last()?);
     (rises.len() >= 3 && last > first).then(|| (rises.len() - 1) as f64 / (last - first))
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    fn swing(factor: f64) -> Vec<[f64; 3]> {
-        (0..200)
-            .map(|i| {
-                let theta = 0.5 * (0.1 * f64::from(i)).sin();
-                [factor * 200.0 * theta.sin(), 200.0 * theta.cos(), 0.01]
-            })
-            .collect()
-    }
-
-    #[test]
-    fn a_turned_plane_of_swing_is_told_from_a_link_that_is_none() {
-        assert!((squeeze(&swing(0.75)).unwrap() - 0.75).abs() < 1e-6);
-        assert!(squeeze(&swing(1.0)).is_none_or(|c| (c - 1.0).abs() < 1e-6));
-        let loose: Vec<[f64; 3]> =
-            swing(1.0).iter().enumerate().map(|(i, s)| [s[0], s[1] * (1.0 + 0.1 * (i as f64).sin()), s[2]]).collect();
-        assert!(squeeze(&loose).is_none_or(|c| c > 0.97));
-    }
 }
