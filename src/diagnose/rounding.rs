@@ -2,7 +2,7 @@
 
 use super::refit::Refit;
 use crate::fit::Record;
-use crate::fit::noise::step_rad;
+use crate::series::noise::step_rad;
 
 /// Places of the encoder's zero within a step that are tried: what the rounding makes depends on it.
 const ZEROS: usize = 4;

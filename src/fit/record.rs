@@ -3,9 +3,9 @@
 use std::ops::Range;
 use std::path::PathBuf;
 
-use super::noise::rounding_in_step;
 use crate::error::{Error, Result};
 use crate::series::AngleSeries;
+use crate::series::noise::rounding_in_step;
 use crate::statistics::median;
 
 /// Errors of a tracked angle in step with the swing, as a share of its noise: 0.007 px beside a noise of 0.025 to 0.035 px in the training videos of the

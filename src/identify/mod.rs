@@ -311,7 +311,7 @@ impl Identification {
         }
         // a wide swing is no sum of a few sinusoids: what they leave is more than noise
         let of_values = |link: &LinkSamples| {
-            crate::fit::noise::of_angle(&link.t_s, &link.theta_rad.iter().copied().map(Some).collect::<Vec<_>>())
+            crate::series::noise::of_angle(&link.t_s, &link.theta_rad.iter().copied().map(Some).collect::<Vec<_>>())
         };
         if modes.iter().any(|mode| mode.residual_excess > 1.0) {
             let least = signal.links.iter().map(of_values);

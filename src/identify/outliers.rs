@@ -3,8 +3,8 @@
 //! Each value is held against the cubic through the two before and the two after it. A motion leaves there what is smooth in time, so that neighbours leave as much;
 //! a value that leaves far more than those around it is none of the motion's.
 
-use super::signal::LinkSamples;
-use crate::fit::noise::step_rad;
+use super::signal::{LinkSamples, Signal};
+use crate::series::noise::step_rad;
 use crate::statistics::median;
 
 /// A value stands out by so many standard deviations of what its neighbours leave (statistics)…
@@ -18,8 +18,19 @@ const MOST: f64 = 0.02;
 /// Values on each side through which the cubic goes.
 const NEAR: usize = 2;
 
+impl Signal {
+    /// Without the values that stand out from their neighbours; how many of each link. `None` where there are none.
+    #[must_use]
+    pub(super) fn without_outliers(&self) -> Option<(Self, Vec<usize>)> {
+        let links: Vec<LinkSamples> = self.links.iter().map(without_outliers).collect();
+        let counts = self.links.iter().zip(&links).map(|(all, kept)| all.t_s.len() - kept.t_s.len());
+        let counts: Vec<usize> = counts.collect();
+        counts.iter().any(|count| *count > 0).then(|| (Self { links, ..self.clone() }, counts))
+    }
+}
+
 /// A link's samples without those that stand out.
-pub fn without_outliers(link: &LinkSamples) -> LinkSamples {
+fn without_outliers(link: &LinkSamples) -> LinkSamples {
     let mut kept = link.clone();
     let steps = step_rad(&link.theta_rad.iter().copied().map(Some).collect::<Vec<_>>());
     let least = STEPS * steps.unwrap_or(0.0);

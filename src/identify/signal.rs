@@ -1,6 +1,5 @@
 //! The measured samples of each link, without the missing ones.
 
-use super::outliers::without_outliers;
 use crate::series::AngleSeries;
 use crate::statistics::median_step_s;
 
@@ -134,15 +133,6 @@ impl Signal {
             }
         }
         (self, wrapped)
-    }
-
-    /// Without the values that stand out from their neighbours ([`super::outliers`]); how many of each link. `None` where there are none.
-    #[must_use]
-    pub fn without_outliers(&self) -> Option<(Self, Vec<usize>)> {
-        let links: Vec<LinkSamples> = self.links.iter().map(without_outliers).collect();
-        let counts = self.links.iter().zip(&links).map(|(all, kept)| all.t_s.len() - kept.t_s.len());
-        let counts: Vec<usize> = counts.collect();
-        counts.iter().any(|count| *count > 0).then(|| (Self { links, ..self.clone() }, counts))
     }
 
     /// From the first time stamp to the last.

@@ -4,6 +4,7 @@
 
 mod clock;
 mod columns;
+pub mod noise;
 mod plausible;
 mod standstill;
 

@@ -9,6 +9,10 @@ use super::smooth::smooth;
 use super::{Filtered, Flags, Measured, Point};
 use crate::statistics::median;
 
+/// Frames of a speed that show how large a mark is at it, and the least difference of speeds (px a frame) that does.
+const FEWEST_OF_A_SPEED: usize = 10;
+const LEAST_SPEED_PX: f64 = 1.0;
+
 /// The marks' tracks over the whole recording.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Tracks {
@@ -37,13 +41,14 @@ impl Tracks {
         let mut areas: Vec<f64> = measured.iter().flatten().map(|m| f64::from(m.area_px2)).collect();
         let area = median(&mut areas).unwrap_or(0.0);
         let speeds = speeds_px(&measured);
+        let usual_px2 = usual_area(&measured, &speeds, area);
         for ((m, f), speed) in measured.iter_mut().zip(&mut flags).zip(speeds) {
             if let Some(m) = m {
                 let [x, y] = [0, 1].map(|axis| variance_factor(speed, scatter.resting[axis], scatter.moving[axis]));
                 m.covariance_px2[0] *= x;
                 m.covariance_px2[1] *= y;
                 m.covariance_px2[2] *= (x * y).sqrt();
-                mind_area(m, f, area);
+                mind_area(m, f, usual_px2(speed));
             }
         }
         let motion = Motion { acceleration_psd_px2_s3: acceleration_psd(&measured, &self.t_s, step_s) };
@@ -84,6 +89,28 @@ impl Tracks {
         let filtered: Vec<Option<Filtered>> = self.marks[mark].iter().map(|p| p.filtered).collect();
         smooth(&filtered, &self.t_s, &self.motion[mark])
     }
+}
+
+/// The area that a mark usually has at a speed: the exposure smears it the more the faster it is (or takes its edges below the threshold).
+///
+/// ```text
+/// A(v) = A_s + (A_f − A_s) (v − v_s)/(v_f − v_s)      medians of the slowest third of its frames and of the fastest
+/// ```
+fn usual_area(measured: &[Option<Measured>], speeds_px: &[f64], median_px2: f64) -> impl Fn(f64) -> f64 + use<> {
+    let seen = measured.iter().zip(speeds_px).filter_map(|(m, speed)| Some([*speed, f64::from(m.as_ref()?.area_px2)]));
+    let mut rows: Vec<[f64; 2]> = seen.collect();
+    rows.sort_by(|a, b| a[0].total_cmp(&b[0]));
+    let third = rows.len() / 3;
+    let of = |rows: &[[f64; 2]]| {
+        let middle = |k: usize| median(&mut rows.iter().map(|row| row[k]).collect::<Vec<_>>()).unwrap_or(0.0);
+        [middle(0), middle(1)]
+    };
+    let [[slow_px, slow_px2], [fast_px, fast_px2]] = [of(&rows[..third]), of(&rows[rows.len() - third..])];
+    let tells = third >= FEWEST_OF_A_SPEED && fast_px - slow_px > LEAST_SPEED_PX;
+    let slope = if tells { (fast_px2 - slow_px2) / (fast_px - slow_px) } else { 0.0 };
+    let at_rest = if tells { slow_px2 - slope * slow_px } else { median_px2 };
+    // beyond the speeds that were seen often nothing is known
+    move |speed_px| (at_rest + slope * speed_px.min(fast_px)).max(0.5 * median_px2)
 }
 
 /// A mark that is partly hidden has its centroid off by up to the hidden share of its radius; one that has grown
