@@ -160,7 +160,9 @@ fn of_state(place: LawPlace, state: &'static str, largest: Largest) -> Vec<Term>
         // what changes is plain: a damper, a spring, a dry friction
         let is_plain = shape.starts.is_empty() && shape.words != "one-sided";
         let of_time = WITH_TIME.iter().filter(|_| is_plain && shape.power < 2);
-        let of_angle = WITH_ANGLE.iter().filter(|_| is_plain && state == "rate");
+        // a magnet's brake goes with the rate; what friction does with the angle a swing that dies away hardly shows
+        let is_brake = |own: &&Modulation| own.starts.is_empty() || shape.power == 1;
+        let of_angle = WITH_ANGLE.iter().filter(|_| is_plain && state == "rate").filter(is_brake);
         let of_time = of_time.map(|modulation| (modulation, largest.time_s));
         for (modulation, most) in of_time.chain(of_angle.map(|modulation| (modulation, largest.angle))) {
             let times = modulation.starts.iter().map(|part| Some(part * most));
