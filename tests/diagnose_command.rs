@@ -124,8 +124,9 @@ impl Folder {
         let heading = if base.contains("[model.effects]") { "" } else { "[model.effects]\n" };
         let config = self.write("simulated.toml", &format!("{base}{heading}{effects}"));
         let out = self.path("angles.csv");
+        let usual: &[&str] = if options.contains(&"--rate") { &[] } else { &["--rate", "30"] };
         freeswing("simulate")
-            .args(["--rate", "30"])
+            .args(usual)
             .args(options)
             .arg("--config")
             .arg(config)
@@ -134,6 +135,22 @@ impl Folder {
             .assert()
             .success();
         out
+    }
+
+    /// The same table from an encoder of so many steps a turn.
+    fn in_steps(&self, angles: &Path, steps: f64) -> PathBuf {
+        let table = fs::read_to_string(angles).unwrap();
+        let column = table.lines().next().unwrap().split(',').position(|name| name == "theta1_rad").unwrap();
+        let stepped = |(row, line): (usize, &str)| {
+            let mut cells: Vec<String> = line.split(',').map(str::to_owned).collect();
+            if row > 0 {
+                let step_rad = std::f64::consts::TAU / steps;
+                let angle_rad: f64 = cells[column].parse().unwrap();
+                cells[column] = format!("{:.7}", (angle_rad / step_rad).round() * step_rad);
+            }
+            cells.join(",") + "\n"
+        };
+        self.write("steps.csv", &table.lines().enumerate().map(stepped).collect::<String>())
     }
 
     /// What a diagnosis with some further options writes.
@@ -345,23 +362,49 @@ fn an_encoder_that_rests_half_the_time_has_no_exact_angles() {
     let folder = Folder::new();
     let options = ["--duration", "40", "--noise-rad", "0", "--seed", "1"];
     let angles = folder.simulated(ONE_LINK, "hinge_coulomb = 3e-2\n", &options);
-    let table = fs::read_to_string(&angles).unwrap();
-    let column = table.lines().next().unwrap().split(',').position(|name| name == "theta1_rad").unwrap();
-    let stepped = |(row, line): (usize, &str)| {
-        let mut cells: Vec<String> = line.split(',').map(str::to_owned).collect();
-        if row > 0 {
-            let step_rad = std::f64::consts::TAU / 3600.0;
-            let angle_rad: f64 = cells[column].parse().unwrap();
-            cells[column] = format!("{:.7}", (angle_rad / step_rad).round() * step_rad);
-        }
-        cells.join(",") + "\n"
-    };
-    let angles = folder.write("steps.csv", &table.lines().enumerate().map(stepped).collect::<String>());
+    let angles = folder.in_steps(&angles, 3600.0);
     let report = folder.diagnosis(&angles, ONE_LINK, &[]);
     let verdict = &report["verdict"];
     assert_eq!(names(&verdict["effects"]), ["hinge_coulomb"], "{verdict:#}");
     let friction = &report["candidates"][0]["parameters"]["hinge_coulomb"]["value"];
     assert!((friction.as_f64().unwrap() / 3e-2 - 1.0).abs() < 0.02, "{friction}");
+}
+
+/// A bob on an arm, let go at an angle, with the friction and drag that are stated.
+fn bob(release_rad: f64, effects: &str) -> String {
+    format!(
+        "[specimen]\n[[specimen.links]]\nlength_m = 0.35\nmass_kg = 0.207\ncom_m = 0.30\ninertia_kg_m2 = 1.96e-3\n\
+         [model]\nc_eq_n_m_s_per_rad = 1e-4\nrelease_rad = [{release_rad}]\n[model.effects]\n{effects}"
+    )
+}
+
+#[test]
+fn the_rounding_of_a_coarse_encoder_is_nothing_that_is_missing() {
+    let folder = Folder::new();
+    for release_rad in [0.0524, 0.14] {
+        let base = bob(release_rad, "");
+        let angles = folder.simulated(&base, "", &["--rate", "100", "--duration", "60", "--noise-rad", "0"]);
+        let report = folder.diagnosis(&folder.in_steps(&angles, 1000.0), &base, &[]);
+        assert_eq!(report["verdict"]["status"], "adequate", "{:#}", report["verdict"]);
+    }
+}
+
+#[test]
+fn friction_and_drag_are_found_where_the_file_s_damper_imitates_both() {
+    let folder = Folder::new();
+    let truth = bob(1.396, "hinge_coulomb = 8e-4\nair_quadratic = 0.02286\n");
+    let options = ["--rate", "100", "--duration", "30", "--noise-rad", "4.5e-4", "--seed", "1"];
+    let angles = folder.simulated(&truth, "", &options);
+    // as a laboratory measures it: to half a percent
+    let base = bob(1.396, "")
+        .replace("com_m = 0.30", "com_m = 0.3005")
+        .replace("0.207", "0.209")
+        .replace("1.96e-3", "1.942e-3");
+    let report = folder.diagnosis(&angles, &base, &[]);
+    let verdict = &report["verdict"];
+    let mut found = names(&verdict["effects"]);
+    found.sort_unstable();
+    assert_eq!(found, ["air_quadratic", "hinge_coulomb"], "{verdict:#}");
 }
 
 #[test]
