@@ -13,7 +13,7 @@ use super::modulated::Modulated;
 use super::signal::Signal;
 use super::sinusoids::SinusoidFit;
 use super::spectrum::Spectrum;
-use super::windows::{Windows, frequencies_over_hz};
+use super::windows::{Windows, over_stretches};
 use crate::series::Measured;
 
 /// A way to a frequency or a damping ratio.
@@ -126,14 +126,17 @@ impl Estimators {
         Consistency::of(&others.chain([own]).collect::<Vec<_>>())
     }
 
-    /// A frequency with an interval that holds those of the record's stretches, where no law of one oscillation describes a record too short for windows: two
-    /// modes too close to be told apart, frames that are missing though the stamps go on, a push.
-    fn over_stretches(&self, whole: &Whole, frequency_hz: Estimate) -> Estimate {
+    /// A frequency and a damping ratio with intervals that hold those of the record's stretches, where no law of one oscillation describes a record too short for
+    /// windows: two modes too close to be told apart, frames that are missing though the stamps go on, a push, a finger that brakes it. The damping ratio only where
+    /// more than noise is left.
+    fn over_stretches(&self, whole: &Whole, [f_hz, xi]: [Estimate; 2]) -> [Estimate; 2] {
         if whole.modulated.is_some() || whole.windows.is_ok() {
-            return frequency_hz;
+            return [f_hz, xi];
         }
-        frequencies_over_hz(whole.signal, whole.fit)
-            .map_or(frequency_hz, |[low, high]| frequency_hz.covering(low, high))
+        let Some([f_ends, xi_ends]) = over_stretches(whole.signal, whole.fit) else { return [f_hz, xi] };
+        let covering = |own: Estimate, [low, high]: [f64; 2]| own.covering(low, high);
+        let uneven = self.residual_excess > 1.0;
+        [covering(f_hz, f_ends), if uneven { covering(xi, xi_ends) } else { xi }]
     }
 
     /// The laws at small amplitude; the damped sinusoids where the amplitude does not matter or its effect cannot be followed.
@@ -185,6 +188,7 @@ impl Estimators {
                 && is_told(law)
         };
         let law = envelope.and_then(|e| e.frequency.filter(|f| sound(e, f)).map(|f| (e, f)));
+        let wide = self.over_stretches(whole, [frequency_hz.blurred(changed_hz), damping_ratio.blurred(changed_xi)]);
         match law {
             Some((envelope, law)) if felt || self.residual_excess > 1.0 => Choice {
                 frequency_hz: {
@@ -200,14 +204,14 @@ impl Estimators {
                 at_small_amplitude: true,
             },
             None if felt || self.residual_excess > 1.0 => Choice {
-                frequency_hz: self.over_stretches(whole, frequency_hz.blurred(changed_hz)),
-                damping_ratio: damping_ratio.blurred(changed_xi),
+                frequency_hz: wide[0],
+                damping_ratio: wide[1],
                 frequency_at_rad: felt.then(|| amplitudes_rad[mode] * weighed(decays).sqrt()),
                 basis: "damped sinusoids over the whole record; widened for what amplitude may have changed".to_owned(),
                 at_small_amplitude: false,
             },
             _ => Choice {
-                frequency_hz: self.over_stretches(whole, frequency_hz),
+                frequency_hz: self.over_stretches(whole, [frequency_hz, damping_ratio])[0],
                 damping_ratio,
                 frequency_at_rad: None,
                 basis: "damped sinusoids over the whole record".to_owned(),

@@ -159,9 +159,9 @@ impl Windows {
     }
 }
 
-/// From the lowest to the highest frequency of a mode alone in stretches of a record that is too short for windows; where it is clear of the noise in two
-/// of them.
-pub(super) fn frequencies_over_hz(signal: &Signal, fit: &SinusoidFit) -> Option<[f64; 2]> {
+/// From the lowest to the highest frequency (Hz) and damping ratio of a mode alone in stretches of a record that is too short for windows; where it is clear of the
+/// noise in two of them.
+pub(super) fn over_stretches(signal: &Signal, fit: &SinusoidFit) -> Option<[[f64; 2]; 2]> {
     let [pole] = fit.poles[..] else { return None };
     let cycles = signal.duration_s() * pole.omega_rad_s / std::f64::consts::TAU;
     let count = (cycles / STRETCH_CYCLES).floor();
@@ -171,9 +171,11 @@ pub(super) fn frequencies_over_hz(signal: &Signal, fit: &SinusoidFit) -> Option<
         let stretch = signal.between(from_s, from_s + stretch_s);
         window_fit(&stretch, from_s + 0.5 * stretch_s, &fit.poles, &fit.poles)
     };
-    let local: Vec<f64> = (0..count as usize).filter_map(of_stretch).map(|fit| fit.poles[0].frequency_hz()).collect();
-    let ends = local.iter().fold([f64::INFINITY, 0.0], |[low, high], f| [f.min(low), f.max(high)]);
-    (local.len() >= 2).then_some(ends)
+    let local: Vec<Pole> = (0..count as usize).filter_map(of_stretch).map(|fit| fit.poles[0]).collect();
+    let ends = |of: fn(&Pole) -> f64| {
+        local.iter().map(of).fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], own| [low.min(own), high.max(own)])
+    };
+    (local.len() >= 2).then(|| [ends(Pole::frequency_hz), ends(Pole::damping_ratio)])
 }
 
 /// Fits a window with all modes, or with fewer when the weaker ones have died away.
