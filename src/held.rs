@@ -12,8 +12,8 @@ const STILL: f64 = 0.04;
 const LONGEST_REST: f64 = 1.5;
 /// A hold after the beginning is at least this part of the swing that follows away from its middle: let go from there, it swings as far.
 const ASIDE: f64 = 0.5;
-/// And one at the end is so many times [`STILL`] away from it: an encoder rests beside the middle, too.
-const CAUGHT: f64 = 2.0;
+/// And one at the end is this part of the swing before it away from it: dry friction stops a swing within a fifth of what its last passes reached.
+const CAUGHT: f64 = 0.35;
 /// Values whose median is where it is held.
 const FIRST: usize = 5;
 /// Fewest values, and fewest passes of the middle, that show a swing.
@@ -37,7 +37,7 @@ pub fn caught_of(paths: impl Iterator<Item = (Vec<f64>, Vec<f64>)>) -> Option<f6
     let paths = Paths::of(paths.map(|(t_s, values)| (reversed(&t_s, -1.0), reversed(&values, 1.0))))?;
     let (t_s, values) = paths.widest()?;
     let hold = Swing::of(t_s, values)?.hold(0, paths.range)?;
-    let is_caught = hold.aside > 2.0 * CAUGHT * STILL * hold.farthest && paths.are_still(t_s[0]..t_s[hold.leaves]);
+    let is_caught = hold.aside > CAUGHT * hold.farthest && paths.are_still(t_s[0]..t_s[hold.leaves]);
     is_caught.then(|| -t_s[hold.leaves])
 }
 
@@ -223,6 +223,20 @@ mod tests {
         // a swing that has become small, and one that comes to rest
         (0..40).for_each(|k| assert_eq!(caught(&|t| (-0.25 * t).exp() * swing(t + 0.05 * f64::from(k), 0.0)), None));
         assert_eq!(caught(&|t| (-0.8 * t).exp() * swing(t, 0.0)), None);
+        // one that dry friction stops, beside its middle by at most δ
+        for k in 0..20 {
+            let (delta, omega) = (0.02 + 0.001 * f64::from(k), 6.0);
+            let stopped = |t: f64| {
+                let (mut amplitude, mut half) = (0.3, 0.0);
+                while amplitude > delta && t > (half + 1.0) * std::f64::consts::PI / omega {
+                    (amplitude, half) = (amplitude - 2.0 * delta, half + 1.0);
+                }
+                let side = if half % 2.0 == 0.0 { 1.0 } else { -1.0 };
+                let phase = omega * t - half * std::f64::consts::PI;
+                side * if amplitude > delta { (amplitude - delta) * phase.cos() + delta } else { amplitude }
+            };
+            assert_eq!(caught(&stopped), None, "{delta}");
+        }
         assert_eq!(caught(&|t| 0.3 * (-0.1 * t).exp() * (6.0 * t).cos() * (0.3 * t).cos()), None);
     }
 
