@@ -73,8 +73,8 @@ pub(super) fn link_length(m: &Measurement, options: &Options, link: usize, first
     ))
 }
 
-/// Δy² = α + β Δx² by least squares, where that explains most of the change of the length: [α, β].
-fn length_against_swing(spans: &[[f64; 3]]) -> Option<[f64; 2]> {
+/// β of Δy² = α + β Δx² by least squares, where that explains most of the change of the length.
+fn length_against_swing(spans: &[[f64; 3]]) -> Option<f64> {
     let n = spans.len() as f64;
     let mean = |f: &dyn Fn(&[f64; 3]) -> f64| spans.iter().map(f).sum::<f64>() / n;
     let (mx, my) = (mean(&|s| s[0] * s[0]), mean(&|s| s[1] * s[1]));
@@ -84,14 +84,13 @@ fn length_against_swing(spans: &[[f64; 3]]) -> Option<[f64; 2]> {
     let length2 = my - slope * mx;
     let rest = |factor: f64, of: f64| mean(&|s| (s[1] * s[1] + factor * s[0] * s[0] - of).powi(2)).sqrt();
     let explained = rest(-slope, length2) < 0.5 * rest(1.0, mx + my);
-    (explained && mx.sqrt() > 0.05 * length2.max(0.0).sqrt()).then_some([length2, slope])
+    (explained && mx.sqrt() > 0.05 * length2.max(0.0).sqrt()).then_some(slope)
 }
 
 /// The factor c by which x is shortened, from Δy² = L² − Δx²/c²; `None` where the link does not swing far enough, or where this does not explain most of the
 /// change.
 fn squeeze(spans: &[[f64; 3]]) -> Option<f64> {
-    let [_, slope] = length_against_swing(spans)?;
-    (slope < -1.0).then(|| (-1.0 / slope).sqrt())
+    length_against_swing(spans).filter(|slope| *slope < -1.0).map(|slope| (-1.0 / slope).sqrt())
 }
 
 /// Whether the link swings in an ellipse of half axes a in the picture and b < a across it, about the vertical: Δy² = L² − b² − (1 − b²/a²) Δx².
@@ -101,7 +100,7 @@ fn is_ellipse(spans: &[[f64; 3]]) -> bool {
     let spread = (spans.iter().map(|s| (s[0] - middle).powi(2)).sum::<f64>() / n).sqrt();
     // a pivot beside the true one makes the link longer to one side
     let is_even = middle.abs() < 0.5 * spread;
-    is_even && length_against_swing(spans).is_some_and(|[_, slope]| (-1.0..0.0).contains(&slope))
+    is_even && length_against_swing(spans).is_some_and(|slope| (-1.0..0.0).contains(&slope))
 }
 
 /// Which way the first link hangs: a film may be upside down, or lie on its side.

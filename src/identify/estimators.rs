@@ -188,7 +188,6 @@ impl Estimators {
                 && is_told(law)
         };
         let law = envelope.and_then(|e| e.frequency.filter(|f| sound(e, f)).map(|f| (e, f)));
-        let wide = self.over_stretches(whole, [frequency_hz.blurred(changed_hz), damping_ratio.blurred(changed_xi)]);
         match law {
             Some((envelope, law)) if felt || self.residual_excess > 1.0 => Choice {
                 frequency_hz: {
@@ -203,13 +202,18 @@ impl Estimators {
                 basis: "windows: f and ξ at small amplitude".to_owned(),
                 at_small_amplitude: true,
             },
-            None if felt || self.residual_excess > 1.0 => Choice {
-                frequency_hz: wide[0],
-                damping_ratio: wide[1],
-                frequency_at_rad: felt.then(|| amplitudes_rad[mode] * weighed(decays).sqrt()),
-                basis: "damped sinusoids over the whole record; widened for what amplitude may have changed".to_owned(),
-                at_small_amplitude: false,
-            },
+            None if felt || self.residual_excess > 1.0 => {
+                let changed = [frequency_hz.blurred(changed_hz), damping_ratio.blurred(changed_xi)];
+                let [frequency_hz, damping_ratio] = self.over_stretches(whole, changed);
+                Choice {
+                    frequency_hz,
+                    damping_ratio,
+                    frequency_at_rad: felt.then(|| amplitudes_rad[mode] * weighed(decays).sqrt()),
+                    basis: "damped sinusoids over the whole record; widened for what amplitude may have changed"
+                        .to_owned(),
+                    at_small_amplitude: false,
+                }
+            }
             _ => Choice {
                 frequency_hz: self.over_stretches(whole, [frequency_hz, damping_ratio])[0],
                 damping_ratio,

@@ -47,6 +47,8 @@ pub mod tumbling;
 mod unit;
 pub mod windows;
 
+use std::borrow::Cow;
+
 use serde::Serialize;
 
 pub use damping::{Damping, Trend};
@@ -141,14 +143,12 @@ pub struct Identification {
 /// [`crate::Error::Simulation`] when the experiment's specimen cannot swing. What the data cannot tell is no error but says so in the result.
 pub fn identify(series: &AngleSeries, experiment: Option<&Experiment>) -> Result<Identification> {
     let body = experiment.map(|e| Ok(Body { experiment: e, chain: Chain::of(&e.specimen)? })).transpose()?;
-    let let_go = series.let_go();
-    let series = let_go.as_ref().map_or(series, |(_, rest)| rest);
-    let caught = series.caught();
-    let series = caught.as_ref().map_or(series, |(_, swing)| swing);
+    let (series, [held_until_s, caught_s]) = free(series);
+    let series = &*series;
     let (signal, wrapped) = Signal::of(series).unwrapped();
     let mut found = Identification::of_record(series, &signal, Measured::Angles);
-    found.held_until_s = let_go.as_ref().map(|(held_s, _)| *held_s);
-    found.rests_from_s = caught.as_ref().map(|(caught_s, _)| *caught_s);
+    found.held_until_s = held_until_s;
+    found.rests_from_s = caught_s;
     for link in wrapped {
         found.notes.push(format!("θ{} jumps by full turns, as wrapped angles do: taken out", link + 1));
     }
@@ -156,16 +156,24 @@ pub fn identify(series: &AngleSeries, experiment: Option<&Experiment>) -> Result
     Ok(found.with_modes(signal, body.as_ref()))
 }
 
+/// The part of a series in which nothing is held, until when it is held before, and from when on after it.
+fn free(series: &AngleSeries) -> (Cow<'_, AngleSeries>, [Option<f64>; 2]) {
+    let (held_until_s, free) = match series.let_go() {
+        Some((held_s, free)) => (Some(held_s), Cow::Owned(free)),
+        None => (None, Cow::Borrowed(series)),
+    };
+    match free.caught() {
+        Some((caught_s, swing)) => (Cow::Owned(swing), [held_until_s, Some(caught_s)]),
+        None => (free, [held_until_s, None]),
+    }
+}
+
 /// Identifies the displacement of one mark, over [`crate::series::PX_PER_RAD`].
 pub fn identify_displacement(series: &AngleSeries) -> Identification {
-    let let_go = series.let_go();
-    let series = let_go.as_ref().map_or(series, |(_, rest)| rest);
-    let caught = series.caught();
-    let series = caught.as_ref().map_or(series, |(_, swing)| swing);
+    let (series, [held_until_s, rests_from_s]) = free(series);
+    let series = &*series;
     let signal = Signal::of(series);
     let found = Identification::of_record(series, &signal, Measured::Displacement);
-    let held_until_s = let_go.as_ref().map(|(held_s, _)| *held_s);
-    let rests_from_s = caught.as_ref().map(|(caught_s, _)| *caught_s);
     Identification { held_until_s, rests_from_s, ..found }.with_modes(signal, None)
 }
 

@@ -73,8 +73,9 @@ impl Law for MovingSupport {
             return prior.support_beside_a_law;
         }
         let Some(base) = fit_of(&Hypothesis::default()) else { return 1.0 };
-        let in_step = if is_in_step(base, hz) { prior.support_in_step } else { 1.0 };
-        in_step * chance_of_multiple(base, hz).map_or(1.0, |chance| chance / (1.0 + chance))
+        let powers = chord_powers(base);
+        let in_step = if is_in_step(&powers, hz) { prior.support_in_step } else { 1.0 };
+        in_step * chance_of_multiple(&powers, hz).map_or(1.0, |chance| chance / (1.0 + chance))
     }
 }
 
@@ -160,9 +161,8 @@ fn only_leans(fit: &Refit<'_>) -> bool {
 
 /// Where a support would move at a multiple of the swing's frequency, how likely that is by chance: the part of the frequencies that lie within a resolution of a
 /// multiple. As likely is something that goes with the swing: a sensor off its centre, a spring stiffer to one side.
-fn chance_of_multiple(null: &Refit<'_>, frequency_hz: f64) -> Option<f64> {
-    (0..null.problem.records.len()).find_map(|record| {
-        let (power, span_s) = chord_powers(null, record)?.into_iter().next()?;
+fn chance_of_multiple(powers: &[Vec<Power>], frequency_hz: f64) -> Option<f64> {
+    powers.iter().filter_map(|of_record| of_record.first()).find_map(|Power { of_bins: power, span_s }| {
         let highest = (1..power.len() - 1).max_by(|a, b| power[*a].total_cmp(&power[*b]))?;
         let [before, at, after] = [highest - 1, highest, highest + 1].map(|k| power[k].max(f64::MIN_POSITIVE).ln());
         let peak = highest as f64 + 0.5 * (after - before) / (2.0 * at - before - after).max(f64::MIN_POSITIVE);
@@ -174,23 +174,31 @@ fn chance_of_multiple(null: &Refit<'_>, frequency_hz: f64) -> Option<f64> {
 
 /// Whether a support would move at a frequency at which the base model's own motion has power. Such a support can stand for any torque in step with
 /// the swing, so it names nothing.
-fn is_in_step(null: &Refit<'_>, frequency_hz: f64) -> bool {
-    (0..null.problem.records.len()).any(|record| {
-        chord_powers(null, record).into_iter().flatten().any(|(power, span_s)| {
-            let bin = (frequency_hz * span_s).round() as usize;
-            let strongest = power[1..].iter().copied().fold(0.0, f64::max);
-            let near = bin.saturating_sub(1)..(bin + 2).min(power.len());
-            power[near.start.min(power.len())..near.end].iter().any(|p| *p > POWER_IN_STEP * strongest)
-        })
+fn is_in_step(powers: &[Vec<Power>], frequency_hz: f64) -> bool {
+    powers.iter().flatten().any(|Power { of_bins: power, span_s }| {
+        let bin = (frequency_hz * span_s).round() as usize;
+        let strongest = power[1..].iter().copied().fold(0.0, f64::max);
+        let near = bin.saturating_sub(1)..(bin + 2).min(power.len());
+        power[near.start.min(power.len())..near.end].iter().any(|p| *p > POWER_IN_STEP * strongest)
     })
 }
 
-/// The power of a fit's own motion at each frequency, of each angle, and over which time.
-fn chord_powers(fit: &Refit<'_>, record: usize) -> Option<Vec<(Vec<f64>, f64)>> {
-    let (model, swing, true_s) = fit.motion(record)?;
-    let chords: Vec<Vec<f64>> =
-        true_s.iter().map(|t| chord_angles_rad(model.chain(), &swing.at(*t).theta_rad)).collect();
-    let span_s = true_s[true_s.len() - 1] - true_s[0];
-    let of = |link: usize| noise::spectrum(&chords.iter().map(|c| c[link]).collect::<Vec<f64>>());
-    Some((0..fit.problem.marks()).map(|link| (of(link), span_s)).collect())
+/// The power of a motion at each multiple of 1/T.
+struct Power {
+    of_bins: Vec<f64>,
+    /// T.
+    span_s: f64,
+}
+
+/// That of a fit's own motion, of each angle of each record that it can be integrated through.
+fn chord_powers(fit: &Refit<'_>) -> Vec<Vec<Power>> {
+    let of_record = |record: usize| {
+        let (model, swing, true_s) = fit.motion(record)?;
+        let chords: Vec<Vec<f64>> =
+            true_s.iter().map(|t| chord_angles_rad(model.chain(), &swing.at(*t).theta_rad)).collect();
+        let span_s = true_s[true_s.len() - 1] - true_s[0];
+        let of_bins = |link: usize| noise::spectrum(&chords.iter().map(|c| c[link]).collect::<Vec<f64>>());
+        Some((0..fit.problem.marks()).map(|link| Power { of_bins: of_bins(link), span_s }).collect())
+    };
+    (0..fit.problem.records.len()).filter_map(of_record).collect()
 }

@@ -19,6 +19,15 @@ pub fn is_of_kind(term: &Term, effect: Effect) -> bool {
     entry.shapes.contains(&term.shape) && (term.state == "angle") == (entry.phase == Some(Phase::Position))
 }
 
+/// The place of the table at which a law acts.
+pub fn place_of(law: LawPlace) -> Place {
+    match law {
+        LawPlace::Hinge | LawPlace::Support => Place::Hinge,
+        LawPlace::Joint => Place::Joint,
+        LawPlace::Strip | LawPlace::Tip => Place::Air,
+    }
+}
+
 /// Of the angle between two columns; 0 where one of them is nothing.
 pub fn cosine(a: &DVectorView<'_, f64>, b: &DVectorView<'_, f64>) -> f64 {
     a.dot(b) / (a.norm() * b.norm()).max(f64::MIN_POSITIVE)
@@ -108,12 +117,7 @@ impl Along {
     /// Whether a term acts where an effect does. Along a single link hinge, strip and tip are one place.
     fn is_at_place(&self, term: &Term, effect: Effect) -> bool {
         let is_single = self.motions.iter().all(|(model, _)| model.chain().count() == 1);
-        let place = match term.law.place {
-            LawPlace::Hinge | LawPlace::Support => Place::Hinge,
-            LawPlace::Joint => Place::Joint,
-            LawPlace::Strip | LawPlace::Tip => Place::Air,
-        };
-        effect.place() == place || (is_single && matches!(effect.place(), Place::Hinge | Place::Air))
+        effect.place() == place_of(term.law.place) || (is_single && matches!(effect.place(), Place::Hinge | Place::Air))
     }
 
     /// Of a unit of an effect's first coefficient.

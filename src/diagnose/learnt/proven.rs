@@ -7,10 +7,9 @@ use super::super::effect::{Effect, Place};
 use super::super::grammar::Term;
 use super::super::heldout::{self, HeldOut, Prediction};
 use super::super::refit::Refit;
-use super::along::Along;
+use super::along::{Along, place_of};
 use super::described::Described;
 use super::fitted::with_laws;
-use crate::experiment::LawPlace;
 use crate::model::Parameter;
 
 /// A law that was learnt.
@@ -31,12 +30,7 @@ pub struct Learnt<'a> {
 impl Learnt<'_> {
     /// Where its first term acts.
     pub fn place(&self) -> Option<Place> {
-        let place = match self.terms.first()?.law.place {
-            LawPlace::Hinge | LawPlace::Support => Place::Hinge,
-            LawPlace::Joint => Place::Joint,
-            LawPlace::Strip | LawPlace::Tip => Place::Air,
-        };
-        Some(place)
+        self.terms.first().map(|term| place_of(term.law.place))
     }
 
     /// The formula with its numbers.
