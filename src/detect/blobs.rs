@@ -94,8 +94,10 @@ pub(super) fn limbs(picture: &Picture<'_>, target: &Target, planes: &mut Planes)
     let (parts, plane) = parts(picture, target, planes)?;
     let is_disc = |part: &&Part| part.shape() >= LEAST_ROUNDNESS && !part.is_target();
     let discs = parts.iter().filter(is_disc);
-    let limb =
-        |part: &Part| centroid::limb::of(picture, target.axis, &silhouette(picture, target, part, plane.as_deref()));
+    let limb = |part: &Part| {
+        let silhouette = silhouette(picture, target, part, plane.as_deref());
+        centroid::limb::of(picture, target.axis, target.threshold, &silhouette)
+    };
     Ok(discs.filter_map(limb).collect())
 }
 

@@ -293,9 +293,7 @@ fn interpolated(plane: &Plane, x: usize, y: usize) -> f32 {
 fn silhouette(picture: &Picture<'_>, points_px: Vec<[f64; 2]>) -> Silhouette {
     let layout = picture.layout;
     let half_sample_px = [layout.chroma_shift_x, layout.chroma_shift_y].map(|shift| 0.5 * f64::from(1u32 << shift));
-    let n = points_px.len().max(1) as f64;
-    let centre_px = [0, 1].map(|axis| points_px.iter().map(|p| p[axis]).sum::<f64>() / n);
-    Silhouette { centre_px, points_px, half_sample_px }
+    Silhouette::of(points_px, half_sample_px)
 }
 
 #[cfg(test)]

@@ -105,7 +105,7 @@ pub fn look(path: &Path, options: &Options, folder: &Path, progress: &dyn Progre
             let worn: Vec<_> = worn.into_iter().map(|hue| looks[usize::from(hue)].clone()).collect();
             if !chain.is_steady(&all) {
                 unsteady.push((chain.worth, worn));
-            } else if let Some(finding) = measured(&mut session, worn, progress)? {
+            } else if let Some(finding) = measured(&mut session, worn, true, progress)? {
                 return Ok(finding);
             }
         }
@@ -118,7 +118,7 @@ pub fn look(path: &Path, options: &Options, folder: &Path, progress: &dyn Progre
     // a motion that is no oscillation, as a double pendulum that turns over
     unsteady.sort_by(|a, b| b.0.total_cmp(&a.0));
     for (_, worn) in unsteady.into_iter().take(CHAINS) {
-        if let Some(finding) = measured(&mut session, worn, progress)? {
+        if let Some(finding) = measured(&mut session, worn, false, progress)? {
             return Ok(finding);
         }
     }
@@ -138,12 +138,18 @@ fn further_stretches(session: &Session<'_>, first: &[FrameBlobs]) -> Vec<f64> {
     (1..STRETCHES).rev().map(|k| begin.t_s + room_s * k as f64 / (STRETCHES - 1) as f64).collect()
 }
 
-/// The chain that the things of these looks form throughout the recording, measured exactly.
-fn measured(session: &mut Session<'_>, looks: Vec<(Hue, String)>, progress: &dyn Progress) -> Result<Option<Finding>> {
+/// The chain that the things of these looks form throughout the recording, measured exactly; one that seemed steady must be so all the way.
+fn measured(
+    session: &mut Session<'_>,
+    looks: Vec<(Hue, String)>,
+    steady: bool,
+    progress: &dyn Progress,
+) -> Result<Option<Finding>> {
     let (hues, names): (Vec<Hue>, Vec<String>) = looks.into_iter().unzip();
     let mut frames = session.gather(hues, progress)?;
     let mut all = things(&frames);
-    let Some(mut chain) = hanging::longest(&all, &names) else { return Ok(None) };
+    let found = hanging::longest(&all, &names).filter(|chain| !steady || chain.is_steady(&all));
+    let Some(mut chain) = found else { return Ok(None) };
     // a hand that holds a mark covers part of it, at one end of its arc
     let held_until_s = held_until_s(&frames, &chain.marks.iter().map(|i| &all[*i]).collect::<Vec<_>>());
     if let Some(held_s) = held_until_s {

@@ -22,8 +22,9 @@ use crate::video::Picture;
 /// a and b of luma and both colour differences, 8-bit codes.
 pub type Shading = [[f32; 2]; CHANNELS];
 
-/// Parts of the edge, each of which must show its levels, with so many pixels.
+/// Parts of the edge, most of which must show their levels, with so many pixels: the others may lie in a highlight, of which there is one.
 const PARTS: usize = 8;
+const FEWEST_PARTS: usize = 6;
 const FEWEST_PIXELS: usize = 3;
 /// Distance from where the mark begins to fade: chroma interpolation reaches as far.
 const MARGIN_PX: f32 = 1.0;
@@ -32,20 +33,22 @@ const STEPS: usize = 12;
 /// Residual below which a pixel counts in full, codes: noise.
 const LEAST_RESIDUAL: f32 = 1.0;
 
-/// Reads the levels just inside the edge. `None` where some part of it has too few pixels: a mark that is small, or swept by
-/// its motion.
-pub fn of(picture: &Picture<'_>, axis: HueAxis, silhouette: &Silhouette) -> Option<Shading> {
+/// Reads the levels just inside the edge where they have the mark's colour, beyond `threshold`, so that no highlight counts. `None` where it has too few such
+/// pixels: a mark that is small, or swept by its motion.
+pub fn of(picture: &Picture<'_>, axis: HueAxis, threshold: i16, silhouette: &Silhouette) -> Option<Shading> {
     let outline = Outline::of(picture, axis, silhouette);
     let patch = Patch::read(picture, &outline);
     let zones = Zones::of(&patch, &outline);
+    let code = |level: f32| (level + 128.0).round() as u8;
+    let has_colour = |s: &Sample| axis.is_luma() || axis.of(code(s.levels[1]), code(s.levels[2])) > threshold;
     let is_near_edge = |sample: &&Sample| {
         let inside_px = -sample.depth_px(&outline) - outline.bands_px[usize::from(sample.sector)] - MARGIN_PX;
-        (0.0..RING_PX).contains(&inside_px)
+        (0.0..RING_PX).contains(&inside_px) && has_colour(sample)
     };
     let pixels: Vec<&Sample> = zones.core.into_iter().filter(is_near_edge).collect();
     let mut counts = [0; PARTS];
     pixels.iter().for_each(|sample| counts[usize::from(sample.sector) * PARTS / outline.count()] += 1);
-    if counts.iter().any(|count| *count < FEWEST_PIXELS) {
+    if counts.iter().filter(|count| **count >= FEWEST_PIXELS).count() < FEWEST_PARTS {
         return None;
     }
     let mut shading = Shading::default();

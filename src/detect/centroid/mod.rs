@@ -28,6 +28,7 @@ mod patch;
 mod profile;
 mod rim;
 mod share;
+mod silhouette;
 mod surroundings;
 mod symmetry;
 mod zones;
@@ -42,6 +43,7 @@ use patch::Patch;
 use profile::Profile;
 use rim::Rim;
 use share::Share;
+pub use silhouette::Silhouette;
 use surroundings::Surroundings;
 pub use symmetry::of_target;
 use zones::Zones;
@@ -55,17 +57,6 @@ pub enum Channels {
     Luma,
     /// The colour differences alone.
     Chroma,
-}
-
-/// A mark's rough place and shape, from the mask.
-#[derive(Debug, Clone)]
-pub struct Silhouette {
-    /// Mean of the mask, luma pixels.
-    pub centre_px: [f64; 2],
-    /// Masked samples as luma pixels, each sample with its half size.
-    pub points_px: Vec<[f64; 2]>,
-    /// Half a chroma sample, luma pixels.
-    pub half_sample_px: [f64; 2],
 }
 
 /// A mark, measured.

@@ -42,16 +42,17 @@ pub const RING_PX: f32 = 3.0;
 const FADE: f32 = 2.3;
 
 impl Outline {
-    /// From the mask.
+    /// From the mask: around its convex hull.
     pub fn of(picture: &Picture<'_>, axis: HueAxis, silhouette: &Silhouette) -> Self {
-        let centre_px = silhouette.centre_px.map(f64::round);
-        let [hx, hy] = silhouette.half_sample_px;
-        let area = silhouette.points_px.len() as f64 * 4.0 * hx * hy;
+        let hull = silhouette.convex();
+        let centre_px = hull.centre_px.map(f64::round);
+        let [hx, hy] = hull.half_sample_px;
+        let area = hull.points_px.len() as f64 * 4.0 * hx * hy;
         let radius = (area / std::f64::consts::PI).sqrt() as f32;
         // a sector is about two pixels wide at the ring; an odd number has no sector boundaries along both axes
         let count = ((TAU * (radius + 3.5) / 2.0) as usize).clamp(16, 96) | 1;
         let mut outline = Self { centre_px, radii_px: vec![0.0; count], bands_px: vec![LEAST_BAND_PX; count] };
-        outline.follow_mask(silhouette);
+        outline.follow_mask(&hull);
         let band_px = outline.band_from_profile(picture, axis, silhouette);
         outline.bands_px.fill(band_px);
         outline
