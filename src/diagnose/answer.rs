@@ -182,7 +182,11 @@ impl Answer {
             uncertified: findings.posterior.uncertified.clone(),
             class_probability: verdict.class_probability,
             unknown_probability: verdict.unknown,
-            inclusion: findings.posterior.inclusions(settings).into_iter().map(|(e, p)| (e.id(), p)).collect(),
+            inclusion: findings
+                .inclusions()
+                .into_iter()
+                .map(|(effect, probability)| (effect.id(), probability))
+                .collect(),
             remainder: Remainder::of(findings),
             law: findings.learnt.as_ref().and_then(LearntLaw::of),
             statement: findings.verdict_statement(),

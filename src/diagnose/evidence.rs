@@ -83,7 +83,7 @@ pub fn ln_evidence(
     let mut not_told = 0;
     for effect in weighed {
         let law = law_of(effect);
-        let Some((value, sd)) = law.strength(effect, &of).filter(|_| law.is_possible(fit)) else {
+        let Some((value, sd)) = law.strength(effect, &of).filter(|_| law.is_possible(fit, settings)) else {
             return f64::NEG_INFINITY;
         };
         let fall = (least_without(effect) - fit.chi2) / scatter.of_all;

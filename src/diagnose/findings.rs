@@ -72,6 +72,15 @@ impl<'a> Findings<'a> {
         (self.posterior.remains > self.context.settings.verdict.even).then(|| likeliest.place())
     }
 
+    /// How probable each effect of the table is. Where the names do not stand, because another law takes the place of the leading one, or because they neither leave next
+    /// to nothing nor predict what was not fitted, each of them is doubted, too.
+    pub fn inclusions(&self) -> Vec<(Effect, f64)> {
+        let settings = self.context.settings;
+        let stand = if self.verdict.status == Status::Unknown { settings.prior.beside_no_answer } else { 1.0 };
+        let of_names = self.posterior.inclusions(settings).into_iter();
+        of_names.map(|(effect, probability)| (effect, stand * probability)).collect()
+    }
+
     /// The effects named, the one that explains most first.
     pub fn named_effects(&self) -> Vec<Effect> {
         self.posterior.by_what_they_explain(self.named())

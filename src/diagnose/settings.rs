@@ -215,7 +215,7 @@ pub struct PriorSettings {
     pub yields: f64,
     /// Of a support's frequency, over the swing's.
     pub frequencies: f64,
-    /// Standard deviation of the stretch and of the shear of a view: half the square of the angle by which it is askew (judgement: set up by eye, to some 20°).
+    /// Standard deviation of the stretch and of the shear of a view, and of a gain: half the square of the angle by which it is askew (judgement: set up by eye, to some 20°).
     pub view: f64,
     /// Coefficients of less than this many standard deviations are not told from zero (statistics).
     pub told_from_zero: f64,
@@ -238,6 +238,8 @@ pub struct PriorSettings {
     pub imitated_down_to: f64,
     /// Decades of that part over which names that are at work may leave something (judgement: smoothed friction, a bent bearing, an encoder's steps).
     pub model_error_decades: f64,
+    /// The part of inclusions of 0.9 and more that are right where the answer names nothing (rigs of three other simulators: 4 of 18).
+    pub beside_no_answer: f64,
     /// The part of names that stand for something outside the table (training bank: names stated at 0.99 were right in 97 of 100 cases).
     pub imitated: f64,
     /// Each name that has not been held against every other effect, as those beyond two are not, and fewer where the budget ends before, is with these odds what it
@@ -414,6 +416,7 @@ impl Default for PriorSettings {
             unknown: 0.10,
             imitated_down_to: 1e-3,
             model_error_decades: 6.0,
+            beside_no_answer: 0.25,
             imitated: 0.03,
             not_compared: 0.7,
             support_in_step: 0.8,

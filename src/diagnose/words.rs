@@ -180,14 +180,26 @@ impl Findings<'_> {
     }
 
     /// What a law's coefficients say beside their values.
-    fn remark(&self) -> &'static str {
+    fn remark(&self) -> String {
         let dry_rad = DRY_SHARE * self.context.largest_bend_rad();
-        match self.named().value(Parameter::HysteresisYield) {
-            Some(yield_rad) if yield_rad < dry_rad => {
-                " The joint yields at next to no angle: that is dry friction in it."
-            }
-            _ => "",
+        let mut remark = String::new();
+        if self.named().value(Parameter::HysteresisYield).is_some_and(|yield_rad| yield_rad < dry_rad) {
+            remark.push_str(" The joint yields at next to no angle: that is dry friction in it.");
         }
+        if let Some(off) = self.length_off() {
+            let (percent, long) = (1e2 * off.abs(), if off > 0.0 { "long" } else { "short" });
+            let _ =
+                write!(remark, " Lengths that are stated {percent:.2} % too {long} do the same: measure them again.");
+        }
+        remark
+    }
+
+    /// The part by which lengths that were taken at their word would have to be stated too long to do what the clock does: ω² goes with 1/L. `None` where that is
+    /// more than a ruler errs.
+    fn length_off(&self) -> Option<f64> {
+        let at_their_word = self.context.experiment.specimen.links.is_empty();
+        let off = 2.0 * self.named().value(Parameter::TimeBase).filter(|_| at_their_word)?;
+        (off.abs() < 2.0 * self.context.settings.search.length_share).then_some(off)
     }
 
     /// Where and when it acts.
@@ -204,6 +216,9 @@ impl Findings<'_> {
             }
             Place::Camera if self.verdict.status == Status::Unknown => {
                 "It looks like an error of what measures the angles rather than of the model"
+            }
+            Place::Camera if self.length_off().is_some() => {
+                "It is an error of the clock, or of the lengths in the file"
             }
             Place::Camera => "It is an error of the camera, not of the model",
         }

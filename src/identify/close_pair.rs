@@ -8,7 +8,7 @@
 //!   modes that overlap so far are not told from one that is no sinusoid;
 //! - no pair where one such oscillation describes the record as well ([`super::modulated`], by the Bayesian information criterion).
 
-use super::excess::residual_excess;
+use super::excess::Excess;
 use super::mode::Mode;
 use super::modulated::Modulated;
 use super::pencil::matrix_pencil;
@@ -68,7 +68,7 @@ pub(super) fn of_one_link(modes: &[Mode]) -> Option<String> {
 
 fn leaves_noise(signal: &Signal, fit: &SinusoidFit) -> bool {
     let residual = fit.residuals(signal);
-    fit.poles.iter().all(|pole| residual_excess(&residual, pole.omega_rad_s) <= 1.0)
+    fit.poles.iter().all(|pole| Excess::of(&residual, pole.omega_rad_s).power <= 1.0)
 }
 
 impl SinusoidFit {

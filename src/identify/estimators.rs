@@ -7,7 +7,7 @@ use super::damping::Trend;
 use super::decrement::Decrement;
 use super::envelope::{Bounds, Envelope, FrequencyLaw};
 use super::estimate::Estimate;
-use super::excess::residual_excess;
+use super::excess::Excess;
 use super::half_power::HalfPower;
 use super::modulated::Modulated;
 use super::signal::Signal;
@@ -99,7 +99,7 @@ impl Estimators {
     pub fn of(whole: &Whole, mode: usize, envelope: &Result<Envelope, String>) -> Self {
         let fit = whole.fit;
         let residual = fit.residuals(whole.signal);
-        let excess: Vec<f64> = fit.poles.iter().map(|p| residual_excess(&residual, p.omega_rad_s)).collect();
+        let excess: Vec<f64> = fit.poles.iter().map(|p| Excess::of(&residual, p.omega_rad_s).power).collect();
         // where the whole record is no sum of damped sinusoids, the other modes are taken away window by window
         let alone = match whole.windows {
             Ok(windows) if excess.iter().any(|e| *e > 1.0) => windows.isolate(whole.signal, fit, mode),

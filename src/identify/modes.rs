@@ -4,7 +4,7 @@ use serde::Serialize;
 
 use super::close_pair::close_pair;
 use super::estimate::{f_tail, probability};
-use super::excess::residual_excess;
+use super::excess::Excess;
 use super::modulated::Modulated;
 use super::pencil::matrix_pencil;
 use super::pole::{FEWEST_CYCLES, Pole};
@@ -175,7 +175,7 @@ impl Improvement<'_> {
         let n = self.signal.values() as f64;
         // the links' weighted sums of squares: exp of the mean deviance
         let ratio = ((self.before - fit.deviance) / n).exp();
-        let excess = residual_excess(&fit.residuals(self.signal), fit.poles[self.mode].omega_rad_s);
+        let excess = Excess::of(&fit.residuals(self.signal), fit.poles[self.mode].omega_rad_s).power;
         let f = (ratio - 1.0) * fit.degrees_of_freedom / self.parameters / excess;
         let frequencies =
             self.spectrum.amplitude_rad.len() as f64 * self.spectrum.step_hz / self.spectrum.resolution_hz;

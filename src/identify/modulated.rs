@@ -11,7 +11,7 @@ use serde::Serialize;
 use super::damping::{Trend, is_above};
 use super::envelope::{Bounds, FrequencyLaw, PENDULUM, THEORY_TOLERANCE};
 use super::estimate::{Estimate, f_tail};
-use super::excess::excess_power;
+use super::excess::Excess;
 use super::signal::Signal;
 use super::sinusoids::SinusoidFit;
 use super::slow_flow::{Coefficients, SETS, SlowFlow};
@@ -21,6 +21,9 @@ use crate::series::Measured;
 const ANY_K: [f64; 2] = [0.0, 0.1];
 /// A fall of the deviance by which a recording contradicts a prior (statistics: three standard deviations).
 const CONTRADICTS: f64 = 9.0;
+/// Part of what is left that may lie beside the oscillation (judgement): as much as lies elsewhere. So large may the errors of a tracker or an encoder be that go with
+/// the swing; more is what the fit does not describe.
+const MOST_BESIDE: f64 = 0.5;
 
 /// What the fit says.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -113,11 +116,13 @@ struct Told<'f, 'a> {
 impl<'f, 'a> Told<'f, 'a> {
     fn of(flow: &'f SlowFlow<'a>) -> Option<Self> {
         let own = flow.coefficients();
-        let [excess, p_value] = excess_power(&flow.residual()?, own.omega_rad_s);
+        let beside = Excess::of(&flow.residual()?, own.omega_rad_s);
         // a fit that failed is no evidence
-        (excess <= 1.0).then_some(())?;
-        let (amplitude_rad, last, covariance) = (flow.amplitude_rad()?, flow.last()?, flow.covariance()?);
-        Some(Self { flow, own, amplitude_rad, last, covariance, p_value })
+        (beside.share <= MOST_BESIDE).then_some(())?;
+        let (amplitude_rad, last) = (flow.amplitude_rad()?, flow.last()?);
+        // what errors of the recording that go with the swing do to the oscillation, least squares sees with the power that they have there
+        let covariance = flow.covariance()? * beside.power;
+        Some(Self { flow, own, amplitude_rad, last, covariance, p_value: beside.p_value })
     }
 
     /// Of a linear function of ω₀, k, β₀, β₁, β₂.

@@ -6,7 +6,7 @@
 //! | [`missing_frames`] | at which instant frames are missing |
 //! | [`moving_support`] | at which frequency a support moves |
 //! | [`hysteresis`] | where its fit starts |
-//! | `oblique_view` | a camera that looks askew, with its stretch and its shear |
+//! | `oblique_view` | a camera that looks askew, with its stretch and its shear; a sensor's scale |
 //! | [`bending`] | a strip that bends everywhere, as finely as it needs |
 
 pub mod bending;
@@ -71,7 +71,7 @@ pub trait Law: Sync {
     }
 
     /// Whether a fit has it as nature can.
-    fn is_possible(&self, _fit: &Refit<'_>) -> bool {
+    fn is_possible(&self, _fit: &Refit<'_>, _prior: &PriorSettings) -> bool {
         true
     }
 
@@ -95,6 +95,7 @@ pub fn law_of(effect: Effect) -> &'static dyn Law {
         Effect::DroppedFrames => &missing_frames::MissingFrames,
         Effect::SupportMotion => &moving_support::MovingSupport,
         Effect::CameraOblique => &oblique_view::ObliqueView,
+        Effect::AngleGain => &oblique_view::WrongScale,
         Effect::JointHysteretic => &hysteresis::Hysteresis,
         Effect::DistributedFlexibility => &bending::Bending,
         _ => &ordinary::Ordinary,

@@ -46,7 +46,7 @@ impl Law for MovingSupport {
         Some((sine.hypot(cosine), sd))
     }
 
-    fn is_possible(&self, fit: &Refit<'_>) -> bool {
+    fn is_possible(&self, fit: &Refit<'_>, _prior: &PriorSettings) -> bool {
         !only_leans(fit)
     }
 

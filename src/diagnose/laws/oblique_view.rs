@@ -1,4 +1,4 @@
-//! A camera that looks askew: a stretch and a shear of the picture.
+//! A camera that looks askew: a stretch and a shear of the picture; a sensor whose scale is wrong.
 //!
 //! Turned aside by α and down by β, both small, it has s = (β² − α²)/2 and b = αβ: half the square of α + iβ but for signs. If no direction of α + iβ is likelier
 //! than another, none of (s, b) is: so the size is ρ = √(s² + b²), and the direction any.
@@ -10,8 +10,13 @@ use super::ordinary::Ordinary;
 use super::{Coefficients, Law, Sought};
 use crate::model::Parameter;
 
-/// The law.
+/// Standard deviations of what a set-up errs beyond which it is none of its errors (statistics): a torque that changes the frequency with the amplitude looks like one.
+const FARTHEST: f64 = 3.0;
+
+/// A camera that looks askew.
 pub struct ObliqueView;
+/// A gain of all angles.
+pub struct WrongScale;
 
 impl Law for ObliqueView {
     fn beside<'a>(&self, sought: &Sought<'_, 'a>) -> Option<Refit<'a>> {
@@ -30,5 +35,24 @@ impl Law for ObliqueView {
     fn ln_kinds(&self, _fit: &Refit<'_>, effect: Effect, of: &Coefficients<'_>, _settings: &PriorSettings) -> f64 {
         let size = self.strength(effect, of).map_or(0.0, |strength| strength.0);
         (std::f64::consts::TAU * size).ln()
+    }
+
+    fn is_possible(&self, fit: &Refit<'_>, prior: &PriorSettings) -> bool {
+        let size = |parameter| fit.value(parameter).unwrap_or(0.0);
+        size(Parameter::ViewStretch).hypot(size(Parameter::ViewShear)) < FARTHEST * prior.view
+    }
+}
+
+impl Law for WrongScale {
+    fn beside<'a>(&self, sought: &Sought<'_, 'a>) -> Option<Refit<'a>> {
+        Ordinary.beside(sought)
+    }
+
+    fn ln_kinds(&self, fit: &Refit<'_>, effect: Effect, of: &Coefficients<'_>, settings: &PriorSettings) -> f64 {
+        Ordinary.ln_kinds(fit, effect, of, settings)
+    }
+
+    fn is_possible(&self, fit: &Refit<'_>, prior: &PriorSettings) -> bool {
+        fit.value(Parameter::AngleGain).is_none_or(|gain| gain.abs() < FARTHEST * prior.view)
     }
 }
