@@ -167,7 +167,10 @@ impl Estimators {
         let squares: f64 = lawful_rad.iter().map(|a| a * a).sum();
         let omitted = Bounds::of(mode == 0, whole.measured).fourth.map(|bound| bound * squares * squares);
         // of the slowest mode of hung angles it is known how amplitude acts
-        let is_told = |law: &FrequencyLaw| (known && mode == 0) || law.f0_hz.half() < WIDEST_LAW * frequency_hz.half();
+        let changed_too = [frequency_hz.blurred(changed_hz), damping_ratio.blurred(changed_xi)];
+        let over_the_record = self.over_stretches(whole, changed_too);
+        let is_told =
+            |law: &FrequencyLaw| (known && mode == 0) || law.f0_hz.half() < WIDEST_LAW * over_the_record[0].half();
         if let Some(own) = whole.modulated.filter(|own| is_told(&own.frequency)) {
             return Choice {
                 frequency_hz: own.frequency.f0_hz,
@@ -203,8 +206,7 @@ impl Estimators {
                 at_small_amplitude: true,
             },
             None if felt || self.residual_excess > 1.0 => {
-                let changed = [frequency_hz.blurred(changed_hz), damping_ratio.blurred(changed_xi)];
-                let [frequency_hz, damping_ratio] = self.over_stretches(whole, changed);
+                let [frequency_hz, damping_ratio] = over_the_record;
                 Choice {
                     frequency_hz,
                     damping_ratio,

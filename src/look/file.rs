@@ -25,8 +25,8 @@ impl Finding {
     /// The first mark keeps its distance from the centre as nearly as `track` asks of a link.
     fn keeps_distance(&self) -> bool {
         let Some((arc, first)) = self.arc.as_ref().zip(self.marks.first()) else { return false };
-        let [x, y] = arc.centre_px;
-        let distances = first.thing.path.iter().flatten().map(|p| (p[0] - x).hypot(p[1] - y));
+        let ([x, y], aspect) = (arc.centre_px, self.stream.pixel_aspect);
+        let distances = first.thing.path.iter().flatten().map(|p| (aspect * (p[0] - x)).hypot(p[1] - y));
         let mut off: Vec<f64> = distances.map(|d| (d - arc.radius_px).abs()).collect();
         median(&mut off).is_some_and(|spread| 1.4826 * spread < MOST_LENGTH_SPREAD * arc.radius_px)
     }

@@ -93,7 +93,7 @@ pub fn look(path: &Path, options: &Options, folder: &Path, progress: &dyn Progre
     let (hues, names): (Vec<Hue>, Vec<String>) = looks.iter().cloned().unzip();
     let (mut seen, mut unsteady, mut from_s, mut rest) = (Vec::new(), Vec::new(), None, Vec::new());
     for stretch in 0..STRETCHES {
-        let frames = session.glance(&hues, from_s, progress)?;
+        let frames = square(session.glance(&hues, from_s, progress)?, session.stream().pixel_aspect);
         if stretch == 0 {
             rest = further_stretches(&session, &frames);
         }
@@ -146,7 +146,9 @@ fn measured(
     progress: &dyn Progress,
 ) -> Result<Option<Finding>> {
     let (hues, names): (Vec<Hue>, Vec<String>) = looks.into_iter().unzip();
-    let mut frames = session.gather(hues, progress)?;
+    // circles and distances are those of square pixels; what is found, is in the file's
+    let aspect = session.stream().pixel_aspect;
+    let mut frames = square(session.gather(hues, progress)?, aspect);
     let mut all = things(&frames);
     let found = hanging::longest(&all, &names).filter(|chain| !steady || chain.is_steady(&all));
     let Some(mut chain) = found else { return Ok(None) };
@@ -179,22 +181,28 @@ fn measured(
     let first = &marks[swinging.min(marks.len() - 1)].thing;
     let stream = session.stream();
     let (width, height) = stream.orientation.size(stream.stored_size_px);
-    let size_px = [width as f64, height as f64];
+    let size_px = [aspect * width as f64, height as f64];
     let arc = chain.arc.map(|arc| arc.through_a_lens(&first.places_px(), first.radius_px(), size_px));
+    let in_file = |thing: &Thing| thing.clone().widened(aspect.recip());
     Ok(Some(Finding {
         held_until_s,
         frequency_hz: marks.get(swinging).and_then(|m| turns_per_second(&m.thing, &t_s)),
-        still: still.cloned().collect(),
-        apart: apart.cloned().collect(),
+        still: still.map(in_file).collect(),
+        apart: apart.map(in_file).collect(),
         links_px,
-        marks,
-        arc,
+        arc: arc.map(|arc| arc.widened(aspect.recip())),
+        marks: marks.iter().map(|m| Mark { thing: in_file(&m.thing), ..m.clone() }).collect(),
         hinge_marked: chain.hinge_marked,
         timing: Timing::audit(&t_s, session.stream().nominal_rate_hz, session.stream().tick_s),
         stream: session.stream().clone(),
         camera: session.camera(),
         background: background(session.album()),
     }))
+}
+
+/// Frames with columns as wide as rows are high.
+fn square(frames: Vec<FrameBlobs>, aspect: f64) -> Vec<FrameBlobs> {
+    frames.into_iter().map(|frame| frame.widened(aspect)).collect()
 }
 
 /// When what moves farthest is let go, if it is held at first.

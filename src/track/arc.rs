@@ -35,6 +35,14 @@ pub struct Arc {
 }
 
 impl Arc {
+    /// Its centre where columns are this many times as wide.
+    #[must_use]
+    pub fn widened(mut self, times: f64) -> Self {
+        self.centre_px[0] *= times;
+        self.sd_px[0] *= times;
+        self
+    }
+
     /// Through the path of a mark of this radius; `None` where its points lie on no circle, or on one point.
     pub fn of(points: &[[f64; 2]], mark_radius_px: f64) -> Option<Self> {
         if points.len() < FEWEST_POINTS {

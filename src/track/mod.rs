@@ -48,6 +48,15 @@ pub struct Measured {
     pub area_px2: f32,
 }
 
+impl Measured {
+    /// With columns this many times as wide; its area stays.
+    pub fn widen(&mut self, times: f64) {
+        self.position_px[0] *= times;
+        self.covariance_px2[0] *= times * times;
+        self.covariance_px2[2] *= times;
+    }
+}
+
 /// The filter's state, kept small.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Filtered {

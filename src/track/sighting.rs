@@ -23,3 +23,14 @@ pub struct FrameBlobs {
     /// What was seen.
     pub sightings: Vec<Sighting>,
 }
+
+impl FrameBlobs {
+    /// With its columns this many times as wide: the shapes that pixels show which are not square.
+    #[must_use]
+    pub fn widened(mut self, times: f64) -> Self {
+        for sighting in &mut self.sightings {
+            sighting.measured.widen(times);
+        }
+        self
+    }
+}

@@ -68,6 +68,13 @@ impl Thing {
         (self.area_px2 / std::f64::consts::PI).sqrt()
     }
 
+    /// With columns this many times as wide; its area and how far it moves stay.
+    #[must_use]
+    pub fn widened(mut self, times: f64) -> Self {
+        self.path.iter_mut().flatten().for_each(|place| place[0] *= times);
+        self
+    }
+
     /// Where it was seen.
     pub fn places_px(&self) -> Vec<[f64; 2]> {
         self.path.iter().flatten().copied().collect()
