@@ -122,11 +122,13 @@ impl<'p> Swing<'p> {
             let next = self.passes.partition_point(|pass| *pass <= leaves);
             let last = *self.passes.get(next + FEWEST_PASSES - 1)?;
             let away = self.values[leaves..=last].iter().map(|value| (value - self.middle).abs());
-            let way_s = self.t_s[self.passes[next]] - self.t_s[leaves];
+            // it may have left at any time in a gap
+            let still_s = self.t_s[leaves.saturating_sub(1)];
+            let way_s = self.t_s[self.passes[next]] - still_s;
             let half_period_s = self.t_s[self.passes[next + 1]] - self.t_s[self.passes[next]];
             // noise stays near a value for a few rows, and passes its middle at every other one
             let is_seen = leaves - first >= 2 * FIRST && self.passes[next + 1] - self.passes[next] >= FEWEST_ROWS;
-            let is_held = is_seen && self.t_s[leaves] - self.t_s[first] > (LONGEST_REST * way_s).max(half_period_s);
+            let is_held = is_seen && still_s - self.t_s[first] > (LONGEST_REST * way_s).max(half_period_s);
             (is_held && is_there).then(|| Hold {
                 leaves,
                 aside: (held - self.middle).abs(),
@@ -163,8 +165,10 @@ fn released_s(t_s: &[f64], values: &[f64], leaves: usize) -> Option<f64> {
         .filter(|k| (values[*k] > middle) != (values[k - 1] > middle))
         .map(|k| t_s[k])
         .collect();
-    let way_s = passes.first().filter(|_| passes.len() >= FEWEST_PASSES)? - t_s[leaves];
-    (t_s[leaves] - t_s[0] > LONGEST_REST * way_s).then_some(t_s[leaves])
+    // it may have left at any time in a gap
+    let still_s = t_s[leaves.saturating_sub(1)];
+    let way_s = passes.first().filter(|_| passes.len() >= FEWEST_PASSES)? - still_s;
+    (still_s - t_s[0] > LONGEST_REST * way_s).then_some(t_s[leaves])
 }
 
 #[cfg(test)]
@@ -238,6 +242,13 @@ mod tests {
             assert_eq!(caught(&stopped), None, "{delta}");
         }
         assert_eq!(caught(&|t| 0.3 * (-0.1 * t).exp() * (6.0 * t).cos() * (0.3 * t).cos()), None);
+    }
+
+    #[test]
+    fn a_gap_near_the_beginning_is_no_hold() {
+        let rows = (0..360).filter(|k| !(4..8).contains(k)).map(|k| f64::from(k) / 30.0);
+        let (t_s, values): (Vec<f64>, Vec<f64>) = rows.map(|t| (t, swing(t, 0.0))).unzip();
+        assert_eq!(released_of(std::iter::once((t_s, values))), None);
     }
 
     #[test]

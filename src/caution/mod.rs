@@ -278,7 +278,7 @@ fn pivot(m: &Measurement, options: &Options) -> Option<String> {
     let sd_rad = usual_sd_rad(angles)?;
     (shift_rad.max(factor * half_range_rad(angles)) > SHARED_DEVIATIONS * sd_rad).then(|| {
         format!(
-            "the pivot is known to ± {sx:.1}, {sy:.1} px: all angles of link 1 may be too large or too small by {:.1} % and shifted by {:.2}°, beyond the standard deviations in the table (frequency and damping stay as they are); a mark on the hinge, or a wider swing, tells it better",
+            "the pivot is known to ± {sx:.1}, {sy:.1} px if the camera faces the swing (one turned aside by 10° puts it 3 % of the link's length too near): all angles of link 1 may be too large or too small by {:.1} % and shifted by {:.2}°, beyond the standard deviations in the table (frequency and damping stay as they are); a mark on the hinge, or a wider swing, tells it better",
             100.0 * factor,
             shift_rad.to_degrees()
         )

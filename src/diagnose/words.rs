@@ -37,15 +37,18 @@ impl Findings<'_> {
                 format!("Missing: {} ({percent:.0} %).{}{}", words(&verdict.effects), self.remark(), self.more())
             }
             Status::Ambiguous => {
-                let rivals: Vec<Effect> =
-                    verdict.class.iter().copied().filter(|effect| !verdict.companions.contains(effect)).collect();
-                let others = if rivals.len() > verdict.effects.len() {
-                    format!(", but the recording does not tell it from others: {}", names(&rivals, ""))
-                } else if !verdict.companions.is_empty() {
-                    format!(", perhaps together with others: {}", names(&verdict.companions, ""))
-                } else {
-                    format!(", or something outside the table that it resembles ({:.0} %)", 1e2 * verdict.unknown)
+                let is_rival =
+                    |effect: &Effect| !verdict.companions.contains(effect) && !verdict.effects.contains(effect);
+                let rivals: Vec<Effect> = verdict.class.iter().copied().filter(is_rival).collect();
+                let mut others = match (&rivals[..], &verdict.companions[..]) {
+                    ([], []) => String::new(),
+                    ([], companions) => format!(", perhaps together with others: {}", names(companions, "")),
+                    (rivals, _) => format!(", but the recording does not tell it from others: {}", names(rivals, "")),
                 };
+                if others.is_empty() || verdict.unknown > self.context.settings.verdict.told_apart {
+                    let unknown = 1e2 * verdict.unknown;
+                    let _ = write!(others, ", or something outside the table that it resembles ({unknown:.0} %)");
+                }
                 let (effects, remark, more) = (words(&verdict.effects), self.remark(), self.more());
                 format!("Missing: most likely {effects} ({percent:.0} %){others}.{remark}{more}")
             }
@@ -72,7 +75,7 @@ impl Findings<'_> {
         let named = &self.posterior.candidates[0];
         let effects = &named.fit.hypothesis.effects;
         if effects.is_empty() {
-            return "; no law of the table comes nearer than the base model".to_owned();
+            return "; no law of the table comes clearly nearer than the base model".to_owned();
         }
         let [comes, explains, them] = match effects.len() {
             1 => ["comes", "it explains", "it"],
@@ -210,6 +213,9 @@ impl Findings<'_> {
             Place::Hinge => "It acts at the hinge",
             Place::Joint => "It acts in the joint",
             Place::Air => "It acts from outside along the strip",
+            Place::Camera if self.verdict.effects.iter().any(|effect| effect.place() != Place::Camera) => {
+                "What explains most is an error of the camera"
+            }
             // what acts on the specimen may look the same
             Place::Camera if self.verdict.class.iter().any(|effect| effect.place() != Place::Camera) => {
                 "It is an error of the camera, or a cause that the recording does not tell from one"

@@ -170,8 +170,8 @@ impl Estimators {
         let changed_too = [frequency_hz.blurred(changed_hz), damping_ratio.blurred(changed_xi)];
         let over_the_record = self.over_stretches(whole, changed_too);
         let is_told =
-            |law: &FrequencyLaw| (known && mode == 0) || law.f0_hz.half() < WIDEST_LAW * over_the_record[0].half();
-        if let Some(own) = whole.modulated.filter(|own| is_told(&own.frequency)) {
+            |law: &FrequencyLaw, other: Estimate| (known && mode == 0) || law.f0_hz.half() < WIDEST_LAW * other.half();
+        if let Some(own) = whole.modulated.filter(|own| is_told(&own.frequency, over_the_record[0])) {
             return Choice {
                 frequency_hz: own.frequency.f0_hz,
                 damping_ratio: own.damping_ratio,
@@ -188,7 +188,7 @@ impl Estimators {
         let sound = |e: &Envelope, law: &FrequencyLaw| {
             e.steps.iter().any(|s| (law.f0_hz.value / s.frequency_hz.value - 1.0).abs() < farthest)
                 && law.f0_hz.half() < farthest * law.f0_hz.value
-                && is_told(law)
+                && is_told(law, frequency_hz)
         };
         let law = envelope.and_then(|e| e.frequency.filter(|f| sound(e, f)).map(|f| (e, f)));
         match law {

@@ -21,9 +21,9 @@ use crate::series::Measured;
 const ANY_K: [f64; 2] = [0.0, 0.1];
 /// A fall of the deviance by which a recording contradicts a prior (statistics: three standard deviations).
 const CONTRADICTS: f64 = 9.0;
-/// Part of what is left that may lie beside the oscillation (judgement): as much as lies elsewhere. So large may the errors of a tracker or an encoder be that go with
-/// the swing; more is what the fit does not describe.
-const MOST_BESIDE: f64 = 0.5;
+/// What may be left beside the oscillation of a hung body, over what scatters from sample to sample (judgement): as much. So large may the errors of a tracker or an encoder be that go
+/// with the swing; more is what the fit does not describe.
+const MOST_BESIDE: f64 = 1.0;
 
 /// What the fit says.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -118,7 +118,8 @@ impl<'f, 'a> Told<'f, 'a> {
         let own = flow.coefficients();
         let beside = Excess::of(&flow.residual()?, own.omega_rad_s);
         // a fit that failed is no evidence
-        (beside.share <= MOST_BESIDE).then_some(())?;
+        let is_noise = beside.over_scatter <= MOST_BESIDE && !flow.is_beyond_hung_bodies(ANY_K);
+        (beside.power <= 1.0 || is_noise).then_some(())?;
         let (amplitude_rad, last) = (flow.amplitude_rad()?, flow.last()?);
         // what errors of the recording that go with the swing do to the oscillation, least squares sees with the power that they have there
         let covariance = flow.covariance()? * beside.power;

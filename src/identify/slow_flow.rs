@@ -286,6 +286,11 @@ impl<'a> SlowFlow<'a> {
         lengths.zip(&self.noise_rad).map(|(n, sd)| 2.0 * n * sd.ln()).sum()
     }
 
+    /// Whether k was opened to this prior, for the recording contradicts what hung bodies allow; of a displacement it always is.
+    pub fn is_beyond_hung_bodies(&self, open: [f64; 2]) -> bool {
+        self.measured == Measured::Angles && self.prior == open
+    }
+
     /// The same solved with another mean and standard deviation of what k may be.
     pub fn with_prior(&self, prior: [f64; 2]) -> Option<Self> {
         Self { prior, ..self.clone() }.solved(&self.free)

@@ -30,6 +30,13 @@ const PARTS_REACH: f64 = 1.1;
 const PARTS_TRAVEL: f64 = 0.2;
 /// Motion of one thing against another, as a share of how far both move, below which they do not turn about each other.
 pub const LEAST_TURN: f64 = 0.02;
+/// [`kurtosis`] of normally distributed noise (statistics).
+const KURTOSIS_OF_NOISE: f64 = 3.0;
+/// Part of its own radius by which a single thing swings at least (judgement: what covers a thing at its edge shifts it by
+/// less).
+const LEAST_TRAVEL: f64 = 0.25;
+/// What a chain whose first mark swings by less than its own radius is worth less: anything else that swings comes first.
+const SLIGHT: f64 = 0.5;
 /// Marks that are looked for at most.
 pub const MOST_MARKS: usize = 12;
 /// Share of the frames in which a mark is seen, at least.
@@ -106,9 +113,11 @@ fn of_look(
     });
     // of two like ones that which swings farther
     let farthest_px = |marks: &[usize]| marks.iter().map(|i| things[*i].travel_px).fold(0.0, f64::max);
-    let (mut marks, arc) = sets.max_by(|(a, _), (b, _)| {
-        value(things, a).total_cmp(&value(things, b)).then(farthest_px(a).total_cmp(&farthest_px(b)))
-    })?;
+    let slight = |marks: &[usize]| if is_slight(&things[marks[0]]) { SLIGHT } else { 0.0 };
+    let worth = |marks: &[usize]| value(things, marks) - slight(marks);
+    let (mut marks, arc) =
+        sets.max_by(|(a, _), (b, _)| worth(a).total_cmp(&worth(b)).then(farthest_px(a).total_cmp(&farthest_px(b))))?;
+    let slight = slight(&marks);
     let mut hinge_marked = false;
     let blurred = arc.map_or(0.0, |arc| arc.residual_px / (MOST_OFF_ARC * things[marks[0]].travel_px));
     if let Some(arc) = arc
@@ -119,7 +128,8 @@ fn of_look(
     }
     // a hue tells a mark from what is printed on it or shines on it
     let strays = crowd.saturating_sub(marks.len()) as f64;
-    let worth = value(things, &marks) + if hued { 0.5 } else { 0.0 } - STRAY * strays - BLURRED_ARC * blurred;
+    let hued = if hued { 0.5 } else { 0.0 };
+    let worth = value(things, &marks) + hued - slight - STRAY * strays - BLURRED_ARC * blurred;
     Some(Chain { marks, arc, hinge_marked, worth })
 }
 
@@ -141,13 +151,15 @@ fn are_parts(things: &[Thing], marks: &[usize], bears: &dyn Fn(&Thing) -> bool) 
 /// hangs from a fixed point has no other path.
 ///
 /// A still thing that something covers from time to time seems to move as well, by less than its own radius and about
-/// no clear centre, or about a point within itself. Two such things do not keep their distance; one alone is no mark.
+/// no clear centre, or about a point within itself. Two such things do not keep their distance; one alone is no mark,
+/// unless it is seldom in the middle of its way, where what is covered now and then mostly is.
 fn hangs(things: &[Thing], marks: &[usize]) -> Option<Option<Arc>> {
     let first = &things[*marks.first()?];
     let path = first.places_px();
     let most_px = MOST_OFF_ARC * first.travel_px;
     let own_radius_px = first.radius_px();
-    let is_no_cover = marks.len() > 1 || first.travel_px > own_radius_px;
+    let rocks = first.travel_px < LEAST_TRAVEL * own_radius_px || kurtosis(&path) > KURTOSIS_OF_NOISE;
+    let is_no_cover = marks.len() > 1 || !is_slight(first) || !rocks;
     match Arc::of(&path, own_radius_px) {
         Some(arc) => {
             let shows_centre = arc.sd_px[0].max(arc.sd_px[1]) < arc.radius_px && arc.radius_px > own_radius_px;
@@ -155,6 +167,21 @@ fn hangs(things: &[Thing], marks: &[usize]) -> Option<Option<Arc>> {
         }
         None => (is_no_cover && off_line_px(&path) < most_px).then_some(None),
     }
+}
+
+/// It moves by less than its own radius.
+fn is_slight(thing: &Thing) -> bool {
+    thing.travel_px <= thing.radius_px()
+}
+
+/// Fourth moment along the longer axis over the square of the second: 1.5 of an even swing, up to 3 of one that falls to
+/// an eighth, 3 of noise, more of what mostly rests.
+fn kurtosis(points: &[[f64; 2]]) -> f64 {
+    let n = points.len().max(1) as f64;
+    let mean = [0, 1].map(|k| points.iter().map(|p| p[k]).sum::<f64>() / n);
+    let moment = |axis: usize, power: i32| points.iter().map(|p| (p[axis] - mean[axis]).powi(power)).sum::<f64>() / n;
+    let axis = usize::from(moment(1, 2) > moment(0, 2));
+    moment(axis, 4) / moment(axis, 2).powi(2).max(f64::MIN_POSITIVE)
 }
 
 /// It swings by itself as a mark does.
@@ -323,6 +350,9 @@ mod tests {
         };
         // an area of 300 px² has a radius of 9.8 px
         assert!(rocks(1.0).is_none());
+        assert!(rocks(4.0).is_some(), "an even swing of less than its radius");
+        let covered = |t: f64| [90.0 + 4.0 * (3.0 * t).sin().powi(9), 190.0 + 0.003 * (9.0 * t).cos()];
+        assert!(longest(&[thing(0, covered, true)], &names).is_none(), "mostly at rest");
         let swings = |t: f64| {
             let theta: f64 = 0.2 * (3.0 * t).sin();
             [400.0 + 40.0 * theta.sin(), 50.0 + 40.0 * theta.cos()]

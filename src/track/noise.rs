@@ -6,8 +6,8 @@
 //!
 //! A codec moves a mark by whole quarter pixels and codes what is left only where it is large, so a moving mark
 //! scatters far more than its noise says; without loss it scatters less. At rest the picture is coded once and repeated:
-//! the error does not show as scatter. The two states therefore have a factor each, and a mark at rest is never believed
-//! to be better than its own scatter or than [`REST_SHARE`] of what the moving marks show, nor better than stated where
+//! the error does not show as scatter; nor does it along an axis on which the mark hardly moves, where it is the same for
+//! many frames. The two states therefore have a factor each, along each axis, and a mark at rest is never believed to be better than its own scatter or than [`REST_SHARE`] of what the moving marks show, nor better than stated where
 //! nothing moves.
 
 use super::{Flags, Measured};
@@ -42,9 +42,9 @@ pub struct Scatter {
 pub fn scatters(marks: &[Vec<(Option<Measured>, Flags)>], t_s: &[f64]) -> Vec<Scatter> {
     let tracks: Vec<Vec<Option<Measured>>> =
         marks.iter().map(|points| points.iter().map(|(m, _)| *m).collect()).collect();
-    let speeds: Vec<Vec<f64>> = tracks.iter().map(|t| speeds_px(t)).collect();
+    let speeds: Vec<[Vec<f64>; 2]> = tracks.iter().map(|t| [0, 1].map(|axis| speeds_along(t, axis))).collect();
     let moving: Vec<[Option<f64>; 2]> =
-        tracks.iter().zip(&speeds).map(|(t, v)| [0, 1].map(|axis| moving_factor(t, v, t_s, axis))).collect();
+        tracks.iter().zip(&speeds).map(|(t, v)| [0, 1].map(|axis| moving_factor(t, &v[axis], t_s, axis))).collect();
     let shown: Vec<f64> = moving.iter().flatten().flatten().copied().collect();
     // where nothing moves, nothing tells what a picture that is repeated hides
     let usual = if shown.is_empty() { 1.0 } else { shown.iter().sum::<f64>() / shown.len() as f64 };
@@ -53,7 +53,7 @@ pub fn scatters(marks: &[Vec<(Option<Measured>, Flags)>], t_s: &[f64]) -> Vec<Sc
         .zip(&speeds)
         .zip(&moving)
         .map(|((track, speed), moving)| {
-            let rest = |axis| resting_factor(track, speed, t_s, axis).unwrap_or(0.0);
+            let rest = |axis: usize| resting_factor(track, &speed[axis], t_s, axis).unwrap_or(0.0);
             let least = if shown.is_empty() { 1.0 } else { 0.0 };
             Scatter {
                 resting: [0, 1].map(|axis| rest(axis).max(REST_SHARE * moving[axis].unwrap_or(usual)).max(least)),
@@ -65,10 +65,15 @@ pub fn scatters(marks: &[Vec<(Option<Measured>, Flags)>], t_s: &[f64]) -> Vec<Sc
 
 /// Speed of a track, px a frame, from its neighbours in time.
 pub fn speeds_px(points: &[Option<Measured>]) -> Vec<f64> {
+    let [x, y] = [0, 1].map(|axis| speeds_along(points, axis));
+    x.iter().zip(&y).map(|(x, y)| x.hypot(*y)).collect()
+}
+
+/// The same along one axis (0: x, 1: y).
+pub fn speeds_along(points: &[Option<Measured>], axis: usize) -> Vec<f64> {
     let between = |a: usize, b: usize| -> Option<f64> {
         let (p, q) = (points.get(a)?.as_ref()?, points.get(b)?.as_ref()?);
-        let (dx, dy) = (q.position_px[0] - p.position_px[0], q.position_px[1] - p.position_px[1]);
-        Some(dx.hypot(dy) / (b - a) as f64)
+        Some((q.position_px[axis] - p.position_px[axis]).abs() / (b - a) as f64)
     };
     (0..points.len())
         .map(|i| {

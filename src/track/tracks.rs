@@ -4,7 +4,7 @@
 use super::choose::Spare;
 use super::follower::measurement;
 use super::kalman::{Belief, Motion};
-use super::noise::{Scatter, speeds_px, variance_factor};
+use super::noise::{Scatter, speeds_along, speeds_px, variance_factor};
 use super::smooth::smooth;
 use super::{Filtered, Flags, Measured, Point};
 use crate::statistics::median;
@@ -42,9 +42,11 @@ impl Tracks {
         let area = median(&mut areas).unwrap_or(0.0);
         let speeds = speeds_px(&measured);
         let usual_px2 = usual_area(&measured, &speeds, area);
-        for ((m, f), speed) in measured.iter_mut().zip(&mut flags).zip(speeds) {
+        let along = [0, 1].map(|axis| speeds_along(&measured, axis));
+        for (i, ((m, f), speed)) in measured.iter_mut().zip(&mut flags).zip(speeds).enumerate() {
             if let Some(m) = m {
-                let [x, y] = [0, 1].map(|axis| variance_factor(speed, scatter.resting[axis], scatter.moving[axis]));
+                let factor = |axis: usize| variance_factor(along[axis][i], scatter.resting[axis], scatter.moving[axis]);
+                let [x, y] = [0, 1].map(factor);
                 m.covariance_px2[0] *= x;
                 m.covariance_px2[1] *= y;
                 m.covariance_px2[2] *= (x * y).sqrt();

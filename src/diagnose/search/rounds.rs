@@ -84,7 +84,7 @@ impl Round {
             Self::Asked => "short stretches",
             Self::Singles => "effects",
             Self::DearSingles => "dear effects",
-            Self::StripCorners => "a strip's corners",
+            Self::StripCorners => "hysteresis in every joint",
             Self::Tied => "tied in the first part",
             Self::FromTheLeader => "from the best",
             Self::Pairs => "pairs",
