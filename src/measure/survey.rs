@@ -8,7 +8,7 @@ use crate::area::Area;
 use crate::detect::{Album, Detector, Hue, Shading, ShadingSurvey, Siting, SitingSurvey};
 use crate::error::Result;
 use crate::experiment::Rig;
-use crate::steady::Background;
+use crate::steady::{Background, CameraShift};
 use crate::video::{Orientation, OwnedPicture, Picture, Recording, StreamInfo, WHOLE_S};
 
 /// Pictures from which hue, scale, threshold and siting are learnt.
@@ -87,7 +87,10 @@ pub fn camera(pictures: &[OwnedPicture], options: &Options, stream: &StreamInfo)
     // a shift that its own patches leave open is none
     let shifts = located.iter().flatten().map(|(camera, _)| camera);
     let sure = shifts.filter(|c| c.size_px() > SURE_SHIFT * c.sd_px);
-    let greatest_px = sure.map(|c| c.size_px()).fold(0.0, f64::max);
+    // one picture alone may have something pass before its patches
+    let mut sizes_px: Vec<f64> = sure.map(CameraShift::size_px).collect();
+    sizes_px.sort_by(|a, b| b.total_cmp(a));
+    let greatest_px = sizes_px.get(1).copied().unwrap_or(0.0);
     // pictures that do not show where the camera looks
     let silent = located.iter().any(Option::is_none);
     let agreed: Vec<Vec<bool>> = located.into_iter().flatten().map(|(_, agreed)| agreed).collect();
