@@ -240,7 +240,7 @@ impl Sidecar {
                     if self.options.roi_px.is_some() || self.options.mask.is_some() {
                         "where it leaves the region of --roi or --mask, widen that"
                     } else {
-                        "look with --overlay where it is covered or dark"
+                        "look with --overlay where it is covered, or dark: then a lower --threshold finds it"
                     }
                 ));
             }

@@ -245,7 +245,8 @@ fn to_decide(effects: &[Effect], class: &[Effect], marks: usize) -> Option<Strin
             "film a grid in the plane of the swing, which fixes the gain of the angles and from where the camera looks",
         );
     }
-    if has(&[Effect::DifferentialLag, Effect::DroppedFrames, Effect::TimeBase]) {
+    let clocked = advice.iter().any(|own| own.starts_with("film a clock"));
+    if has(&[Effect::DifferentialLag, Effect::DroppedFrames, Effect::TimeBase]) && !clocked {
         advice.push("film a running clock beside the strip");
     }
     if advice.is_empty() {
