@@ -133,6 +133,33 @@ fn what_init_writes_is_enough_to_track_and_says_what_is_still_to_be_measured() {
     assert!(refused(&bench.freeswing(&["init", "swing.mp4"])).contains("exists already"));
 }
 
+/// The file states pixels that are a third wider than high: the circle is one in square pixels, and its centre in those of the file.
+#[test]
+fn pixels_that_are_not_square_have_the_same_pivot() {
+    let bench = Bench::of(&scene());
+    let pivot = |roi: &str| {
+        done(&bench.freeswing(&["init", "swing.mp4", "--force", "--roi", roi]));
+        let file = std::fs::read_to_string(bench.path("experiment.toml")).unwrap();
+        let of = |key: &str| {
+            let line = file.lines().find_map(|line| line.split_once(key)).unwrap_or_else(|| panic!("{file}"));
+            let numbers = line.1.split([',', ']']).map(|word| word.trim().parse::<f64>());
+            numbers.take(2).collect::<Result<Vec<f64>, _>>().unwrap()
+        };
+        (of("pivot_px = ["), of("pivot_sd_px = ["))
+    };
+    let (square, sd) = pivot("0,70,320,170");
+    let made = Command::new("ffmpeg")
+        .args(["-loglevel", "error", "-y", "-i", "swing.mp4", "-vf", "scale=240:240,setsar=4/3"])
+        .args(["-c:v", "libx264", "-crf", "12", "squeezed.mp4"])
+        .current_dir(bench.folder.path())
+        .status();
+    assert!(made.unwrap().success());
+    std::fs::rename(bench.path("squeezed.mp4"), bench.path("swing.mp4")).unwrap();
+    let (squeezed, _) = pivot("0,70,240,170");
+    assert!((squeezed[0] - 0.75 * square[0]).abs() < 1.0, "{square:?} {squeezed:?}");
+    assert!((squeezed[1] - square[1]).abs() < 2.0 * sd[1], "{square:?} ± {sd:?}, {squeezed:?}");
+}
+
 /// A hand holds what swings for a second: nothing is learnt from that, and it is said what to leave out.
 #[test]
 fn a_beginning_that_is_held_is_left_out() {

@@ -130,6 +130,38 @@ mod tests {
     }
 
     #[test]
+    fn a_gain_that_no_sensor_has_is_none() {
+        let t_s: Vec<f64> = (0..30).map(|k| k as f64 / 30.0).collect();
+        let theta_rad = vec![vec![Some(0.1); 30]; 2];
+        let relative_sd = vec![vec![1.0; 30]; 2];
+        let path = "made".into();
+        let records = [Record { path, theta_rad, relative_sd, t_s, in_step: 0.0, rounding: 0.0, continues: false }];
+        let with_gain = |gain: f64| {
+            let problem = Problem::new(&records, &Experiment::default(), &[Parameter::AngleGain]).unwrap();
+            let mut x = vec![gain];
+            x.resize(problem.variables(), 0.3);
+            let mut normal = DMatrix::identity(x.len(), x.len());
+            normal[(0, 0)] = 1e8;
+            let hypothesis = Hypothesis { effects: vec![Effect::AngleGain], dropped: None };
+            let certificate = Certificate { starts_agreeing: 3, nested_ok: true };
+            let fit = Refit {
+                hypothesis,
+                problem,
+                x,
+                chi2: 60.0,
+                normal,
+                steps: 1,
+                damping: 0.0,
+                converged: true,
+                certificate,
+            };
+            ln_evidence(&fit, Scatter::NOISE, |_| 1e6, &PriorSettings::default(), 9.0)
+        };
+        assert!(with_gain(0.08).is_finite() && with_gain(-0.12).is_finite());
+        assert_eq!(with_gain(0.4), f64::NEG_INFINITY);
+    }
+
+    #[test]
     fn a_law_of_no_size_is_none_however_much_is_left_without_it() {
         let t_s: Vec<f64> = (0..30).map(|k| k as f64 / 30.0).collect();
         let theta_rad = vec![vec![Some(0.1); 30]; 2];

@@ -311,6 +311,31 @@ mod tests {
     }
 
     #[test]
+    fn errors_that_go_with_the_swing_widen_what_they_do_not_outweigh() {
+        let omega = std::f64::consts::TAU * F0_HZ;
+        // a wave a tenth off the swing's frequency, beside noise of half a milliradian
+        let with_errors = |size_rad: f64| {
+            let mut seed = 1u64;
+            let mut uniform = || {
+                seed = seed.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+                (seed >> 11) as f64 / (1u64 << 53) as f64 - 0.5
+            };
+            let mut made = swing(30.0, 0.3, |v| 0.02 * v);
+            for (t, theta) in made.t_s.iter().zip(made.theta_rad[0].iter_mut().flatten()) {
+                let noise_rad = 5e-4 * (0..12).map(|_| uniform()).sum::<f64>();
+                *theta += noise_rad + size_rad * (1.1 * omega * t).cos();
+            }
+            identify(&made, None).unwrap().modes[0].clone()
+        };
+        let [plain, slight, strong] = [0.0, 1.5e-4, 3e-3].map(with_errors);
+        let told = |mode: &super::super::Mode| mode.modulated.clone().map(|own| own.frequency.f0_hz);
+        let (plain, slight) = (told(&plain).unwrap(), told(&slight).unwrap());
+        assert!(slight.half() > 1.2 * plain.half() && slight.half() < 5.0 * plain.half(), "{plain:?} {slight:?}");
+        assert!(slight.holds(F0_HZ), "{slight:?}");
+        assert!(told(&strong).is_none(), "{strong:?}");
+    }
+
+    #[test]
     fn a_swing_that_friction_stops_at_once_has_no_slow_flow() {
         let found = identify(&swing(10.0, 0.05, |v| 0.15 * (v / 1e-3).tanh()), None).unwrap();
         assert!(found.modes.iter().all(|mode| mode.modulated.is_none()), "{found}");
