@@ -180,7 +180,7 @@ pub struct SetUp<'s> {
     pub experiment: &'s mut Experiment,
     /// A yield angle to expect, and its standard deviation.
     pub yield_rad: (f64, f64),
-    /// Standard deviation of the stretch and of the shear of a view to expect, and of a sensor's gain.
+    /// Standard deviation of the stretch and of the shear of a view to expect.
     pub view: f64,
     /// The strip that bends everywhere.
     pub strip: BendingStrip,
@@ -222,11 +222,6 @@ impl SetUp<'_> {
     fn looks_askew(&mut self) {
         let of = |parameter| Belief { parameter, value: 0.0, sd: self.view };
         self.beliefs.extend([Parameter::ViewStretch, Parameter::ViewShear].map(of));
-    }
-
-    /// A sensor's scale is wrong by no more than its owner fails to see.
-    fn is_scaled(&mut self) {
-        self.beliefs.push(Belief { parameter: Parameter::AngleGain, value: 0.0, sd: self.view });
     }
 }
 
@@ -281,15 +276,12 @@ static TABLE: [Entry; 18] = {
             ..velocity(entry(&[P::DroppedFrames], Camera, Otherwise, "frames missing at one instant"))
         },
         entry(&[P::CameraTilt], Camera, Otherwise, "a tilted camera"),
-        Entry {
-            set_up: |problem| problem.is_scaled(),
-            ..of_camera(position(entry(
-                &[P::AngleGain],
-                Camera,
-                Otherwise,
-                "a common gain of the angles (a sensor's scale; of small swings, a view askew)",
-            )))
-        },
+        of_camera(position(entry(
+            &[P::AngleGain],
+            Camera,
+            Otherwise,
+            "a common gain of the angles (a sensor's scale; of small swings, a view askew)",
+        ))),
         Entry {
             id: "camera_oblique",
             set_up: |problem| problem.looks_askew(),
