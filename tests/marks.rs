@@ -41,6 +41,17 @@ impl Bench {
         self.freeswing(&[&["track", "swing.mp4", "--out", "angles.csv"], more].concat())
     }
 
+    /// The recording coded anew by `ffmpeg`, through a filter.
+    fn refilmed(&self, filter: &str, crf: &str) {
+        let made = Command::new("ffmpeg")
+            .args(["-loglevel", "error", "-y", "-i", "swing.mp4", "-vf", filter])
+            .args(["-c:v", "libx264", "-crf", crf, "again.mp4"])
+            .current_dir(self.folder.path())
+            .status();
+        assert!(made.unwrap().success());
+        std::fs::rename(self.path("again.mp4"), self.path("swing.mp4")).unwrap();
+    }
+
     fn table(&self) -> String {
         std::fs::read_to_string(self.path("angles.csv")).unwrap()
     }
@@ -148,13 +159,7 @@ fn pixels_that_are_not_square_have_the_same_pivot() {
         (of("pivot_px = ["), of("pivot_sd_px = ["))
     };
     let (square, sd) = pivot("0,70,320,170");
-    let made = Command::new("ffmpeg")
-        .args(["-loglevel", "error", "-y", "-i", "swing.mp4", "-vf", "scale=240:240,setsar=4/3"])
-        .args(["-c:v", "libx264", "-crf", "12", "squeezed.mp4"])
-        .current_dir(bench.folder.path())
-        .status();
-    assert!(made.unwrap().success());
-    std::fs::rename(bench.path("squeezed.mp4"), bench.path("swing.mp4")).unwrap();
+    bench.refilmed("scale=240:240,setsar=4/3", "12");
     let (squeezed, _) = pivot("0,70,240,170");
     assert!((squeezed[0] - 0.75 * square[0]).abs() < 1.0, "{square:?} {squeezed:?}");
     assert!((squeezed[1] - square[1]).abs() < 2.0 * sd[1], "{square:?} ± {sd:?}, {squeezed:?}");
@@ -164,13 +169,7 @@ fn pixels_that_are_not_square_have_the_same_pivot() {
 #[test]
 fn a_beginning_that_is_held_is_left_out() {
     let bench = Bench::of(&scene());
-    let made = Command::new("ffmpeg")
-        .args(["-loglevel", "error", "-y", "-i", "swing.mp4", "-vf", "tpad=start_mode=clone:start_duration=1"])
-        .args(["-c:v", "libx264", "-crf", "18", "held.mp4"])
-        .current_dir(bench.folder.path())
-        .status();
-    assert!(made.unwrap().success());
-    std::fs::rename(bench.path("held.mp4"), bench.path("swing.mp4")).unwrap();
+    bench.refilmed("tpad=start_mode=clone:start_duration=1", "18");
     let words = done(&bench.freeswing(&["init", "swing.mp4"]));
     assert!(words.contains("held still until t = 1."), "{words}");
     let file = std::fs::read_to_string(bench.path("experiment.toml")).unwrap();
@@ -187,25 +186,7 @@ fn a_beginning_that_is_held_is_left_out() {
 #[test]
 fn a_hinge_below_all_that_swings_is_the_first_mark() {
     let bench = Bench::of(&scene());
-    let flipped = Command::new("ffmpeg")
-        .args([
-            "-loglevel",
-            "error",
-            "-y",
-            "-i",
-            "swing.mp4",
-            "-vf",
-            "vflip",
-            "-c:v",
-            "libx264",
-            "-crf",
-            "18",
-            "up.mp4",
-        ])
-        .current_dir(bench.folder.path())
-        .status();
-    assert!(flipped.unwrap().success());
-    std::fs::rename(bench.path("up.mp4"), bench.path("swing.mp4")).unwrap();
+    bench.refilmed("vflip", "18");
     let words = done(&bench.track(&[]));
     assert!(!words.contains("px long"), "{words}");
     let standing = column(&bench.table(), "theta1_rad").into_iter().filter(|theta| theta.cos() < 0.0).count();

@@ -116,45 +116,29 @@ mod tests {
     use crate::experiment::Experiment;
     use crate::fit::{Problem, Record};
 
-    /// A fit with dry friction of this size, its standard deviation 10⁻⁸ N·m, that leaves four times the noise's variance in 60 values.
-    fn with_friction(records: &[Record], torque_n_m: f64) -> Refit<'_> {
-        let free = [Parameter::HingeCoulomb];
-        let problem = Problem::new(records, &Experiment::default(), &free).unwrap();
-        let mut x = vec![torque_n_m];
+    fn records() -> [Record; 1] {
+        let t_s: Vec<f64> = (0..30).map(|k| k as f64 / 30.0).collect();
+        let (theta_rad, relative_sd) = (vec![vec![Some(0.1); 30]; 2], vec![vec![1.0; 30]; 2]);
+        [Record { path: "made".into(), theta_rad, relative_sd, t_s, in_step: 0.0, rounding: 0.0, continues: false }]
+    }
+
+    /// A fit with one effect of this size and standard deviation, that leaves so much in 60 values.
+    fn with(records: &[Record], effect: Effect, (value, sd): (f64, f64), chi2: f64) -> Refit<'_> {
+        let problem = Problem::new(records, &Experiment::default(), &effect.parameters()[..1]).unwrap();
+        let mut x = vec![value];
         x.resize(problem.variables(), 0.3);
         let mut normal = DMatrix::identity(x.len(), x.len());
-        normal[(0, 0)] = 1e16;
-        let hypothesis = Hypothesis { effects: vec![Effect::HingeCoulomb], dropped: None };
+        normal[(0, 0)] = 1.0 / (sd * sd);
+        let hypothesis = Hypothesis { effects: vec![effect], dropped: None };
         let certificate = Certificate { starts_agreeing: 1, nested_ok: true };
-        Refit { hypothesis, problem, x, chi2: 240.0, normal, steps: 1, damping: 0.0, converged: true, certificate }
+        Refit { hypothesis, problem, x, chi2, normal, steps: 1, damping: 0.0, converged: true, certificate }
     }
 
     #[test]
     fn a_gain_that_no_sensor_has_is_none() {
-        let t_s: Vec<f64> = (0..30).map(|k| k as f64 / 30.0).collect();
-        let theta_rad = vec![vec![Some(0.1); 30]; 2];
-        let relative_sd = vec![vec![1.0; 30]; 2];
-        let path = "made".into();
-        let records = [Record { path, theta_rad, relative_sd, t_s, in_step: 0.0, rounding: 0.0, continues: false }];
+        let records = records();
         let with_gain = |gain: f64| {
-            let problem = Problem::new(&records, &Experiment::default(), &[Parameter::AngleGain]).unwrap();
-            let mut x = vec![gain];
-            x.resize(problem.variables(), 0.3);
-            let mut normal = DMatrix::identity(x.len(), x.len());
-            normal[(0, 0)] = 1e8;
-            let hypothesis = Hypothesis { effects: vec![Effect::AngleGain], dropped: None };
-            let certificate = Certificate { starts_agreeing: 3, nested_ok: true };
-            let fit = Refit {
-                hypothesis,
-                problem,
-                x,
-                chi2: 60.0,
-                normal,
-                steps: 1,
-                damping: 0.0,
-                converged: true,
-                certificate,
-            };
+            let fit = with(&records, Effect::AngleGain, (gain, 1e-4), 60.0);
             ln_evidence(&fit, Scatter::NOISE, |_| 1e6, &PriorSettings::default(), 9.0)
         };
         assert!(with_gain(0.08).is_finite() && with_gain(-0.12).is_finite());
@@ -163,26 +147,15 @@ mod tests {
 
     #[test]
     fn a_law_of_no_size_is_none_however_much_is_left_without_it() {
-        let t_s: Vec<f64> = (0..30).map(|k| k as f64 / 30.0).collect();
-        let theta_rad = vec![vec![Some(0.1); 30]; 2];
-        let records = [Record {
-            path: "made".into(),
-            theta_rad,
-            relative_sd: vec![vec![1.0; 30]; 2],
-            t_s,
-            in_step: 0.0,
-            rounding: 0.0,
-            continues: false,
-        }];
+        let records = records();
+        let with_friction = |torque_n_m: f64| with(&records, Effect::HingeCoulomb, (torque_n_m, 1e-8), 240.0);
         let scatter = Scatter { of_values: 5.0, of_all: 5.0 };
-        let needed = |torque_n_m: f64| {
-            ln_evidence(&with_friction(&records, torque_n_m), scatter, |_| 1e6, &PriorSettings::default(), 9.0)
-        };
+        let needed =
+            |torque_n_m: f64| ln_evidence(&with_friction(torque_n_m), scatter, |_| 1e6, &PriorSettings::default(), 9.0);
         assert_eq!(needed(0.0), f64::NEG_INFINITY);
         // far more than noise is left: what is needed is not held against its own standard deviation
         assert!(needed(1e-8).is_finite());
-        let not_needed =
-            ln_evidence(&with_friction(&records, 1e-8), scatter, |_| 241.0, &PriorSettings::default(), 9.0);
+        let not_needed = ln_evidence(&with_friction(1e-8), scatter, |_| 241.0, &PriorSettings::default(), 9.0);
         assert_eq!(not_needed, f64::NEG_INFINITY);
     }
 }

@@ -213,7 +213,8 @@ fn to_decide(effects: &[Effect], class: &[Effect], marks: usize) -> Option<Strin
     if has(&[Effect::CameraTilt, Effect::SideForce, Effect::RestCurl]) {
         advice.push("film a plumb line beside the strip, and the strip turned about its length by half a turn");
     }
-    if has(&[Effect::TimeBase, Effect::HingeStiffness, Effect::AddedMass, Effect::DistributedFlexibility]) {
+    let of_pace = has(&[Effect::TimeBase, Effect::HingeStiffness, Effect::AddedMass, Effect::DistributedFlexibility]);
+    if of_pace {
         advice.push(
             "film a clock with the strip, and release it at a much larger angle: only a spring's share in the frequency falls with amplitude",
         );
@@ -245,8 +246,8 @@ fn to_decide(effects: &[Effect], class: &[Effect], marks: usize) -> Option<Strin
             "film a grid in the plane of the swing, which fixes the gain of the angles and from where the camera looks",
         );
     }
-    let clocked = advice.iter().any(|own| own.starts_with("film a clock"));
-    if has(&[Effect::DifferentialLag, Effect::DroppedFrames, Effect::TimeBase]) && !clocked {
+    // one clock is enough
+    if has(&[Effect::DifferentialLag, Effect::DroppedFrames, Effect::TimeBase]) && !of_pace {
         advice.push("film a running clock beside the strip");
     }
     if advice.is_empty() {

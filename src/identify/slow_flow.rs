@@ -286,7 +286,7 @@ impl<'a> SlowFlow<'a> {
         lengths.zip(&self.noise_rad).map(|(n, sd)| 2.0 * n * sd.ln()).sum()
     }
 
-    /// Whether k was opened to this prior, for the recording contradicts what hung bodies allow; of a displacement it always is.
+    /// Whether k was opened to this prior, for the recording contradicts what hung bodies allow. Of a displacement it is open from the start, which contradicts nothing.
     pub fn is_beyond_hung_bodies(&self, open: [f64; 2]) -> bool {
         self.measured == Measured::Angles && self.prior == open
     }

@@ -101,7 +101,7 @@ pub struct Measurement {
 /// What is known of the camera's own motion.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct Camera {
-    /// Greatest shift seen, px, in the pictures looked at beforehand or, where it is taken out, in any frame.
+    /// Greatest shift, px, that two of the pictures looked at beforehand show or, where it is taken out, in any frame.
     pub greatest_shift_px: f64,
     /// It is taken out of the marks' positions.
     pub taken_out: bool,

@@ -7,8 +7,9 @@
 //! A codec moves a mark by whole quarter pixels and codes what is left only where it is large, so a moving mark
 //! scatters far more than its noise says; without loss it scatters less. At rest the picture is coded once and repeated:
 //! the error does not show as scatter; nor does it along an axis on which the mark hardly moves, where it is the same for
-//! many frames. The two states therefore have a factor each, along each axis, and a mark at rest is never believed to be better than its own scatter or than [`REST_SHARE`] of what the moving marks show, nor better than stated where
-//! nothing moves.
+//! many frames. The two states therefore have a factor each, along each axis, and a mark at rest is never believed to be
+//! better than its own scatter or than [`REST_SHARE`] of what the moving marks show, nor better than stated where nothing
+//! moves.
 
 use super::{Flags, Measured};
 use crate::statistics::{median, median_step_s};
@@ -63,13 +64,7 @@ pub fn scatters(marks: &[Vec<(Option<Measured>, Flags)>], t_s: &[f64]) -> Vec<Sc
         .collect()
 }
 
-/// Speed of a track, px a frame, from its neighbours in time.
-pub fn speeds_px(points: &[Option<Measured>]) -> Vec<f64> {
-    let [x, y] = [0, 1].map(|axis| speeds_along(points, axis));
-    x.iter().zip(&y).map(|(x, y)| x.hypot(*y)).collect()
-}
-
-/// The same along one axis (0: x, 1: y).
+/// Speed of a track along one axis (0: x, 1: y), px a frame, from its neighbours in time.
 pub fn speeds_along(points: &[Option<Measured>], axis: usize) -> Vec<f64> {
     let between = |a: usize, b: usize| -> Option<f64> {
         let (p, q) = (points.get(a)?.as_ref()?, points.get(b)?.as_ref()?);
@@ -192,7 +187,7 @@ mod tests {
                 })
             })
             .collect();
-        let factor = moving_factor(&points, &speeds_px(&points), &t_s, 0).unwrap();
+        let factor = moving_factor(&points, &speeds_along(&points, 0), &t_s, 0).unwrap();
         // errors without memory are stated a little too large, never too small
         assert!((2.0..2.5).contains(&factor), "{factor}");
     }

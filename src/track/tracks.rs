@@ -4,7 +4,7 @@
 use super::choose::Spare;
 use super::follower::measurement;
 use super::kalman::{Belief, Motion};
-use super::noise::{Scatter, speeds_along, speeds_px, variance_factor};
+use super::noise::{Scatter, speeds_along, variance_factor};
 use super::smooth::smooth;
 use super::{Filtered, Flags, Measured, Point};
 use crate::statistics::median;
@@ -40,9 +40,9 @@ impl Tracks {
         let (mut measured, mut flags): (Vec<_>, Vec<_>) = points.into_iter().unzip();
         let mut areas: Vec<f64> = measured.iter().flatten().map(|m| f64::from(m.area_px2)).collect();
         let area = median(&mut areas).unwrap_or(0.0);
-        let speeds = speeds_px(&measured);
-        let usual_px2 = usual_area(&measured, &speeds, area);
         let along = [0, 1].map(|axis| speeds_along(&measured, axis));
+        let speeds: Vec<f64> = along[0].iter().zip(&along[1]).map(|(x, y)| x.hypot(*y)).collect();
+        let usual_px2 = usual_area(&measured, &speeds, area);
         for (i, ((m, f), speed)) in measured.iter_mut().zip(&mut flags).zip(speeds).enumerate() {
             if let Some(m) = m {
                 let factor = |axis: usize| variance_factor(along[axis][i], scatter.resting[axis], scatter.moving[axis]);
