@@ -157,8 +157,8 @@ pub struct Entry {
     pub needs: Needs,
     /// Whether an encoder cannot err so.
     pub of_camera: bool,
-    /// The part of its own torque by which its law may be wrong before something unknown is suspected beside it. That of a hysteresis is larger: how it goes
-    /// over from spring to slip has as many forms as there are authors.
+    /// The part of its own torque by which its law may be wrong before something else is suspected beside it. That of friction and of hysteresis is larger: how they go
+    /// with speed, and over from sticking to slip, has as many forms as there are authors.
     pub law_error: f64,
     /// Shapes of the grammar's terms that are this law, or within its error where no law is exact; of the angle where it goes with the position, of the rate elsewhere.
     pub shapes: &'static [&'static str],
@@ -168,6 +168,13 @@ pub struct Entry {
     set_up: fn(&mut SetUp<'_>),
     /// In words, with an article.
     pub words: &'static str,
+}
+
+impl Entry {
+    /// Whether it changes a frequency, or the amplitude at which that is seen.
+    pub fn is_of_frequency(&self) -> bool {
+        self.acts == Acts::Pace || self.of_camera && self.phase == Some(Phase::Position)
+    }
 }
 
 /// A problem that is being set up, and what of the recordings that may depend on.
@@ -231,6 +238,8 @@ const PROPORTIONAL: &[&str] = &["in proportion"];
 const DRY: &[&str] = &["sign", "sign that fades with speed"];
 /// Of a law that is right to this part of its torque.
 const EXACT: f64 = 0.002;
+/// Of one that is a first approximation of what surfaces and fibres do.
+const APPROXIMATE: f64 = 0.05;
 
 const fn entry(parameters: &'static [Parameter], place: Place, acts: Acts, words: &'static str) -> Entry {
     let (cost, needs, law_error) = (Cost::Ordinary, Needs::Nothing, EXACT);
@@ -307,6 +316,7 @@ static TABLE: [Entry; 18] = {
         },
         Entry {
             can_stop: true,
+            law_error: APPROXIMATE,
             shapes: DRY,
             ..velocity(entry(&[P::HingeCoulomb], Hinge, Loss, "dry friction of the hinge"))
         },
@@ -320,7 +330,7 @@ static TABLE: [Entry; 18] = {
             id: "joint_hysteretic",
             cost: Cost::Corners,
             needs: Needs::Joint,
-            law_error: 0.05,
+            law_error: APPROXIMATE,
             set_up: |problem| problem.yields(),
             shapes: DRY,
             ..velocity(entry(&[P::HysteresisTorque, P::HysteresisYield], Joint, Loss, "hysteresis of the joint"))

@@ -101,13 +101,16 @@ pub fn led_by_likely<'a>(
     proof: Option<HeldOut>,
     from_s: Option<f64>,
 ) -> (Posterior<'a>, Option<HeldOut>) {
+    let verdict = &context.settings.verdict;
     let inclusions = posterior.inclusions(context.settings);
-    let likely: Vec<Effect> =
-        inclusions.iter().filter(|own| own.1 > context.settings.verdict.even).map(|own| own.0).collect();
+    let likely: Vec<Effect> = inclusions.iter().filter(|own| own.1 > verdict.even).map(|own| own.0).collect();
+    // where nothing else remains, the table's own fits tell sets of its names apart
+    let least =
+        if posterior.remains > verdict.even { 0.0 } else { verdict.told_apart * posterior.candidates[0].if_named };
     let is_meant = |candidate: &Candidate<'_>| {
         let effects = &candidate.fit.hypothesis.effects;
         let is_of_likely = effects.len() == likely.len() && effects.iter().all(|effect| likely.contains(effect));
-        is_of_likely && candidate.ln_posterior.is_finite()
+        is_of_likely && candidate.ln_posterior.is_finite() && candidate.if_named >= least
     };
     let is_new = |effect: &Effect| !posterior.best().hypothesis.has(*effect);
     let takes_a_place = !posterior.needed.is_empty() && likely.iter().any(is_new);

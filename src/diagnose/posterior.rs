@@ -50,8 +50,19 @@ pub struct Posterior<'a> {
     pub unknowns: Vec<Latent>,
     /// How many effects of a hypothesis have been held against every other.
     pub compared: Compared,
-    /// How probable each name of the likeliest fit is where any law may stand in its place, as far as that was asked.
-    pub needed: Vec<(Effect, f64)>,
+    /// How probable each effect is where any law may stand in its place; nothing where that was not asked.
+    pub needed: Vec<Needed>,
+}
+
+/// How probable an effect is where any law may stand in its place.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Needed {
+    /// Which.
+    pub effect: Effect,
+    /// That it is at work.
+    pub probability: f64,
+    /// That it is not, and a law is that no table holds.
+    pub replaced: f64,
 }
 
 /// Weighs the hypotheses of some fits, out of so many candidate effects, beside the unknown around the likeliest of them. So many effects of each have been held
@@ -200,7 +211,7 @@ fn genuine(fit: &Refit<'_>, others: &[&Refit<'_>], compared: &Compared, settings
     if effects.is_empty() {
         return 1.0;
     }
-    let odds: f64 = effects.iter().map(|effect| law_of(*effect).odds(fit, others, settings)).product();
+    let odds: f64 = effects.iter().map(|effect| odds(*effect, fit, others, settings)).product();
     let further = effects.len().saturating_sub(compared.of(effects)) as i32;
     odds * (1.0 - settings.prior.imitated) * settings.prior.not_compared.powi(further)
 }
@@ -208,7 +219,31 @@ fn genuine(fit: &Refit<'_>, others: &[&Refit<'_>], compared: &Compared, settings
 /// The same of one of them: what another one beside it stands for is not its concern.
 fn genuine_alone(effect: Effect, is_further: bool, fit: &Refit<'_>, others: &[&Refit<'_>], settings: &Settings) -> f64 {
     let further = if is_further { settings.prior.not_compared } else { 1.0 };
-    law_of(effect).odds(fit, others, settings) * (1.0 - settings.prior.imitated) * further
+    odds(effect, fit, others, settings) * (1.0 - settings.prior.imitated) * further
+}
+
+/// The odds that one of them is what it seems to be, as its own law and those beside it say.
+fn odds(effect: Effect, fit: &Refit<'_>, others: &[&Refit<'_>], settings: &Settings) -> f64 {
+    let beside = if completes_a_law(effect, fit, others) { settings.prior.completes_a_law } else { 1.0 };
+    beside.min(law_of(effect).odds(fit, others, settings))
+}
+
+/// Whether an effect explains no more than the error of another one's law: of two torques that go with the position, or with the velocity, the smaller may be what the
+/// larger one's law lacks.
+fn completes_a_law(effect: Effect, fit: &Refit<'_>, others: &[&Refit<'_>]) -> bool {
+    let explained = |effect: Effect| {
+        let rest = fit.hypothesis.without(effect).effects;
+        others.iter().find(|other| other.hypothesis.effects == rest).map(|without| without.chi2 - fit.chi2)
+    };
+    let is_like = |other: &&Effect| {
+        **other != effect && other.place() != Place::Camera && other.entry().phase == effect.entry().phase
+    };
+    let errors = fit.hypothesis.effects.iter().filter(is_like).filter_map(|other| {
+        let error = other.entry().law_error;
+        Some(error * error * explained(*other)?)
+    });
+    let most = errors.fold(0.0, f64::max);
+    effect.place() != Place::Camera && explained(effect).is_some_and(|own| own < most)
 }
 
 /// By how much the torque of a fit's laws may be wrong.
@@ -272,10 +307,13 @@ impl<'a> Posterior<'a> {
         self
     }
 
-    /// Whether a name of the likeliest fit often stands for something else.
+    /// Whether a name of the likeliest fit often stands for something else, or two of them may together: a frequency, and how it goes with amplitude, is what any
+    /// spring changes that is no straight line.
     pub fn may_stand_in(&self, settings: &Settings) -> bool {
         let (best, others) = (self.best(), self.fits());
-        best.hypothesis.effects.iter().any(|effect| law_of(*effect).odds(best, &others, settings) < 1.0)
+        let effects = &best.hypothesis.effects;
+        let of_frequency = effects.iter().filter(|effect| effect.entry().is_of_frequency()).count();
+        of_frequency > 1 || effects.iter().any(|effect| odds(*effect, best, &others, settings) < 1.0)
     }
 
     fn fits(&self) -> Vec<&Refit<'a>> {
@@ -310,10 +348,10 @@ impl<'a> Posterior<'a> {
         let with = || self.candidates.iter().filter(|c| c.fit.hypothesis.has(effect));
         let counts = with().filter(|c| c.in_layers > NEGLIGIBLE);
         let of_table = counts.map(|c| c.in_layers * genuine(&c.fit)).fold(0.0, |sum, p| sum + p).min(1.0);
-        let needed = self.needed.iter().find(|own| own.0 == effect);
+        let needed = self.needed.iter().find(|own| own.effect == effect);
         let likeliest = with().next().map_or(1.0 - settings.prior.imitated, |c| genuine(&c.fit));
         // the descriptions hold those of the table, too
-        needed.map_or(of_table, |(_, needed)| needed * likeliest)
+        needed.map_or(of_table, |needed| needed.probability * likeliest)
     }
 
     /// How probable each effect of the table is.

@@ -247,8 +247,9 @@ pub struct PriorSettings {
     pub not_compared: f64,
     /// A support in step with the swing is with these odds what it seems to be (training bank: four times out of five).
     pub support_in_step: f64,
-    /// The same beside a law of physics where it gains little: three free numbers complete a law that is only nearly right (training bank).
-    pub support_beside_a_law: f64,
+    /// A name that gains no more than the error of another name's law, or, of a support, whose three free numbers complete any law that is only nearly right, little
+    /// (training bank, of supports).
+    pub completes_a_law: f64,
     /// That little, in standard deviations (training bank).
     pub slight: f64,
     /// A clock that jumps by a part of a frame is with these odds a camera's (training bank).
@@ -420,7 +421,7 @@ impl Default for PriorSettings {
             imitated: 0.03,
             not_compared: 0.7,
             support_in_step: 0.8,
-            support_beside_a_law: 0.35,
+            completes_a_law: 0.35,
             slight: 25.0,
             part_of_a_frame: 0.6,
         }

@@ -155,11 +155,11 @@ impl Verdict {
     }
 }
 
-/// Where another law takes the place of the name that explains most, how likely that is: the other names may complete what is not there.
+/// Where a law of no table takes the place of the name that explains most, how likely that is: the other names may complete what is not there.
 fn replaced(posterior: &Posterior<'_>, settings: &Settings) -> Option<f64> {
     let leading = posterior.by_what_they_explain(posterior.best()).first().copied()?;
-    let needed = posterior.needed.iter().find(|own| own.0 == leading).map(|own| own.1)?;
-    (needed < settings.verdict.even).then_some(1.0 - needed)
+    let needed = posterior.needed.iter().find(|own| own.effect == leading)?;
+    (needed.replaced > settings.verdict.even).then_some(needed.replaced)
 }
 
 /// Those of a class that no likely hypothesis has in the place of one of the names.

@@ -70,7 +70,7 @@ impl Law for MovingSupport {
         let rest = fit.hypothesis.without(Effect::SupportMotion);
         let is_slight = fit_of(&rest).is_some_and(|without| without.chi2 - fit.chi2 < prior.slight * prior.slight);
         if is_slight && rest.effects.iter().any(|e| e.place() != Place::Camera) {
-            return prior.support_beside_a_law;
+            return prior.completes_a_law;
         }
         let Some(base) = fit_of(&Hypothesis::default()) else { return 1.0 };
         let powers = chord_powers(base);

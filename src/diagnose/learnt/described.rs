@@ -8,10 +8,9 @@ use super::super::evidence::{Scatter, normalised};
 use super::super::grammar::{Form, Term};
 use super::super::hypothesis::Hypothesis;
 use super::super::misfit::most_of_noise;
-use super::super::posterior::Posterior;
+use super::super::posterior::{Needed, Posterior};
 use super::super::refit::Refit;
 use super::super::settings::LawSettings;
-use super::Needed;
 use super::along::Along;
 use super::fitted::{Begun, Budget, along_the_recording, fitted, gone_on, with_laws};
 use super::in_place::in_place_of_names;
@@ -223,24 +222,33 @@ impl Twins {
 }
 
 /// The probability of each effect among all descriptions: of those that name it, or one that it does as well as, and of those with a term that does what it does along a
-/// motion.
+/// motion; and that of those without it which have a term that no effect does.
 pub fn needed(
     context: &FitContext<'_>,
     order: &[Described<'_>],
     posterior: &Posterior<'_>,
     effects: &[Effect],
     along: &Along,
-) -> Needed {
+) -> Vec<Needed> {
     let weights = normalised(&order.iter().map(|own| -own.length).collect::<Vec<f64>>());
     let twins = Twins::of(posterior, effects);
-    let shares: Vec<Vec<(Effect, f64)>> =
-        order.iter().map(|own| own.stand_for(context, along).into_iter().flatten().collect()).collect();
+    let terms: Vec<Vec<Vec<(Effect, f64)>>> = order.iter().map(|own| own.stand_for(context, along)).collect();
     let of_effect = |effect: &Effect| {
-        let share = |(own, shares): (&Described<'_>, &Vec<(Effect, f64)>)| {
-            let of_terms = shares.iter().filter(|share| share.0 == *effect).map(|share| share.1).fold(0.0, f64::max);
-            twins.share(*effect, &own.fit.hypothesis).max(of_terms)
-        };
-        (*effect, order.iter().zip(&shares).map(share).zip(&weights).map(|(share, weight)| share * weight).sum())
+        let mut needed = Needed { effect: *effect, probability: 0.0, replaced: 0.0 };
+        for ((own, terms), weight) in order.iter().zip(&terms).zip(&weights) {
+            let of_terms = terms.iter().flatten().filter(|own| own.0 == *effect).map(|own| own.1).fold(0.0, f64::max);
+            // sets of names alone are all among the descriptions
+            let of_names = match terms.is_empty() {
+                true => f64::from(u8::from(own.fit.hypothesis.has(*effect))),
+                false => twins.share(*effect, &own.fit.hypothesis),
+            };
+            let share = of_names.max(of_terms);
+            needed.probability += share * weight;
+            if terms.iter().any(Vec::is_empty) {
+                needed.replaced += (1.0 - share) * weight;
+            }
+        }
+        needed
     };
     effects.iter().map(of_effect).collect()
 }

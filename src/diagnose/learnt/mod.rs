@@ -43,14 +43,11 @@ mod sought;
 use super::context::FitContext;
 use super::effect::Effect;
 use super::heldout::HeldOut;
-use super::posterior::Posterior;
+use super::posterior::{Needed, Posterior};
 use described::{Described, descriptions, needed};
 use proven::{foretold, proven};
 
 pub use proven::Learnt;
-
-/// How probable each effect is where any law may stand in its place; nothing where that was not asked.
-pub type Needed = Vec<(Effect, f64)>;
 
 /// Learns what the likeliest fit leaves, where that is more than noise, where one of its names often stands for something else, or where it takes so many names that one
 /// law may do as well; the effects are those that may be at work. A strip's fits are too dear for it.
@@ -60,19 +57,19 @@ pub fn beside<'a>(
     effects: &[Effect],
     proof: Option<&HeldOut>,
     from_s: Option<f64>,
-) -> (Needed, Option<Learnt<'a>>) {
+) -> (Vec<Needed>, Option<Learnt<'a>>) {
     let settings = context.settings;
     let many = posterior.best().hypothesis.effects.len() > settings.search.main_effects;
     let remains = posterior.remains > settings.verdict.even || posterior.may_stand_in(settings) || many;
     let is_worth = remains && !context.is_strip();
     let found = if is_worth { descriptions(context, posterior, effects) } else { None };
-    let Some((order, along)) = found else { return (Needed::new(), None) };
+    let Some((order, along)) = found else { return (Vec::new(), None) };
     let needed = |order: &[Described<'_>]| needed(context, order, posterior, effects, &along);
     let Some(proof) = proof else { return (needed(&order), None) };
     let foretold = foretold(context, order, from_s);
     let learnt = proven(context, &foretold, proof, &along);
     let order: Vec<Described<'a>> = foretold.into_iter().map(|own| own.0).collect();
     // where no motion could be integrated, that says nothing of any effect
-    let needed = if order.is_empty() { Needed::new() } else { needed(&order) };
+    let needed = if order.is_empty() { Vec::new() } else { needed(&order) };
     (needed, learnt)
 }

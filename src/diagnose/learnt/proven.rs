@@ -3,7 +3,7 @@
 use rayon::prelude::*;
 
 use super::super::context::FitContext;
-use super::super::effect::{Effect, Place};
+use super::super::effect::{Effect, Phase, Place};
 use super::super::grammar::Term;
 use super::super::heldout::{self, HeldOut, Prediction};
 use super::super::refit::Refit;
@@ -31,6 +31,11 @@ impl Learnt<'_> {
     /// Where its first term acts.
     pub fn place(&self) -> Option<Place> {
         self.terms.first().map(|term| place_of(term.law.place))
+    }
+
+    /// With what its first term goes.
+    pub fn phase(&self) -> Option<Phase> {
+        self.terms.first().map(|term| if term.state == "angle" { Phase::Position } else { Phase::Velocity })
     }
 
     /// The formula with its numbers.
