@@ -6,9 +6,15 @@
 //!
 //! ```text
 //! Δx = t_x − φ (y − y_c),   Δy = t_y + φ (x − x_c)
+//! Σ (Δ_k − s_k)ᵀ H_k (Δ_k − s_k) + σ² (φ/φ₀)² → least,     H_k = Σ ∇ ∇ᵀ over patch k,   φ₀ = |t| / width
 //! ```
+//!
+//! H_k is how well a patch shows a shift in each direction: a faint one, of which a codec keeps less than a strong one, hardly counts, nor does an edge along its own
+//! length. A hand turns a camera about its axis by about the angle by which it turns it aside; of a lens whose picture is as wide as it is far, that is φ₀.
 
 mod smooth;
+
+use nalgebra::{Matrix2, Matrix2x3, Matrix3, Vector2, Vector3};
 
 use crate::statistics::median;
 use crate::video::Picture;
@@ -35,6 +41,10 @@ const MOST_DIFFERENCE: f64 = 0.5;
 const SAME_PX: f64 = 3.5;
 /// Residual within which a patch agrees, px, at least.
 const AGREEMENT_PX: f64 = 0.25;
+/// Fewer patches do not tell a turn from a shift.
+const FEWEST_TURNING: usize = 4;
+/// No camera is so still that it turns by less (a hundredth of a pixel at a hundred pixels from the centre).
+const LEAST_TURN_RAD: f64 = 1e-4;
 
 /// Where the camera looks in one picture, against the reference picture.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
@@ -45,8 +55,8 @@ pub struct CameraShift {
     pub turn_rad: f64,
     /// Centre of the picture.
     pub centre_px: [f64; 2],
-    /// Standard deviation of the shift, from how far the patches disagree.
-    pub sd_px: f64,
+    /// Covariance of shift (px) and turn (rad), from how far the patches disagree.
+    covariance: Matrix3<f64>,
     /// Patches that agree.
     pub patches: usize,
 }
@@ -55,6 +65,15 @@ impl CameraShift {
     fn at(&self, p: [f64; 2]) -> [f64; 2] {
         let [x, y] = [p[0] - self.centre_px[0], p[1] - self.centre_px[1]];
         [self.shift_px[0] - self.turn_rad * y, self.shift_px[1] + self.turn_rad * x]
+    }
+
+    /// σ²: the scatter of some patches about it, weighed by what each shows.
+    fn variance(&self, kept: &[&Found<'_>], weight: impl Fn(&Patch) -> Matrix2<f64>) -> f64 {
+        let square = |found: &&Found<'_>| {
+            let off = found.off(self);
+            (off.transpose() * weight(found.patch) * off)[0]
+        };
+        kept.iter().map(square).sum::<f64>() / (2.0 * kept.len() as f64 - 3.0).max(1.0)
     }
 
     /// Where a point of this picture lies in the reference picture.
@@ -67,6 +86,19 @@ impl CameraShift {
     pub fn size_px(&self) -> f64 {
         self.shift_px[0].hypot(self.shift_px[1])
     }
+
+    /// Standard deviation of the shift of the picture's centre, the mean of both directions.
+    pub fn sd_px(&self) -> f64 {
+        (0.5 * (self.covariance[(0, 0)] + self.covariance[(1, 1)])).sqrt()
+    }
+
+    /// Variances along x and y, and covariance, of the shift of a point (px²).
+    pub fn variance_px2(&self, p: [f64; 2]) -> [f64; 3] {
+        let [x, y] = [p[0] - self.centre_px[0], p[1] - self.centre_px[1]];
+        let (along_x, along_y) = (Vector3::new(1.0, 0.0, -y), Vector3::new(0.0, 1.0, x));
+        let of = |a: &Vector3<f64>, b: &Vector3<f64>| (a.transpose() * self.covariance * b)[0];
+        [of(&along_x, &along_x), of(&along_y, &along_y), of(&along_x, &along_y)]
+    }
 }
 
 /// A piece of the reference picture.
@@ -77,8 +109,10 @@ struct Patch {
     /// Luma less its mean, and its gradients, row by row.
     values: Vec<f32>,
     gradients: Vec<[f32; 2]>,
-    /// Inverse of Σ ∇ ∇ᵀ: xx, xy, yy.
-    inverse: [f64; 3],
+    /// Σ ∇ ∇ᵀ, which says how well it shows a shift.
+    information: Matrix2<f64>,
+    /// Its inverse.
+    inverse: Matrix2<f64>,
     /// Mean square of the weaker gradient.
     strength: f64,
     /// Σ of the squares of the values.
@@ -114,9 +148,12 @@ impl Background {
     pub fn locate(&self, picture: &Picture<'_>) -> Option<CameraShift> {
         let luma = Luma::of(picture);
         let start = self.scout(&luma)?;
-        let found: Vec<([f64; 2], [f64; 2])> =
-            self.patches.iter().filter_map(|p| Some(([p.x as f64, p.y as f64], p.find(&luma, start)?))).collect();
-        self.agree(found, start)
+        let found: Vec<Found<'_>> = self
+            .patches
+            .iter()
+            .filter_map(|patch| Some(Found { patch, shift_px: Vector2::from(patch.find(&luma, start)?) }))
+            .collect();
+        self.agree(&found, start)
     }
 
     /// A first shift in whole pixels: the one that most patches say. What swings may hold the clearest patches.
@@ -156,37 +193,27 @@ impl Background {
     }
 
     /// Shift and turn on which most patches agree, by least squares over those that do, from a first shift.
-    fn agree(&self, found: Vec<([f64; 2], [f64; 2])>, start: [f64; 2]) -> Option<CameraShift> {
-        let mut camera =
-            CameraShift { shift_px: start, centre_px: self.centre_px, patches: found.len(), ..Default::default() };
+    fn agree(&self, found: &[Found<'_>], start: [f64; 2]) -> Option<CameraShift> {
+        let mut camera = CameraShift { shift_px: start, centre_px: self.centre_px, ..Default::default() };
         let share = (AGREEING_SHARE * found.len() as f64) as usize;
         let fewest = if self.named { 1 } else { FEWEST_AGREEING.max(share) };
         for round in 0..6 {
-            let rest = |f: &([f64; 2], [f64; 2])| {
-                let at = camera.at(f.0);
-                (f.1[0] - at[0]).hypot(f.1[1] - at[1])
-            };
-            let usual = median(&mut found.iter().map(rest).collect::<Vec<_>>()).unwrap_or(0.0);
+            let usual = median(&mut found.iter().map(|f| f.off(&camera).norm()).collect::<Vec<_>>()).unwrap_or(0.0);
             // a turn, and parts of a pixel, are not known yet in the first round
             let limit = if round == 0 { 3.0 } else { (3.0 * usual).clamp(AGREEMENT_PX, 1.0) };
-            let kept: Vec<_> = found.iter().filter(|f| rest(f) <= limit).collect();
+            let kept: Vec<&Found<'_>> = found.iter().filter(|f| f.off(&camera).norm() <= limit).collect();
             if kept.len() < fewest || !(self.named || self.is_wide(&kept)) {
                 return None;
             }
-            let next = self.least_squares(&kept)?;
-            let squares = |f: &&([f64; 2], [f64; 2])| {
-                let at = next.at(f.0);
-                (f.1[0] - at[0]).powi(2) + (f.1[1] - at[1]).powi(2)
-            };
-            let sum: f64 = kept.iter().map(squares).sum();
-            camera = CameraShift { sd_px: (0.5 * sum).sqrt() / kept.len() as f64, ..next };
+            // at first every patch has one vote: the clearest may lie on what swings
+            camera = self.least_squares(&kept, &camera, round > 0)?;
         }
         Some(camera)
     }
 
     /// The patches lie all over the picture.
-    fn is_wide(&self, kept: &[&([f64; 2], [f64; 2])]) -> bool {
-        let x = || kept.iter().map(|f| f.0[0]);
+    fn is_wide(&self, kept: &[&Found<'_>]) -> bool {
+        let x = || kept.iter().map(|f| f.patch.x as f64);
         let span = x().fold(f64::MIN, f64::max) - x().fold(f64::MAX, f64::min);
         span > LEAST_SPAN * 2.0 * self.centre_px[0]
     }
@@ -196,30 +223,44 @@ impl Background {
         self.named && !self.patches.is_empty() || self.patches.len() >= FEWEST_AGREEING
     }
 
-    fn least_squares(&self, kept: &[&([f64; 2], [f64; 2])]) -> Option<CameraShift> {
-        let turns = kept.len() >= 4;
-        let mut normal = nalgebra::Matrix3::<f64>::zeros();
-        let mut right = nalgebra::Vector3::<f64>::zeros();
-        for (place, shift) in kept {
-            let (x, y) = (place[0] - self.centre_px[0], place[1] - self.centre_px[1]);
-            for (row, value) in [([1.0, 0.0, -y], shift[0]), ([0.0, 1.0, x], shift[1])] {
-                let row = nalgebra::Vector3::from(row);
-                normal += row * row.transpose();
-                right += row * value;
-            }
+    /// Shift and turn of the camera from some patches; `before` says how far it may have turned.
+    fn least_squares(&self, kept: &[&Found<'_>], before: &CameraShift, weighed: bool) -> Option<CameraShift> {
+        let weight = |patch: &Patch| if weighed { patch.information } else { Matrix2::identity() };
+        let mut normal = Matrix3::<f64>::zeros();
+        let mut right = Vector3::<f64>::zeros();
+        for Found { patch, shift_px } in kept.iter().copied() {
+            let (x, y) = (patch.x as f64 - self.centre_px[0], patch.y as f64 - self.centre_px[1]);
+            let slopes = Matrix2x3::new(1.0, 0.0, -y, 0.0, 1.0, x);
+            normal += slopes.transpose() * weight(patch) * slopes;
+            right += slopes.transpose() * weight(patch) * shift_px;
         }
-        if !turns {
-            // so few cannot tell a turn from a shift
-            normal[(2, 2)] += 1e12;
-        }
-        let solution = normal.cholesky()?.solve(&right);
-        Some(CameraShift {
-            shift_px: [solution[0], solution[1]],
-            turn_rad: solution[2],
+        // so few cannot tell a turn from a shift
+        let turn_rad = if kept.len() < FEWEST_TURNING { 0.0 } else { before.size_px() / (2.0 * self.centre_px[0]) };
+        let variance = before.variance(kept, weight).max(f64::MIN_POSITIVE);
+        normal[(2, 2)] += variance / (turn_rad * turn_rad).max(LEAST_TURN_RAD * LEAST_TURN_RAD);
+        let inverse = normal.try_inverse()?;
+        let [x, y, turn_rad] = (inverse * right).into();
+        let found = CameraShift {
+            shift_px: [x, y],
+            turn_rad,
             centre_px: self.centre_px,
-            sd_px: 0.0,
             patches: kept.len(),
-        })
+            covariance: Matrix3::zeros(),
+        };
+        Some(CameraShift { covariance: inverse * found.variance(kept, weight), ..found })
+    }
+}
+
+/// A patch, and by how much it has shifted.
+struct Found<'b> {
+    patch: &'b Patch,
+    shift_px: Vector2<f64>,
+}
+
+impl Found<'_> {
+    /// How far it is from where a camera's shift puts it.
+    fn off(&self, camera: &CameraShift) -> Vector2<f64> {
+        self.shift_px - Vector2::from(camera.at([self.patch.x as f64, self.patch.y as f64]))
     }
 }
 
@@ -271,12 +312,13 @@ impl Patch {
         let mean = values.iter().sum::<f32>() / values.len() as f32;
         values.iter_mut().for_each(|v| *v -= mean);
         let [xx, xy, yy] = sums;
-        let determinant = xx * yy - xy * xy;
+        let information = Matrix2::new(xx, xy, xy, yy);
         let weaker = 0.5 * (xx + yy) - (0.25 * (xx - yy).powi(2) + xy * xy).sqrt();
-        (determinant > 1e-9).then(|| Self {
+        Some(Self {
             x,
             y,
-            inverse: [yy / determinant, -xy / determinant, xx / determinant],
+            inverse: information.try_inverse()?,
+            information,
             strength: weaker / values.len() as f64,
             squares: values.iter().map(|v| f64::from(*v).powi(2)).sum(),
             values,
@@ -327,8 +369,7 @@ impl Patch {
                 push[1] += f64::from(gradient[1]) * difference;
                 rest += difference * difference;
             }
-            let [xx, xy, yy] = self.inverse;
-            let step = [xx * push[0] + xy * push[1], xy * push[0] + yy * push[1]];
+            let step: [f64; 2] = (self.inverse * Vector2::from(push)).into();
             (0..2).for_each(|axis| shift[axis] -= step[axis].clamp(-2.0, 2.0));
             if (shift[0] - start[0]).hypot(shift[1] - start[1]) > 6.0 {
                 return None;
@@ -427,6 +468,26 @@ mod tests {
         assert!((camera.shift_px[0] - 6.3).abs() < 0.05 && (camera.shift_px[1] + 4.6).abs() < 0.05, "{camera:?}");
         let still = background.locate(&reference.view()).unwrap();
         assert!(still.size_px() < 0.01, "{still:?}");
+    }
+
+    #[test]
+    fn what_a_codec_keeps_of_a_faint_texture_does_not_hold_the_camera() {
+        // the lower half is faint, and stays where it was
+        let faint = |shift: [f64; 2]| {
+            let (mut picture, still) = (textured(shift), textured([0.0, 0.0]));
+            for at in 130 * 320..240 * 320 {
+                let code = f64::from(still.view().luma.code(false, at % 320, at / 320));
+                picture.set(0, at, (120.0 + 0.1 * (code - 120.0)).round() as u16);
+            }
+            picture
+        };
+        let background = Background::of(&faint([0.0, 0.0]).view(), &[]);
+        let camera = background.locate(&faint([0.6, -0.5]).view()).unwrap();
+        for (point, most_px) in [([40.0, 60.0], 0.15), ([280.0, 60.0], 0.15), ([160.0, 200.0], 0.25)] {
+            let [x, y] = camera.undo(point);
+            let off_px = (x - point[0] + 0.6).hypot(y - point[1] - 0.5);
+            assert!(off_px < most_px, "{point:?} is off by {off_px:.3} px");
+        }
     }
 
     #[test]

@@ -540,6 +540,20 @@ fn a_stiffening_hinge_is_learnt_as_a_formula_that_the_file_takes_back() {
 }
 
 #[test]
+fn friction_that_fades_with_speed_is_friction_and_no_drag_beside_it() {
+    let folder = Folder::new();
+    let hidden = "hinge_coulomb = 2.5e-3\n[[model.law]]\nname = \"sticking\"\nplace = \"hinge\"\n\
+                  torque_n_m = \"-a * sign(rate) * exp(-(rate / b) ^ 2)\"\n\
+                  parameters.a = { start = 5e-4, min = 0.0, unit = \"N m\" }\n\
+                  parameters.b = { start = 0.25, unit = \"rad/s\" }\n";
+    let angles = folder.simulated(ONE_LINK, hidden, &["--duration", "40", "--noise-rad", "1e-4", "--seed", "1"]);
+    let verdict = &folder.diagnosis(&angles, ONE_LINK, &[])["verdict"];
+    let inclusion = |effect: &str| verdict["inclusion"][effect].as_f64().unwrap();
+    assert!(inclusion("hinge_coulomb") > 0.9, "{verdict:#}");
+    assert!(inclusion("air_quadratic") < 0.5 && inclusion("air_linear") < 0.5, "{verdict:#}");
+}
+
+#[test]
 fn one_thread_and_two_write_the_same_bytes() {
     let folder = Folder::new();
     let angles = folder.swing(ONE_LINK, "air_quadratic = 4e-3\n");

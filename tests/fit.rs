@@ -50,6 +50,7 @@ impl Case {
             in_step: 0.0,
             rounding: 0.0,
             continues: false,
+            stated_rad: Vec::new(),
         }
     }
 }

@@ -81,18 +81,21 @@ fn repeats(m: &Measurement) -> Option<String> {
     })
 }
 
-/// The part of the steps amid motion in which a mark stands still.
+/// The part of the steps amid motion in which a mark stands still. Where it turns round, as at the end of a swing, it may stand still by itself.
 fn repeated_share(points: &[Point]) -> Option<f64> {
-    let steps: Vec<Option<f64>> = points
+    let steps: Vec<Option<[f64; 2]>> = points
         .windows(2)
         .map(|pair| {
             let (a, b) = (pair[0].measured?, pair[1].measured?);
-            Some((b.position_px[0] - a.position_px[0]).hypot(b.position_px[1] - a.position_px[1]))
+            Some([b.position_px[0] - a.position_px[0], b.position_px[1] - a.position_px[1]])
         })
         .collect();
+    let length = |step: [f64; 2]| step[0].hypot(step[1]);
     let amid = |k: usize| {
-        let mut near = [steps[k - 2]?, steps[k - 1]?, steps[k + 1]?, steps[k + 2]?];
-        Some((steps[k]?, median(&mut near)?))
+        let [before, after] = [steps[k - 1]?, steps[k + 1]?];
+        let goes_on = before[0] * after[0] + before[1] * after[1] >= 0.5 * length(before) * length(after);
+        let mut near = [steps[k - 2]?, before, after, steps[k + 2]?].map(length);
+        goes_on.then_some((length(steps[k]?), median(&mut near)?))
     };
     let moving: Vec<(f64, f64)> =
         (2..steps.len().saturating_sub(2)).filter_map(amid).filter(|(_, near)| *near > LEAST_STEP_PX).collect();
@@ -417,4 +420,33 @@ fn crossing_rate_hz(m: &Measurement) -> Option<f64> {
     let rises: Vec<f64> = rows.windows(2).filter(|w| w[0].1 < middle && w[1].1 >= middle).map(|w| w[1].0).collect();
     let (first, last) = (rises.first()?, rises.last()?);
     (rises.len() >= 3 && last > first).then(|| (rises.len() - 1) as f64 / (last - first))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::track::{Flags, Measured};
+
+    /// Points of a swing of 100 px, one for each instant.
+    fn swing(hz: f64, t_s: impl Iterator<Item = f64>) -> Vec<Point> {
+        let at = |t: f64| Measured {
+            position_px: [300.0 + 100.0 * (std::f64::consts::TAU * hz * t).cos(), 200.0],
+            covariance_px2: [1e-3, 1e-3, 0.0],
+            area_px2: 300.0,
+        };
+        t_s.map(|t| Point { measured: Some(at(t)), filtered: None, flags: Flags::default() }).collect()
+    }
+
+    #[test]
+    fn a_mark_that_turns_round_between_two_pictures_repeats_none() {
+        // both pictures lie on either side of the end of a swing of 15 pictures
+        let points = swing(2.0, (0..330).map(|k| (f64::from(k) + 0.5) / 30.0));
+        assert_eq!(repeated_share(&points), None);
+    }
+
+    #[test]
+    fn one_picture_in_five_is_seen_to_repeat_another() {
+        let points = swing(0.8, (0..330).map(|k| f64::from(k * 4 / 5) / 24.0));
+        assert!((repeated_share(&points).unwrap() - 0.2).abs() < 0.05);
+    }
 }

@@ -119,6 +119,7 @@ mod tests {
             in_step: 0.0,
             rounding: 0.0,
             continues: false,
+            stated_rad: Vec::new(),
         };
         let mut experiment = Experiment::default();
         experiment.model.effects.distributed_flexibility = Some(1e-5);

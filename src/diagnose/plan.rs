@@ -77,5 +77,6 @@ fn recorded(experiment: &Experiment, plan: &Plan) -> Result<Record> {
         in_step: 0.0,
         rounding: 0.0,
         continues: false,
+        stated_rad: Vec::new(),
     })
 }

@@ -281,6 +281,7 @@ mod tests {
             in_step: 0.0,
             rounding: 0.0,
             continues: false,
+            stated_rad: Vec::new(),
         }];
         let met = |own: f64, other: f64| {
             let mut fit = leaving(&records, own, 1);

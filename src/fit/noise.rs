@@ -1,17 +1,22 @@
-//! The noise of a recording, of each angle from its values alone ([`crate::series::noise`]).
+//! The noise of a recording, of each angle from its values alone ([`crate::series::noise`]), and of tracked ones at least what the tracker states.
 
 use super::Record;
 use crate::series::noise::{LEAST_RAD, least_rad, of_angle};
 
 /// Standard deviation of each angle's noise.
 pub fn noise_rad(record: &Record) -> Vec<f64> {
-    record.theta_rad.iter().map(|angles| of_angle(&record.t_s, angles)).collect()
+    let of = |(link, angles): (usize, &Vec<Option<f64>>)| of_angle(&record.t_s, angles).max(stated_rad(record, link));
+    record.theta_rad.iter().enumerate().map(of).collect()
 }
 
 /// The least that the noise of an angle can be, by all pieces of its recording: one of them may be at rest.
 pub fn least_noise_rad(records: &[Record], record: usize, link: usize) -> f64 {
     let pieces = records.iter().filter(|piece| piece.path == records[record].path);
-    pieces.map(|piece| least_rad(&piece.theta_rad[link])).fold(LEAST_RAD, f64::max)
+    pieces.map(|piece| least_rad(&piece.theta_rad[link]).max(stated_rad(piece, link))).fold(LEAST_RAD, f64::max)
+}
+
+fn stated_rad(record: &Record, link: usize) -> f64 {
+    record.stated_rad.get(link).copied().unwrap_or(0.0)
 }
 
 #[cfg(test)]
@@ -43,6 +48,7 @@ mod tests {
             in_step: 0.0,
             rounding: 0.0,
             continues: false,
+            stated_rad: Vec::new(),
         }
     }
 
@@ -57,6 +63,17 @@ mod tests {
             // the least of several estimates of 600 values lies some per cent low
             is_noise(&record((0..600).map(|i| f64::from(i) / 30.0).collect(), seed), 0.13);
         }
+    }
+
+    #[test]
+    fn tracked_angles_have_at_least_the_noise_that_is_stated() {
+        let tracked = |stated: f64| Record {
+            stated_rad: vec![stated],
+            ..record((0..600).map(|i| f64::from(i) / 30.0).collect(), 7)
+        };
+        assert_eq!(noise_rad(&tracked(2e-3)), [2e-3]);
+        is_noise(&tracked(1e-5), 0.13);
+        assert_eq!(least_noise_rad(&[tracked(2e-3)], 0, 0), 2e-3);
     }
 
     #[test]

@@ -30,6 +30,9 @@ pub struct Record {
     pub rounding: f64,
     /// Whether it goes on where the record before it ends: a piece of the same recording, with a start of its own.
     pub continues: bool,
+    /// The usual standard deviation that a tracker states of each angle: it counts errors that go on from frame to frame, which do not show between neighbours. Nothing
+    /// where none is stated; of another program's table it is taken for relative only.
+    pub stated_rad: Vec<f64>,
 }
 
 impl Record {
@@ -56,6 +59,11 @@ impl Record {
             in_step: if series.tracked { TRACKED_IN_STEP } else { 0.0 },
             rounding: if series.tracked { 0.0 } else { rounding_in_step(&series.t_s, &series.theta_rad) },
             continues: false,
+            stated_rad: if series.tracked {
+                series.sd_rad.iter().filter_map(|sd| usual(sd)).collect()
+            } else {
+                Vec::new()
+            },
         })
     }
 
@@ -82,6 +90,7 @@ impl Record {
             in_step: self.in_step,
             rounding: self.rounding,
             continues: self.continues,
+            stated_rad: self.stated_rad.clone(),
         }
     }
 
@@ -203,10 +212,14 @@ fn local_cubic(points: &[(f64, f64)]) -> Option<[f64; 3]> {
 
 /// Standard deviations over their median; a value without one counts like the median.
 fn relative(sd_rad: &[Option<f64>]) -> Vec<f64> {
-    let mut stated: Vec<f64> = sd_rad.iter().flatten().copied().filter(|sd| *sd > 0.0).collect();
-    let Some(median) = median(&mut stated) else { return vec![1.0; sd_rad.len()] };
+    let Some(median) = usual(sd_rad) else { return vec![1.0; sd_rad.len()] };
     // a stated error of next to nothing must not outweigh everything else
     sd_rad.iter().map(|sd| sd.map_or(1.0, |sd| (sd / median).clamp(0.3, 30.0))).collect()
+}
+
+/// The median of the standard deviations that are stated.
+fn usual(sd_rad: &[Option<f64>]) -> Option<f64> {
+    median(&mut sd_rad.iter().flatten().copied().filter(|sd| *sd > 0.0).collect::<Vec<_>>())
 }
 
 #[cfg(test)]
@@ -222,6 +235,7 @@ mod tests {
             in_step: 0.25,
             rounding: 0.0,
             continues: false,
+            stated_rad: Vec::new(),
         }
     }
 

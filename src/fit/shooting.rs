@@ -280,6 +280,7 @@ mod tests {
                 in_step: 0.0,
                 rounding: 0.0,
                 continues: false,
+                stated_rad: Vec::new(),
             },
             states,
         )

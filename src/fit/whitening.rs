@@ -248,6 +248,7 @@ mod tests {
             in_step: 0.25,
             rounding: 0.0,
             continues: false,
+            stated_rad: Vec::new(),
         }
     }
 

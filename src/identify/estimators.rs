@@ -191,28 +191,31 @@ impl Estimators {
                 && is_told(law, frequency_hz)
         };
         let law = envelope.and_then(|e| e.frequency.filter(|f| sound(e, f)).map(|f| (e, f)));
+        // a range over the record extrapolates to no amplitude
+        let of_windows = |envelope: &Envelope| {
+            let linear = envelope.linear_damping().map(|xi| relatively_blurred(xi, omitted[1]));
+            linear.unwrap_or_else(|| envelope.damping_over_the_record())
+        };
         match law {
             Some((envelope, law)) if felt || self.residual_excess > 1.0 => Choice {
                 frequency_hz: {
                     let f0_hz = relatively_blurred(law.f0_hz, omitted[0].hypot(of_losses(envelope, duration_s)));
                     if trend == Some(Trend::Uneven) { envelope.over_steps(f0_hz) } else { f0_hz }
                 },
-                // a range over the record extrapolates to no amplitude
-                damping_ratio: envelope
-                    .linear_damping()
-                    .map_or_else(|| envelope.damping_over_the_record(), |xi| relatively_blurred(xi, omitted[1])),
+                damping_ratio: of_windows(envelope),
                 frequency_at_rad: None,
                 basis: "windows: f and ξ at small amplitude".to_owned(),
                 at_small_amplitude: true,
             },
             None if felt || self.residual_excess > 1.0 => {
                 let [frequency_hz, damping_ratio] = over_the_record;
+                let widened = "damped sinusoids over the whole record; widened for what amplitude may have changed";
                 Choice {
                     frequency_hz,
-                    damping_ratio,
+                    // what falls out of step with a sinusoid is no loss
+                    damping_ratio: envelope.map_or(damping_ratio, of_windows),
                     frequency_at_rad: felt.then(|| amplitudes_rad[mode] * weighed(decays).sqrt()),
-                    basis: "damped sinusoids over the whole record; widened for what amplitude may have changed"
-                        .to_owned(),
+                    basis: if envelope.is_some() { format!("{widened}; ξ of windows") } else { widened.to_owned() },
                     at_small_amplitude: false,
                 }
             }

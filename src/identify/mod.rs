@@ -71,6 +71,9 @@ use spectrum::Spectrum;
 use tumbling::Tumbling;
 use windows::Windows;
 
+/// A value whose own standard deviation is so many times the usual one is left out: it would count as a twenty-fifth of another.
+const UNSURE: f64 = 5.0;
+
 /// What was recorded.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Record {
@@ -144,9 +147,11 @@ pub struct Identification {
 pub fn identify(series: &AngleSeries, experiment: Option<&Experiment>) -> Result<Identification> {
     let body = experiment.map(|e| Ok(Body { experiment: e, chain: Chain::of(&e.specimen)? })).transpose()?;
     let (series, [held_until_s, caught_s]) = free(series);
+    let (series, unsure) = sure(series, Measured::Angles);
     let series = &*series;
     let (signal, wrapped) = Signal::of(series).unwrapped();
     let mut found = Identification::of_record(series, &signal, Measured::Angles);
+    found.notes.extend(unsure);
     found.held_until_s = held_until_s;
     found.rests_from_s = caught_s;
     for link in wrapped {
@@ -168,12 +173,25 @@ fn free(series: &AngleSeries) -> (Cow<'_, AngleSeries>, [Option<f64>; 2]) {
     }
 }
 
+/// A series without the values of which the table itself says that they are hardly known, and what to say of that.
+fn sure(series: Cow<'_, AngleSeries>, measured: Measured) -> (Cow<'_, AngleSeries>, Vec<String>) {
+    let Some((sure, counts)) = series.without_unsure(UNSURE) else { return (series, Vec::new()) };
+    let said = |(link, count): (usize, &usize)| {
+        let values = if *count == 1 { "value has" } else { "values have" };
+        let name = measured.name(link);
+        format!("{name}: {count} {values} a standard deviation of more than {UNSURE:.0} times the usual one: left out")
+    };
+    (Cow::Owned(sure), counts.iter().enumerate().filter(|(_, count)| **count > 0).map(said).collect())
+}
+
 /// Identifies the displacement of one mark, over [`crate::series::PX_PER_RAD`].
 pub fn identify_displacement(series: &AngleSeries) -> Identification {
     let (series, [held_until_s, rests_from_s]) = free(series);
+    let (series, unsure) = sure(series, Measured::Displacement);
     let series = &*series;
     let signal = Signal::of(series);
-    let found = Identification::of_record(series, &signal, Measured::Displacement);
+    let mut found = Identification::of_record(series, &signal, Measured::Displacement);
+    found.notes.extend(unsure);
     Identification { held_until_s, rests_from_s, ..found }.with_modes(signal, None)
 }
 

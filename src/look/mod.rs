@@ -152,6 +152,10 @@ fn measured(
     let mut all = things(&frames);
     let found = hanging::longest(&all, &names).filter(|chain| !steady || chain.is_steady(&all));
     let Some(mut chain) = found else { return Ok(None) };
+    let t_s: Vec<f64> = frames.iter().map(|frame| frame.t_s).collect();
+    if chain.marks.iter().any(|i| session.is_where_it_changes(&t_s, &all[*i]) == Some(false)) {
+        return Ok(None);
+    }
     // a hand that holds a mark covers part of it, at one end of its arc
     let held_until_s = held_until_s(&frames, &chain.marks.iter().map(|i| &all[*i]).collect::<Vec<_>>());
     if let Some(held_s) = held_until_s {

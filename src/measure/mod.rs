@@ -16,7 +16,7 @@ use crate::experiment::{MarkColour, Rig};
 use crate::progress::Progress;
 use crate::rejected::Rejected;
 use crate::steady::Background;
-use crate::track::{FrameBlobs, MarkSlot, Tracker, Tracks};
+use crate::track::{FrameBlobs, MarkSlot, Thing, Tracker, Tracks};
 use crate::video::{DamageSpread, Decoded, Outcome, OwnedPicture, Recording, StillTimes, StreamInfo, Timing};
 use view::{Seen, View, frame_blobs};
 
@@ -137,6 +137,8 @@ pub struct Session<'a> {
     calibration: Calibration,
     area: Area,
     album: Album,
+    /// Stamps of its pictures.
+    sampled_s: Vec<f64>,
     /// Those pictures, where it is not known yet what is sought.
     pictures: Vec<OwnedPicture>,
     hues: Vec<Hue>,
@@ -160,7 +162,7 @@ impl<'a> Session<'a> {
         let calibration = Calibration::new(&options.rig, stream.pixel_aspect, folder)?;
         let area = Area::new(&options.rig, folder, stream.orientation.size(stream.stored_size_px))?;
         let (mut hues, slots) = hues_of(&options.marks);
-        let pictures = survey::pictures(&recording, &options.rig)?;
+        let (pictures, sampled_s) = survey::pictures(&recording, &options.rig)?;
         let album = survey::album(&pictures, &area, stream.orientation);
         let marks = || album.calibrate(&mut hues, options.threshold);
         let (trials, (background, camera)) = rayon::join(marks, || survey::camera(&pictures, options, &stream));
@@ -174,6 +176,7 @@ impl<'a> Session<'a> {
             calibration,
             area,
             album,
+            sampled_s,
             pictures,
             hues,
             siting: None,
@@ -213,6 +216,24 @@ impl<'a> Session<'a> {
     /// Pictures spread over the recording.
     pub fn album(&self) -> &Album {
         &self.album
+    }
+
+    /// Whether a thing that goes along a path, of which the stamps are given, is where something else usually is, in most of the pictures spread over the recording
+    /// that show it farther than its radius from its usual place: what is still there, and only covered, is not. `None` where no such picture is.
+    pub fn is_where_it_changes(&self, t_s: &[f64], thing: &Thing) -> Option<bool> {
+        let (album, stream, usual_px) = (&self.album, &self.stream, thing.place_px());
+        let changes = |(picture, stamp_s): (usize, &f64)| {
+            let frame = t_s.iter().position(|t| t == stamp_s)?;
+            let at = thing.path[frame]?;
+            let is_away = (at[0] - usual_px[0]).hypot(at[1] - usual_px[1]) > thing.radius_px();
+            let stored = stream.orientation.stored_point([at[0] / stream.pixel_aspect, at[1]], stream.stored_size_px);
+            let [x, y] = [0, 1].map(|axis| stored[axis].max(0.0) as usize >> album.shifts[axis]);
+            let moved = album.moved.get(picture)?.get(y * album.pictures[picture].width + x)?;
+            is_away.then_some(*moved)
+        };
+        let seen: Vec<bool> = self.sampled_s.iter().enumerate().filter_map(changes).collect();
+        (!seen.is_empty() && !self.camera.taken_out)
+            .then(|| 2 * seen.iter().filter(|moved| **moved).count() > seen.len())
     }
 
     /// Its stream.
@@ -341,7 +362,7 @@ impl Camera {
             Some(camera) => {
                 self.greatest_shift_px = self.greatest_shift_px.max(camera.size_px());
                 self.patches += camera.patches;
-                self.sd_px += camera.sd_px.powi(2);
+                self.sd_px += camera.sd_px().powi(2);
             }
             None if self.taken_out => self.lost_frames += 1,
             None => {}

@@ -19,16 +19,17 @@ const CAMERA_MOVES_PX: f64 = 0.3;
 const SURE_SHIFT: f64 = 5.0;
 const FEWEST_PICTURES: usize = 3;
 
-/// The pictures, of the part of the recording that is measured.
-pub fn pictures(recording: &Recording, rig: &Rig) -> Result<Vec<OwnedPicture>> {
+/// The pictures, of the part of the recording that is measured, and their stamps.
+pub fn pictures(recording: &Recording, rig: &Rig) -> Result<(Vec<OwnedPicture>, Vec<f64>)> {
     let mut pictures = Vec::new();
     let span_s = rig.span_s();
-    recording.sample(SAMPLE_PICTURES, span_s, &mut |frame| pictures.push(frame.picture.to_owned()))?;
+    recording.sample(SAMPLE_PICTURES, span_s, &mut |frame| pictures.push((frame.picture.to_owned(), frame.t_s)))?;
     if pictures.is_empty() {
         // whether there is such a part turns out when the frames are read
-        recording.sample(SAMPLE_PICTURES, WHOLE_S, &mut |frame| pictures.push(frame.picture.to_owned()))?;
+        recording
+            .sample(SAMPLE_PICTURES, WHOLE_S, &mut |frame| pictures.push((frame.picture.to_owned(), frame.t_s)))?;
     }
-    Ok(pictures)
+    Ok(pictures.into_iter().unzip())
 }
 
 /// Their colours, and what moves.
@@ -86,7 +87,7 @@ pub fn camera(pictures: &[OwnedPicture], options: &Options, stream: &StreamInfo)
     let located: Vec<_> = others.par_iter().map(locate).collect();
     // a shift that its own patches leave open is none
     let shifts = located.iter().flatten().map(|(camera, _)| camera);
-    let sure = shifts.filter(|c| c.size_px() > SURE_SHIFT * c.sd_px);
+    let sure = shifts.filter(|c| c.size_px() > SURE_SHIFT * c.sd_px());
     // one picture alone may have something pass before its patches
     let mut sizes_px: Vec<f64> = sure.map(CameraShift::size_px).collect();
     sizes_px.sort_by(|a, b| b.total_cmp(a));

@@ -55,7 +55,7 @@ impl Session<'_> {
         let before = self.hues.clone();
         let trials = self.album.calibrate(&mut self.hues, None)?;
         self.settle(&trials, true, progress)?;
-        self.pictures = survey::pictures(&self.recording, &self.options.rig)?;
+        self.pictures = survey::pictures(&self.recording, &self.options.rig)?.0;
         self.survey_light()?;
         Ok(self.hues.iter().zip(&before).any(|(now, before)| now.is_sought_otherwise(before)))
     }

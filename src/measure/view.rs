@@ -85,11 +85,10 @@ impl<'a> View<'a> {
 
 /// Puts a blob where it would be had the camera not moved.
 fn undo(blob: &mut Blob, camera: &CameraShift) {
+    let own = camera.variance_px2([blob.centroid.x_px, blob.centroid.y_px]);
+    blob.centroid.variance_px2.iter_mut().zip(own).for_each(|(sum, variance)| *sum += variance);
     [blob.centroid.x_px, blob.centroid.y_px] = camera.undo([blob.centroid.x_px, blob.centroid.y_px]);
     blob.binary_px = camera.undo(blob.binary_px);
-    let variance = camera.sd_px.powi(2);
-    blob.centroid.variance_px2[0] += variance;
-    blob.centroid.variance_px2[1] += variance;
 }
 
 /// What was seen in a frame and when; nothing is measured in a damaged one.

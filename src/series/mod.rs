@@ -13,7 +13,7 @@ use std::path::{Path, PathBuf};
 
 use crate::error::{Error, Result};
 use crate::held::{caught_of, released_of};
-use crate::statistics::median_step_s;
+use crate::statistics::{median, median_step_s};
 use columns::{Columns, Row, Table, not_a_table};
 
 /// Fewest rows, and fewest values of each angle, from which anything can be said.
@@ -180,6 +180,19 @@ impl AngleSeries {
         Some((released_s, self.slice(self.rows(released_s, f64::INFINITY))))
     }
 
+    /// Without the values whose own standard deviation is more than so many times the usual one, and how many of each angle those are; `None` where there are none.
+    pub fn without_unsure(&self, times: f64) -> Option<(Self, Vec<usize>)> {
+        let mut sure = self.clone();
+        let mut counts = vec![0; self.links()];
+        for ((theta, sd), count) in sure.theta_rad.iter_mut().zip(&self.sd_rad).zip(&mut counts) {
+            let Some(usual) = median(&mut sd.iter().flatten().copied().collect::<Vec<_>>()) else { continue };
+            for (value, _) in theta.iter_mut().zip(sd).filter(|(_, sd)| sd.is_some_and(|sd| sd > times * usual)) {
+                *count += usize::from(value.take().is_some());
+            }
+        }
+        counts.iter().any(|count| *count > 0).then_some((sure, counts))
+    }
+
     /// When it is caught, where it is held still to the end, and what precedes.
     pub fn caught(&self) -> Option<(f64, Self)> {
         let caught_s = caught_of(self.paths())?;
@@ -292,6 +305,20 @@ mod tests {
     fn a_displacement_without_an_angle_is_refused_with_what_to_do() {
         let refused = refusal("frame,t_s,m1_x_px,m1_y_px,displacement_px,displacement_sd_px\n0,0.0,1.0,1.0,0.1,0.1\n");
         assert!(refused.contains("--pivot"), "{refused}");
+    }
+
+    #[test]
+    fn values_of_a_large_standard_deviation_are_left_out() {
+        let sd = |row: usize| if (20..24).contains(&row) { 0.2 } else { 0.001 + 1e-5 * row as f64 };
+        let mut text = "t_s,theta1_rad,theta1_sd_rad\n".to_owned();
+        (0..60).for_each(|row| {
+            _ = writeln!(text, "{:.1},{:.5},{:.5}", 0.1 * row as f64, swing(0.1 * row as f64), sd(row))
+        });
+        let (sure, counts) = parse(&text).unwrap().without_unsure(5.0).unwrap();
+        assert_eq!(counts, [4]);
+        let missing: Vec<usize> = (0..60).filter(|row| sure.theta_rad[0][*row].is_none()).collect();
+        assert_eq!(missing, [20, 21, 22, 23]);
+        assert!(sure.without_unsure(5.0).is_none());
     }
 
     #[test]

@@ -78,6 +78,19 @@ pub(super) struct Candidate {
     pub path: Vec<Option<[f64; 2]>>,
 }
 
+/// Candidates among which is chosen, with how much the distance of each two of them changes.
+struct Kept<'c> {
+    candidates: Vec<&'c Candidate>,
+    stretches: Vec<Vec<f64>>,
+}
+
+impl<'c> Kept<'c> {
+    fn of(candidates: Vec<&'c Candidate>) -> Self {
+        let of_one = |a: &&Candidate| candidates.iter().map(|b| stretch(a, b)).collect();
+        Self { stretches: candidates.iter().map(of_one).collect(), candidates }
+    }
+}
+
 /// Chooses a tracklet for every slot.
 pub(super) fn choose(
     tracklets: &[Tracklet],
@@ -112,9 +125,10 @@ pub(super) fn choose(
             kept.push(candidate);
         }
     }
+    let kept = Kept::of(kept);
     let mut best: Option<(f64, Vec<Option<usize>>)> = None;
     let mut partial = vec![None; slots.len()];
-    search(&kept, slots, 0, &mut partial, &mut |assignment| {
+    search(&kept.candidates, slots, 0, &mut partial, &mut |assignment| {
         let score = score(&kept, assignment);
         if best.as_ref().is_none_or(|(s, _)| score > *s) {
             best = Some((score, assignment.to_vec()));
@@ -124,8 +138,8 @@ pub(super) fn choose(
     if swings {
         drop_unfit(&kept, &mut assignment);
     }
-    let moves = assignment.iter().flatten().any(|i| kept[*i].moves);
-    let chosen: Vec<Option<usize>> = assignment.into_iter().map(|c| c.map(|i| kept[i].tracklet)).collect();
+    let moves = assignment.iter().flatten().any(|i| kept.candidates[*i].moves);
+    let chosen: Vec<Option<usize>> = assignment.into_iter().map(|c| c.map(|i| kept.candidates[i].tracklet)).collect();
     let taken: Vec<usize> = chosen.iter().flatten().copied().collect();
     let spares = spares(&candidates, &taken);
     Choice { chosen, spares, moves }
@@ -182,9 +196,9 @@ fn spares(candidates: &[Candidate], taken: &[usize]) -> Vec<Spare> {
 }
 
 /// Takes back what cannot be a mark: what stands still and is no hinge.
-fn drop_unfit(kept: &[&Candidate], assignment: &mut [Option<usize>]) {
+fn drop_unfit(kept: &Kept<'_>, assignment: &mut [Option<usize>]) {
     for slot in 0..assignment.len() {
-        let unfit = assignment[slot].is_some_and(|i| !kept[i].moves && !is_hinge(kept, assignment, slot));
+        let unfit = assignment[slot].is_some_and(|i| !kept.candidates[i].moves && !is_hinge(kept, assignment, slot));
         if unfit {
             assignment[slot] = None;
         }
@@ -192,11 +206,11 @@ fn drop_unfit(kept: &[&Candidate], assignment: &mut [Option<usize>]) {
 }
 
 /// What stands still in this slot is the first of the chain, and the next keeps its distance from it.
-fn is_hinge(kept: &[&Candidate], assignment: &[Option<usize>], slot: usize) -> bool {
+fn is_hinge(kept: &Kept<'_>, assignment: &[Option<usize>], slot: usize) -> bool {
     let Some(own) = assignment[slot] else { return false };
     let next = assignment[slot + 1..].iter().flatten().next();
     assignment[..slot].iter().all(Option::is_none)
-        && next.is_some_and(|next| kept[*next].moves && stretch(kept[own], kept[*next]) < MOST_STRETCH)
+        && next.is_some_and(|next| kept.candidates[*next].moves && kept.stretches[own][*next] < MOST_STRETCH)
 }
 
 /// Everything that lasts.
@@ -270,20 +284,22 @@ fn search(
     }
 }
 
-fn score(kept: &[&Candidate], assignment: &[Option<usize>]) -> f64 {
-    let chosen: Vec<&Candidate> = assignment.iter().flatten().map(|i| kept[*i]).collect();
+fn score(kept: &Kept<'_>, assignment: &[Option<usize>]) -> f64 {
+    let Kept { candidates, stretches } = kept;
+    let places: Vec<usize> = assignment.iter().flatten().copied().collect();
+    let chosen: Vec<&Candidate> = places.iter().map(|i| candidates[*i]).collect();
     // of two halves of a track, before a gap and after it, the first: what follows it will be found again
     let presence: f64 = chosen.iter().map(|c| c.presence * c.steadiness - c.lateness).sum();
     // a mark by itself has no distance to another that tells it: of two like pendulums, the one that swings about the pivot
     let from_pivot = match assignment {
-        [only] => only.map_or(0.0, |only| kept[only].pivot_stretch),
+        [only] => only.map_or(0.0, |only| candidates[only].pivot_stretch),
         _ => 0.0,
     };
-    let stretch = chosen.windows(2).map(|w| stretch(w[0], w[1])).fold(from_pivot, f64::max);
+    let stretch = places.windows(2).map(|w| stretches[w[0]][w[1]]).fold(from_pivot, f64::max);
     let mean = chosen.iter().map(|c| c.ln_area).sum::<f64>() / chosen.len().max(1) as f64;
     let unlike = (chosen.iter().map(|c| (c.ln_area - mean).powi(2)).sum::<f64>() / chosen.len().max(1) as f64).sqrt();
-    let swings = kept.iter().any(|c| c.moves);
-    let still = |slot: &usize| assignment[*slot].is_some_and(|i| !kept[i].moves);
+    let swings = candidates.iter().any(|c| c.moves);
+    let still = |slot: &usize| assignment[*slot].is_some_and(|i| !candidates[i].moves);
     let unfit = (0..assignment.len()).filter(still).filter(|slot| !is_hinge(kept, assignment, *slot)).count();
     presence - 3.0 * stretch - 0.5 * unlike - if swings { UNFIT * unfit as f64 } else { 0.0 }
 }

@@ -32,7 +32,7 @@ const PARTS_TRAVEL: f64 = 0.2;
 pub const LEAST_TURN: f64 = 0.02;
 /// [`kurtosis`] of normally distributed noise (statistics).
 const KURTOSIS_OF_NOISE: f64 = 3.0;
-/// Part of its own radius by which a single thing swings at least (judgement: what covers a thing at its edge shifts it by
+/// Part of its own radius by which one thing of a chain swings at least (judgement: what covers a thing at its edge shifts it by
 /// less).
 const LEAST_TRAVEL: f64 = 0.25;
 /// What a chain whose first mark swings by less than its own radius is worth less: anything else that swings comes first.
@@ -101,6 +101,7 @@ fn of_look(
 ) -> Option<Chain> {
     let mut movers: Vec<usize> = (0..things.len())
         .filter(|i| belongs(&things[*i]) && things[*i].moves && things[*i].presence > LEAST_PRESENCE)
+        .filter(|i| !is_covered(&things[*i]))
         .collect();
     movers.sort_by(|a, b| things[*b].presence.total_cmp(&things[*a].presence));
     let movers = distinct(things, &movers);
@@ -148,25 +149,29 @@ fn are_parts(things: &[Thing], marks: &[usize], bears: &dyn Fn(&Thing) -> bool) 
 }
 
 /// The circle on which the first mark swings; `Some(None)` where its path is so flat that it shows no centre. What
-/// hangs from a fixed point has no other path.
-///
-/// A still thing that something covers from time to time seems to move as well, by less than its own radius and about
-/// no clear centre, or about a point within itself. Two such things do not keep their distance; one alone is no mark,
-/// unless it is seldom in the middle of its way, where what is covered now and then mostly is.
+/// hangs from a fixed point has no other path. Things none of which swings by a part of its own width are covered now and then, and hang from nothing.
 fn hangs(things: &[Thing], marks: &[usize]) -> Option<Option<Arc>> {
     let first = &things[*marks.first()?];
+    if marks.iter().all(|i| things[*i].travel_px < LEAST_TRAVEL * things[*i].radius_px()) {
+        return None;
+    }
     let path = first.places_px();
     let most_px = MOST_OFF_ARC * first.travel_px;
-    let own_radius_px = first.radius_px();
-    let rocks = first.travel_px < LEAST_TRAVEL * own_radius_px || kurtosis(&path) > KURTOSIS_OF_NOISE;
-    let is_no_cover = marks.len() > 1 || !is_slight(first) || !rocks;
-    match Arc::of(&path, own_radius_px) {
-        Some(arc) => {
-            let shows_centre = arc.sd_px[0].max(arc.sd_px[1]) < arc.radius_px && arc.radius_px > own_radius_px;
-            (arc.residual_px < most_px && (is_no_cover || shows_centre)).then_some(Some(arc))
-        }
-        None => (is_no_cover && off_line_px(&path) < most_px).then_some(None),
+    match Arc::of(&path, first.radius_px()) {
+        Some(arc) => (arc.residual_px < most_px).then_some(Some(arc)),
+        None => (off_line_px(&path) < most_px).then_some(None),
     }
+}
+
+/// A still thing that something covers from time to time seems to move as well, by less than its own radius and about no clear centre, or about a point within
+/// itself; it is mostly in the middle of its way, where what swings seldom is.
+fn is_covered(thing: &Thing) -> bool {
+    let path = thing.places_px();
+    let shows_centre = || {
+        Arc::of(&path, thing.radius_px())
+            .is_some_and(|arc| arc.sd_px[0].max(arc.sd_px[1]) < arc.radius_px && arc.radius_px > thing.radius_px())
+    };
+    is_slight(thing) && kurtosis(&path) > KURTOSIS_OF_NOISE && !shows_centre()
 }
 
 /// It moves by less than its own radius.
@@ -186,7 +191,7 @@ fn kurtosis(points: &[[f64; 2]]) -> f64 {
 
 /// It swings by itself as a mark does.
 pub fn hangs_alone(thing: &Thing) -> bool {
-    thing.presence > LEAST_PRESENCE && hangs(std::slice::from_ref(thing), &[0]).is_some()
+    thing.presence > LEAST_PRESENCE && !is_covered(thing) && hangs(std::slice::from_ref(thing), &[0]).is_some()
 }
 
 /// Root mean square distance of points from the straight line through them.
@@ -358,6 +363,19 @@ mod tests {
             [400.0 + 40.0 * theta.sin(), 50.0 + 40.0 * theta.cos()]
         };
         assert!(longest(&[thing(0, swings, true)], &names).is_some());
+    }
+
+    #[test]
+    fn still_things_that_are_covered_at_their_edges_are_no_chain() {
+        let names = ["#c83424".to_owned()];
+        // something passes before each once in a swing
+        let covered = |x: f64, by_px: f64| move |t: f64| [x + by_px * (3.0 * t + x).sin().powi(9), 190.0 + 0.4 * x];
+        let chain = |by_px: f64| {
+            let things: Vec<Thing> = [100.0, 240.0, 410.0].iter().map(|x| thing(0, covered(*x, by_px), true)).collect();
+            longest(&things, &names)
+        };
+        // of a radius of 9.8 px
+        assert!(chain(1.0).is_none() && chain(4.0).is_none());
     }
 
     #[test]

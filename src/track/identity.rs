@@ -13,8 +13,8 @@ use super::chain::Chain;
 const CLEAR_MISFIT: f64 = 10.0;
 /// Frames in a row that must say the same.
 const FRAMES_AGREED: u32 = 5;
-/// Most names of one colour that are tried in every order.
-const MOST_NAMES: usize = 7;
+/// Most answers that are tried in a frame: seven names in every order.
+const MOST_ANSWERS: usize = 5040;
 
 /// Sightings that belong to another mark.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -116,7 +116,13 @@ impl Identity {
     /// The names of the marks in doubt, once they are clear.
     fn clear_answer(&mut self, seen_px: &[Option<[f64; 2]>], in_doubt: &[usize]) -> Option<Vec<usize>> {
         let choices: Vec<Vec<usize>> = in_doubt.iter().map(|mark| self.names_for(*mark)).collect();
-        if choices.iter().any(|names| names.len() > MOST_NAMES) {
+        // each mark in doubt takes a name of its colour from those that follow
+        let left = |place: usize| {
+            let hue = |place: usize| self.names[in_doubt[place]].hue;
+            choices[place].len().saturating_sub((0..place).filter(|before| hue(*before) == hue(place)).count()).max(1)
+        };
+        let answers = (0..choices.len()).map(left).fold(1usize, usize::saturating_mul);
+        if answers > MOST_ANSWERS {
             return None;
         }
         let mut best: (f64, Vec<usize>) = (f64::INFINITY, Vec::new());
@@ -195,5 +201,21 @@ fn for_each_answer(choices: &[Vec<usize>], answer: &mut Vec<usize>, visit: &mut 
             for_each_answer(choices, answer, visit);
             answer.pop();
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_no_one_could_try_in_every_order_is_left_in_doubt() {
+        // seven marks of each of two colours, all of which may be any: 5040 answers each, 25 million together
+        let mut identity = Identity::new(&[0, 1].repeat(7), None);
+        let seen_px: Vec<Option<[f64; 2]>> = (0..14).map(|k| Some([40.0 * f64::from(k), 10.0])).collect();
+        (0..10).for_each(|frame| drop(identity.see(frame, &seen_px)));
+        (0..14).for_each(|mark| identity.doubt(mark, 10));
+        assert!((10..20).all(|frame| identity.see(frame, &seen_px).is_empty()));
+        assert_eq!(identity.finish().len(), 14);
     }
 }
