@@ -128,6 +128,19 @@ impl Album {
         }
     }
 
+    /// Whether a picture differs at a point from what others usually show there; `None` where there are none, or the point lies outside.
+    pub fn differs(&self, picture: usize, [x, y]: [f64; 2], others: &[usize]) -> Option<bool> {
+        let own = self.pictures.get(picture)?;
+        let [column, row] = [(x, self.shifts[0]), (y, self.shifts[1])].map(|(v, shift)| v.max(0.0) as usize >> shift);
+        let at = Some(row * own.width + column).filter(|_| column < own.width && row < own.height)?;
+        let changes = |channel: usize| {
+            let of = |picture: &Samples| picture.channels()[channel][at];
+            let usual = median(&mut others.iter().map(|k| f64::from(of(&self.pictures[*k]))).collect::<Vec<_>>())?;
+            Some((f64::from(of(own)) - usual).abs() > f64::from(LEAST_CHANGE[channel]))
+        };
+        Some([0, 1, 2].into_iter().map(changes).collect::<Option<Vec<bool>>>()?.contains(&true))
+    }
+
     /// The light of a picture over that of the usual one: the median ratio of luma. A camera that sets its exposure anew, and a lamp on the mains, change all
     /// samples alike, and nothing that swings covers half of them. Samples too dark to tell count as unchanged: before a dark wall all that is bright may swing.
     fn light(&self, picture: &Samples, usual: &[u8]) -> f64 {

@@ -153,7 +153,7 @@ fn measured(
     let found = hanging::longest(&all, &names).filter(|chain| !steady || chain.is_steady(&all));
     let Some(mut chain) = found else { return Ok(None) };
     let t_s: Vec<f64> = frames.iter().map(|frame| frame.t_s).collect();
-    if chain.marks.iter().any(|i| session.is_where_it_changes(&t_s, &all[*i]) == Some(false)) {
+    if chain.marks.iter().any(|i| session.makes_a_difference(&t_s, &all[*i]) == Some(false)) {
         return Ok(None);
     }
     // a hand that holds a mark covers part of it, at one end of its arc

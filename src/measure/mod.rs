@@ -218,22 +218,22 @@ impl<'a> Session<'a> {
         &self.album
     }
 
-    /// Whether a thing that goes along a path, of which the stamps are given, is where something else usually is, in most of the pictures spread over the recording
-    /// that show it farther than its radius from its usual place: what is still there, and only covered, is not. `None` where no such picture is.
-    pub fn is_where_it_changes(&self, t_s: &[f64], thing: &Thing) -> Option<bool> {
-        let (album, stream, usual_px) = (&self.album, &self.stream, thing.place_px());
-        let changes = |(picture, stamp_s): (usize, &f64)| {
-            let frame = t_s.iter().position(|t| t == stamp_s)?;
-            let at = thing.path[frame]?;
-            let is_away = (at[0] - usual_px[0]).hypot(at[1] - usual_px[1]) > thing.radius_px();
-            let stored = stream.orientation.stored_point([at[0] / stream.pixel_aspect, at[1]], stream.stored_size_px);
-            let [x, y] = [0, 1].map(|axis| stored[axis].max(0.0) as usize >> album.shifts[axis]);
-            let moved = album.moved.get(picture)?.get(y * album.pictures[picture].width + x)?;
-            is_away.then_some(*moved)
+    /// Whether a thing, whose path goes through frames of these stamps, makes a difference where it is: in most of the pictures spread over the recording, against those
+    /// that show it elsewhere. What is still there, and only covered now and then, does not. `None` where no pictures tell.
+    pub fn makes_a_difference(&self, t_s: &[f64], thing: &Thing) -> Option<bool> {
+        let stream = &self.stream;
+        let of_picture = |stamp_s: &f64| thing.path[t_s.iter().position(|t| t == stamp_s)?];
+        let places: Vec<Option<[f64; 2]>> = self.sampled_s.iter().map(of_picture).collect();
+        let makes_one = |(picture, place): (usize, &Option<[f64; 2]>)| {
+            let [x, y] = (*place)?;
+            let is_elsewhere = |other: &[f64; 2]| (other[0] - x).hypot(other[1] - y) > 2.0 * thing.radius_px();
+            let others: Vec<usize> =
+                (0..places.len()).filter(|k| places[*k].as_ref().is_some_and(is_elsewhere)).collect();
+            let stored_px = stream.orientation.stored_point([x / stream.pixel_aspect, y], stream.stored_size_px);
+            self.album.differs(picture, stored_px, &others)
         };
-        let seen: Vec<bool> = self.sampled_s.iter().enumerate().filter_map(changes).collect();
-        (!seen.is_empty() && !self.camera.taken_out)
-            .then(|| 2 * seen.iter().filter(|moved| **moved).count() > seen.len())
+        let seen: Vec<bool> = places.iter().enumerate().filter_map(makes_one).collect();
+        (!seen.is_empty() && !self.camera.taken_out).then(|| 2 * seen.iter().filter(|own| **own).count() >= seen.len())
     }
 
     /// Its stream.
