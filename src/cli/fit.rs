@@ -24,7 +24,7 @@ Examples:
 Free are the joint's spring and damper, every effect named in [model.effects] (its value is the start), and of one link the hinge's
 viscous damper. A joint whose k_eq_n_m_per_rad is 0 has no spring. Several recordings share all parameters but not their release.
 The fit begins with the file's values and with those that the recording's own frequencies and decay say. \"Reproduced\" means: the residual
-is no more than the noise, which is taken from the angles alone, and at least nine tenths of the variance are explained.")]
+is no more than the noise, which is taken from the table alone, and at least nine tenths of the variance are explained.")]
 pub struct FitArgs {
     /// Tables of angles of one specimen; `-` is standard input.
     #[arg(required = true, value_name = "ANGLES")]

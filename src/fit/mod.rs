@@ -4,7 +4,7 @@
 //! |---|---|
 //! | [`base`] | what is free unless told otherwise |
 //! | [`record`] | the angles of a recording |
-//! | [`noise`] | its noise, from the angles alone |
+//! | [`noise`] | its noise, from the table alone |
 //! | [`seen`] | its modes, without the model |
 //! | [`pace`] | how fast it swings beside the specimen: wrong lengths, clocks and units |
 //! | [`horizon`] | how far a motion can be foretold |
@@ -97,7 +97,7 @@ pub struct Residuals {
     pub values: Vec<Vec<Residual>>,
     /// Root mean square of each angle.
     pub rmse_rad: Vec<f64>,
-    /// Noise of each angle, from the angles alone ([`noise`]).
+    /// Noise of each angle, from the table alone ([`noise`]).
     pub noise_rad: Vec<f64>,
 }
 

@@ -91,7 +91,9 @@ pub fn look(path: &Path, options: &Options, folder: &Path, progress: &dyn Progre
     let mut session = Session::open(path, &options, folder, progress)?;
     let looks = looks(session.album())?;
     let (hues, names): (Vec<Hue>, Vec<String>) = looks.iter().cloned().unzip();
+    let of_looks = |worn: &[u8]| worn.iter().map(|hue| looks[usize::from(*hue)].clone()).collect::<Vec<_>>();
     let (mut seen, mut unsteady, mut from_s, mut rest) = (Vec::new(), Vec::new(), None, Vec::new());
+    let mut tried: Vec<Vec<u8>> = Vec::new();
     for stretch in 0..STRETCHES {
         let frames = square(session.glance(&hues, from_s, progress)?, session.stream().pixel_aspect);
         if stretch == 0 {
@@ -102,11 +104,15 @@ pub fn look(path: &Path, options: &Options, folder: &Path, progress: &dyn Progre
             let mut worn: Vec<u8> = chain.marks.iter().map(|i| all[*i].hue).collect();
             worn.sort_unstable();
             worn.dedup();
-            let worn: Vec<_> = worn.into_iter().map(|hue| looks[usize::from(hue)].clone()).collect();
             if !chain.is_steady(&all) {
-                unsteady.push((chain.worth, worn));
-            } else if let Some(finding) = measured(&mut session, worn, true, progress)? {
-                return Ok(finding);
+                if !unsteady.iter().any(|own: &(f64, Vec<u8>)| own.1 == worn) {
+                    unsteady.push((chain.worth, worn));
+                }
+            } else if !tried.contains(&worn) {
+                tried.push(worn.clone());
+                if let Some(finding) = measured(&mut session, of_looks(&worn), true, progress)? {
+                    return Ok(finding);
+                }
             }
         }
         seen.push((frames.len(), all));
@@ -118,7 +124,7 @@ pub fn look(path: &Path, options: &Options, folder: &Path, progress: &dyn Progre
     // a motion that is no oscillation, as a double pendulum that turns over
     unsteady.sort_by(|a, b| b.0.total_cmp(&a.0));
     for (_, worn) in unsteady.into_iter().take(CHAINS) {
-        if let Some(finding) = measured(&mut session, worn, false, progress)? {
+        if let Some(finding) = measured(&mut session, of_looks(&worn), false, progress)? {
             return Ok(finding);
         }
     }
