@@ -6,11 +6,11 @@
 //!
 //! ```text
 //! Δx = t_x − φ (y − y_c),   Δy = t_y + φ (x − x_c)
-//! Σ (Δ_k − s_k)ᵀ H_k (Δ_k − s_k) + σ² (φ/φ₀)² → least,     H_k = Σ ∇ ∇ᵀ over patch k,   φ₀ = |t| / width
+//! Σ (Δ_k − s_k)ᵀ W_k (Δ_k − s_k) → least,     W_k = (h H_k⁻¹ + 1)⁻¹,   H_k = Σ ∇ ∇ᵀ over patch k,   h: median of ½ tr H_k
 //! ```
 //!
 //! H_k is how well a patch shows a shift in each direction: a faint one, of which a codec keeps less than a strong one, hardly counts, nor does an edge along its own
-//! length. A hand turns a camera about its axis by about the angle by which it turns it aside; of a lens whose picture is as wide as it is far, that is φ₀.
+//! length. Interpolation and parallax give each patch an error of its own, too, here as large as that of the middle one's noise.
 
 mod smooth;
 
@@ -43,8 +43,6 @@ const SAME_PX: f64 = 3.5;
 const AGREEMENT_PX: f64 = 0.25;
 /// Fewer patches do not tell a turn from a shift.
 const FEWEST_TURNING: usize = 4;
-/// No camera is so still that it turns by less (a hundredth of a pixel at a hundred pixels from the centre).
-const LEAST_TURN_RAD: f64 = 1e-4;
 
 /// Where the camera looks in one picture, against the reference picture.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
@@ -65,15 +63,6 @@ impl CameraShift {
     fn at(&self, p: [f64; 2]) -> [f64; 2] {
         let [x, y] = [p[0] - self.centre_px[0], p[1] - self.centre_px[1]];
         [self.shift_px[0] - self.turn_rad * y, self.shift_px[1] + self.turn_rad * x]
-    }
-
-    /// σ²: the scatter of some patches about it, weighed by what each shows.
-    fn variance(&self, kept: &[&Found<'_>], weight: impl Fn(&Patch) -> Matrix2<f64>) -> f64 {
-        let square = |found: &&Found<'_>| {
-            let off = found.off(self);
-            (off.transpose() * weight(found.patch) * off)[0]
-        };
-        kept.iter().map(square).sum::<f64>() / (2.0 * kept.len() as f64 - 3.0).max(1.0)
     }
 
     /// Where a point of this picture lies in the reference picture.
@@ -206,7 +195,8 @@ impl Background {
                 return None;
             }
             // at first every patch has one vote: the clearest may lie on what swings
-            camera = self.least_squares(&kept, &camera, round > 0)?;
+            let weights = if round == 0 { vec![Matrix2::identity(); kept.len()] } else { weights(&kept) };
+            camera = self.least_squares(&kept.into_iter().zip(weights).collect::<Vec<_>>())?;
         }
         Some(camera)
     }
@@ -223,31 +213,39 @@ impl Background {
         self.named && !self.patches.is_empty() || self.patches.len() >= FEWEST_AGREEING
     }
 
-    /// Shift and turn of the camera from some patches; `before` says how far it may have turned.
-    fn least_squares(&self, kept: &[&Found<'_>], before: &CameraShift, weighed: bool) -> Option<CameraShift> {
-        let weight = |patch: &Patch| if weighed { patch.information } else { Matrix2::identity() };
+    /// Shift and turn of the camera from some patches, each with its weight.
+    fn least_squares(&self, kept: &[(&Found<'_>, Matrix2<f64>)]) -> Option<CameraShift> {
         let mut normal = Matrix3::<f64>::zeros();
         let mut right = Vector3::<f64>::zeros();
-        for Found { patch, shift_px } in kept.iter().copied() {
+        for (Found { patch, shift_px }, weight) in kept {
             let (x, y) = (patch.x as f64 - self.centre_px[0], patch.y as f64 - self.centre_px[1]);
             let slopes = Matrix2x3::new(1.0, 0.0, -y, 0.0, 1.0, x);
-            normal += slopes.transpose() * weight(patch) * slopes;
-            right += slopes.transpose() * weight(patch) * shift_px;
+            normal += slopes.transpose() * weight * slopes;
+            right += slopes.transpose() * weight * shift_px;
         }
         // so few cannot tell a turn from a shift
-        let turn_rad = if kept.len() < FEWEST_TURNING { 0.0 } else { before.size_px() / (2.0 * self.centre_px[0]) };
-        let variance = before.variance(kept, weight).max(f64::MIN_POSITIVE);
-        normal[(2, 2)] += variance / (turn_rad * turn_rad).max(LEAST_TURN_RAD * LEAST_TURN_RAD);
-        let inverse = normal.try_inverse()?;
+        let turns = kept.len() >= FEWEST_TURNING;
+        let inverse = if turns {
+            normal.try_inverse()?
+        } else {
+            let shifts = normal.fixed_view::<2, 2>(0, 0).into_owned().try_inverse()?;
+            shifts.fixed_resize::<3, 3>(0.0)
+        };
         let [x, y, turn_rad] = (inverse * right).into();
-        let found = CameraShift {
+        let camera = CameraShift {
             shift_px: [x, y],
             turn_rad,
             centre_px: self.centre_px,
             patches: kept.len(),
             covariance: Matrix3::zeros(),
         };
-        Some(CameraShift { covariance: inverse * found.variance(kept, weight), ..found })
+        let square = |(found, weight): &(&Found<'_>, Matrix2<f64>)| {
+            let off = found.off(&camera);
+            (off.transpose() * weight * off)[0]
+        };
+        let freedom = 2.0 * kept.len() as f64 - if turns { 3.0 } else { 2.0 };
+        let variance = kept.iter().map(square).sum::<f64>() / freedom.max(1.0);
+        Some(CameraShift { covariance: inverse * variance, ..camera })
     }
 }
 
@@ -262,6 +260,13 @@ impl Found<'_> {
     fn off(&self, camera: &CameraShift) -> Vector2<f64> {
         self.shift_px - Vector2::from(camera.at([self.patch.x as f64, self.patch.y as f64]))
     }
+}
+
+/// W_k of some patches.
+fn weights(kept: &[&Found<'_>]) -> Vec<Matrix2<f64>> {
+    let usual = median(&mut kept.iter().map(|f| 0.5 * f.patch.information.trace()).collect::<Vec<_>>()).unwrap_or(1.0);
+    let weight = |found: &&Found<'_>| (usual * found.patch.inverse + Matrix2::identity()).try_inverse();
+    kept.iter().map(|found| weight(found).unwrap_or_default()).collect()
 }
 
 /// The best patch of every cell, the clearest first.
@@ -447,15 +452,29 @@ mod tests {
         for y in 0..240 {
             for x in 0..320 {
                 let (u, v) = (x as f64 - shift[0], y as f64 - shift[1]);
-                let mut value = 120.0 + 30.0 * (0.21 * u + 0.05 * v).sin() + 30.0 * (0.17 * v - 0.04 * u).cos();
-                // no finer than a lens shows: 0.6 rad a pixel at the far corner
-                value += 20.0 * (0.002 * u * v).sin();
+                let mut value = shade(u, v);
                 // what swings, and must not count
                 if (140..200).contains(&x) {
                     value = 120.0 + 60.0 * (0.3 * (u - 3.0 * shift[0])).sin();
                 }
                 picture.set(0, y * 320 + x, value.round() as u16);
             }
+        }
+        picture
+    }
+
+    /// Luma of a textured wall.
+    fn shade(u: f64, v: f64) -> f64 {
+        let value = 120.0 + 30.0 * (0.21 * u + 0.05 * v).sin() + 30.0 * (0.17 * v - 0.04 * u).cos();
+        // no finer than a lens shows: 0.6 rad a pixel at the far corner
+        value + 20.0 * (0.002 * u * v).sin()
+    }
+
+    /// The wall alone.
+    fn plain() -> OwnedPicture {
+        let mut picture = OwnedPicture::black(textured([0.0; 2]).layout);
+        for at in 0..320 * 240 {
+            picture.set(0, at, shade((at % 320) as f64, (at / 320) as f64).round() as u16);
         }
         picture
     }
@@ -487,6 +506,32 @@ mod tests {
             let [x, y] = camera.undo(point);
             let off_px = (x - point[0] + 0.6).hypot(y - point[1] - 0.5);
             assert!(off_px < most_px, "{point:?} is off by {off_px:.3} px");
+        }
+    }
+
+    #[test]
+    fn a_camera_that_turns_about_its_axis_is_found_to_do_so() {
+        let (layout, turn_rad) = (textured([0.0; 2]).layout, 3e-3);
+        let mut turned = OwnedPicture::black(layout);
+        for y in 0..240 {
+            for x in 0..320 {
+                let (u, v) = (f64::from(x) - 160.0, f64::from(y) - 120.0);
+                let at = [f64::from(x) + turn_rad * v, f64::from(y) - turn_rad * u];
+                turned.set(0, (y * 320 + x) as usize, shade(at[0], at[1]).round() as u16);
+            }
+        }
+        let background = Background::of(&plain().view(), &[]);
+        let camera = background.locate(&turned.view()).unwrap();
+        assert!((camera.turn_rad - turn_rad).abs() < 2e-4 && camera.size_px() < 0.03, "{camera:?}");
+    }
+
+    #[test]
+    fn one_or_two_reference_marks_show_a_shift() {
+        for points in [&[[60.0, 70.0]][..], &[[60.0, 70.0], [250.0, 180.0]]] {
+            let background = Background::of(&textured([0.0, 0.0]).view(), points);
+            let camera = background.locate(&textured([2.3, -1.6]).view()).unwrap();
+            assert!((camera.shift_px[0] - 2.3).abs() < 0.1 && (camera.shift_px[1] + 1.6).abs() < 0.1, "{camera:?}");
+            assert_eq!(camera.turn_rad, 0.0);
         }
     }
 

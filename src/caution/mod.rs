@@ -22,6 +22,8 @@ const NOISE_OF_WIDTH: f64 = 0.005;
 const LEAST_STEP_PX: f64 = 2.0;
 const STILL_STEP: f64 = 0.15;
 const FEWEST_REPEATS: usize = 5;
+/// Cosine between the steps before and after one, from which on the mark has not turned round between them (judgement: 60°).
+const GOES_ON: f64 = 0.5;
 const LEAST_REPEATED: f64 = 0.05;
 /// Share of the marks' own motion from which another thing's is no trembling.
 const LEAST_TRAVEL: f64 = 0.05;
@@ -93,7 +95,7 @@ fn repeated_share(points: &[Point]) -> Option<f64> {
     let length = |step: [f64; 2]| step[0].hypot(step[1]);
     let amid = |k: usize| {
         let [before, after] = [steps[k - 1]?, steps[k + 1]?];
-        let goes_on = before[0] * after[0] + before[1] * after[1] >= 0.5 * length(before) * length(after);
+        let goes_on = before[0] * after[0] + before[1] * after[1] >= GOES_ON * length(before) * length(after);
         let mut near = [steps[k - 2]?, before, after, steps[k + 2]?].map(length);
         goes_on.then_some((length(steps[k]?), median(&mut near)?))
     };

@@ -135,7 +135,9 @@ impl Album {
         let at = Some(row * own.width + column).filter(|_| column < own.width && row < own.height)?;
         let changes = |channel: usize| {
             let of = |picture: &Samples| picture.channels()[channel][at];
-            let usual = median(&mut others.iter().map(|k| f64::from(of(&self.pictures[*k]))).collect::<Vec<_>>())?;
+            let usual = median(
+                &mut others.iter().filter_map(|k| Some(f64::from(of(self.pictures.get(*k)?)))).collect::<Vec<_>>(),
+            )?;
             Some((f64::from(of(own)) - usual).abs() > f64::from(LEAST_CHANGE[channel]))
         };
         Some([0, 1, 2].into_iter().map(changes).collect::<Option<Vec<bool>>>()?.contains(&true))

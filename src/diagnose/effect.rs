@@ -171,7 +171,7 @@ pub struct Entry {
 }
 
 impl Entry {
-    /// Whether it changes a frequency, or the amplitude at which that is seen.
+    /// Whether it changes a frequency, or the scale of the angles at which that is seen.
     pub fn is_of_frequency(&self) -> bool {
         self.acts == Acts::Pace || self.of_camera && self.phase == Some(Phase::Position)
     }
@@ -238,7 +238,7 @@ const PROPORTIONAL: &[&str] = &["in proportion"];
 const DRY: &[&str] = &["sign", "sign that fades with speed"];
 /// Of a law that is right to this part of its torque.
 const EXACT: f64 = 0.002;
-/// Of one that is a first approximation of what surfaces and fibres do.
+/// Of one that is a first approximation of what surfaces and fibres do (judgement).
 const APPROXIMATE: f64 = 0.05;
 
 const fn entry(parameters: &'static [Parameter], place: Place, acts: Acts, words: &'static str) -> Entry {

@@ -100,7 +100,7 @@ impl<'a> Findings<'a> {
     pub fn phase(&self) -> Option<Phase> {
         match self.verdict.status {
             Status::Adequate => None,
-            // a law that has been proven goes with what it does
+            // a law that has been proven says itself whether it goes with position or velocity
             Status::Unknown if self.learnt.is_some() => self.learnt.as_ref().and_then(Learnt::phase),
             Status::Unknown => {
                 let of_torque = self.missing_torque.as_ref().and_then(|torque| torque.phase);

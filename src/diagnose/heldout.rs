@@ -94,7 +94,7 @@ pub fn borne_out<'a>(
 }
 
 /// The posterior led by the effects that are more probable than not each by itself, where a law that was learnt has put one of them in the place of a name; and
-/// its proof.
+/// its proof. Where nothing remains beside the names, it must be among the sets that the table's fits do not tell apart.
 pub fn led_by_likely<'a>(
     context: &FitContext<'a>,
     posterior: Posterior<'a>,
@@ -104,9 +104,9 @@ pub fn led_by_likely<'a>(
     let verdict = &context.settings.verdict;
     let inclusions = posterior.inclusions(context.settings);
     let likely: Vec<Effect> = inclusions.iter().filter(|own| own.1 > verdict.even).map(|own| own.0).collect();
+    let most = posterior.candidates.iter().map(|candidate| candidate.if_named).fold(0.0, f64::max);
     // where nothing else remains, the table's own fits tell sets of its names apart
-    let least =
-        if posterior.remains > verdict.even { 0.0 } else { verdict.told_apart * posterior.candidates[0].if_named };
+    let least = if posterior.remains > verdict.even { 0.0 } else { verdict.told_apart * most };
     let is_meant = |candidate: &Candidate<'_>| {
         let effects = &candidate.fit.hypothesis.effects;
         let is_of_likely = effects.len() == likely.len() && effects.iter().all(|effect| likely.contains(effect));

@@ -61,7 +61,7 @@ pub struct Needed {
     pub effect: Effect,
     /// That it is at work.
     pub probability: f64,
-    /// That it is not, and a law is that no table holds.
+    /// That a law outside the table acts in its place.
     pub replaced: f64,
 }
 
@@ -236,7 +236,10 @@ fn completes_a_law(effect: Effect, fit: &Refit<'_>, others: &[&Refit<'_>]) -> bo
         others.iter().find(|other| other.hypothesis.effects == rest).map(|without| without.chi2 - fit.chi2)
     };
     let is_like = |other: &&Effect| {
-        **other != effect && other.place() != Place::Camera && other.entry().phase == effect.entry().phase
+        **other != effect
+            && effect.entry().phase.is_some()
+            && other.place() != Place::Camera
+            && other.entry().phase == effect.entry().phase
     };
     let errors = fit.hypothesis.effects.iter().filter(is_like).filter_map(|other| {
         let error = other.entry().law_error;
@@ -308,7 +311,7 @@ impl<'a> Posterior<'a> {
     }
 
     /// Whether a name of the likeliest fit often stands for something else, or two of them may together: a frequency, and how it goes with amplitude, is what any
-    /// spring changes that is no straight line.
+    /// nonlinear spring changes.
     pub fn may_stand_in(&self, settings: &Settings) -> bool {
         let (best, others) = (self.best(), self.fits());
         let effects = &best.hypothesis.effects;

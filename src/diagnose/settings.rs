@@ -247,8 +247,8 @@ pub struct PriorSettings {
     pub not_compared: f64,
     /// A support in step with the swing is with these odds what it seems to be (training bank: four times out of five).
     pub support_in_step: f64,
-    /// A name that gains no more than the error of another name's law, or, of a support, whose three free numbers complete any law that is only nearly right, little
-    /// (training bank, of supports).
+    /// Odds of a name that gains no more than the error of another name's law, and of a support that gains little: its three free numbers complete any law that is only
+    /// nearly right (training bank, of supports only).
     pub completes_a_law: f64,
     /// That little, in standard deviations (training bank).
     pub slight: f64,

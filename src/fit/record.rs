@@ -30,8 +30,8 @@ pub struct Record {
     pub rounding: f64,
     /// Whether it goes on where the record before it ends: a piece of the same recording, with a start of its own.
     pub continues: bool,
-    /// The usual standard deviation that a tracker states of each angle: it counts errors that go on from frame to frame, which do not show between neighbours. Nothing
-    /// where none is stated; of another program's table it is taken for relative only.
+    /// The usual standard deviation that a tracker states of each angle: it counts errors that go on from frame to frame, which do not show between neighbours. Empty
+    /// unless `track` wrote the table.
     pub stated_rad: Vec<f64>,
 }
 
@@ -60,7 +60,7 @@ impl Record {
             rounding: if series.tracked { 0.0 } else { rounding_in_step(&series.t_s, &series.theta_rad) },
             continues: false,
             stated_rad: if series.tracked {
-                series.sd_rad.iter().filter_map(|sd| usual(sd)).collect()
+                series.sd_rad.iter().map(|sd| usual(sd).unwrap_or(0.0)).collect()
             } else {
                 Vec::new()
             },

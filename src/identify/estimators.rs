@@ -191,7 +191,7 @@ impl Estimators {
                 && is_told(law, frequency_hz)
         };
         let law = envelope.and_then(|e| e.frequency.filter(|f| sound(e, f)).map(|f| (e, f)));
-        // a range over the record extrapolates to no amplitude
+        // where the windows tell no law, ξ is the range of their own
         let of_windows = |envelope: &Envelope| {
             let linear = envelope.linear_damping().map(|xi| relatively_blurred(xi, omitted[1]));
             linear.unwrap_or_else(|| envelope.damping_over_the_record())
@@ -212,11 +212,11 @@ impl Estimators {
                 let widened = "damped sinusoids over the whole record; widened for what amplitude may have changed";
                 Choice {
                     frequency_hz,
-                    // what falls out of step with a sinusoid is no loss
+                    // a frequency that changes makes the swing smaller than a sinusoid of one frequency, which takes that for damping
                     damping_ratio: envelope.map_or(damping_ratio, of_windows),
                     frequency_at_rad: felt.then(|| amplitudes_rad[mode] * weighed(decays).sqrt()),
-                    basis: if envelope.is_some() { format!("{widened}; ξ of windows") } else { widened.to_owned() },
-                    at_small_amplitude: false,
+                    basis: if envelope.is_some() { format!("f: {widened}; ξ: windows") } else { widened.to_owned() },
+                    at_small_amplitude: envelope.is_some_and(|e| e.linear_damping().is_some()),
                 }
             }
             _ => Choice {

@@ -71,7 +71,7 @@ use spectrum::Spectrum;
 use tumbling::Tumbling;
 use windows::Windows;
 
-/// A value whose own standard deviation is so many times the usual one is left out: it would count as a twenty-fifth of another.
+/// A value whose own standard deviation is so many times the usual one is left out: all values count alike here, and its weight should be a twenty-fifth.
 const UNSURE: f64 = 5.0;
 
 /// What was recorded.

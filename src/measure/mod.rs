@@ -128,6 +128,9 @@ pub fn measure(path: &Path, options: &Options, folder: &Path, progress: &dyn Pro
     Session::open(path, options, folder, progress)?.run(progress)
 }
 
+/// Pictures that tell whether a thing makes a difference where it is, at least (judgement: of one or two chance decides).
+const FEWEST_TELLING: usize = 3;
+
 /// A recording that is about to be measured: what is sought is known.
 pub struct Session<'a> {
     path: PathBuf,
@@ -139,7 +142,7 @@ pub struct Session<'a> {
     album: Album,
     /// Stamps of its pictures.
     sampled_s: Vec<f64>,
-    /// Those pictures, where it is not known yet what is sought.
+    /// Its pictures, where it is not known yet what is sought.
     pictures: Vec<OwnedPicture>,
     hues: Vec<Hue>,
     siting: Option<Siting>,
@@ -233,7 +236,8 @@ impl<'a> Session<'a> {
             self.album.differs(picture, stored_px, &others)
         };
         let seen: Vec<bool> = places.iter().enumerate().filter_map(makes_one).collect();
-        (!seen.is_empty() && !self.camera.taken_out).then(|| 2 * seen.iter().filter(|own| **own).count() >= seen.len())
+        (seen.len() >= FEWEST_TELLING && !self.camera.taken_out)
+            .then(|| 2 * seen.iter().filter(|own| **own).count() >= seen.len())
     }
 
     /// Its stream.

@@ -32,7 +32,7 @@ const PARTS_TRAVEL: f64 = 0.2;
 pub const LEAST_TURN: f64 = 0.02;
 /// [`kurtosis`] of normally distributed noise (statistics).
 const KURTOSIS_OF_NOISE: f64 = 3.0;
-/// Part of its own radius by which one thing of a chain swings at least (judgement: what covers a thing at its edge shifts it by
+/// Part of its own radius by which at least one thing of a chain swings (judgement: what covers a thing at its edge shifts it by
 /// less).
 const LEAST_TRAVEL: f64 = 0.25;
 /// What a chain whose first mark swings by less than its own radius is worth less: anything else that swings comes first.
@@ -101,7 +101,6 @@ fn of_look(
 ) -> Option<Chain> {
     let mut movers: Vec<usize> = (0..things.len())
         .filter(|i| belongs(&things[*i]) && things[*i].moves && things[*i].presence > LEAST_PRESENCE)
-        .filter(|i| !is_covered(&things[*i]))
         .collect();
     movers.sort_by(|a, b| things[*b].presence.total_cmp(&things[*a].presence));
     let movers = distinct(things, &movers);
@@ -149,10 +148,10 @@ fn are_parts(things: &[Thing], marks: &[usize], bears: &dyn Fn(&Thing) -> bool) 
 }
 
 /// The circle on which the first mark swings; `Some(None)` where its path is so flat that it shows no centre. What
-/// hangs from a fixed point has no other path. Things none of which swings by a part of its own width are covered now and then, and hang from nothing.
+/// hangs from a fixed point has no other path. Things each of which is only covered now and then hang from nothing.
 fn hangs(things: &[Thing], marks: &[usize]) -> Option<Option<Arc>> {
     let first = &things[*marks.first()?];
-    if marks.iter().all(|i| things[*i].travel_px < LEAST_TRAVEL * things[*i].radius_px()) {
+    if marks.iter().all(|i| is_covered(&things[*i])) {
         return None;
     }
     let path = first.places_px();
@@ -163,9 +162,12 @@ fn hangs(things: &[Thing], marks: &[usize]) -> Option<Option<Arc>> {
     }
 }
 
-/// A still thing that something covers from time to time seems to move as well, by less than its own radius and about no clear centre, or about a point within
-/// itself; it is mostly in the middle of its way, where what swings seldom is.
+/// A still thing that something covers from time to time seems to move as well: by less than a quarter of its radius; or by less than its radius, about no clear
+/// centre or about a point within itself, and mostly in the middle of its way, where what swings seldom is until it has decayed.
 fn is_covered(thing: &Thing) -> bool {
+    if thing.travel_px < LEAST_TRAVEL * thing.radius_px() {
+        return true;
+    }
     let path = thing.places_px();
     let shows_centre = || {
         Arc::of(&path, thing.radius_px())
@@ -191,7 +193,7 @@ fn kurtosis(points: &[[f64; 2]]) -> f64 {
 
 /// It swings by itself as a mark does.
 pub fn hangs_alone(thing: &Thing) -> bool {
-    thing.presence > LEAST_PRESENCE && !is_covered(thing) && hangs(std::slice::from_ref(thing), &[0]).is_some()
+    thing.presence > LEAST_PRESENCE && hangs(std::slice::from_ref(thing), &[0]).is_some()
 }
 
 /// Root mean square distance of points from the straight line through them.
@@ -376,6 +378,21 @@ mod tests {
         };
         // of a radius of 9.8 px
         assert!(chain(1.0).is_none() && chain(4.0).is_none());
+    }
+
+    #[test]
+    fn an_upper_mark_that_has_moved_little_and_come_to_rest_stays_in_its_chain() {
+        let upper = |t: f64| {
+            let theta: f64 = 0.025 * (-0.2 * t).exp() * (3.0 * t).sin();
+            [400.0 + 200.0 * theta.sin(), 50.0 + 200.0 * theta.cos()]
+        };
+        let lower = move |t: f64| {
+            let theta: f64 = 0.3 * (-0.2 * t).exp() * (3.0 * t).sin();
+            [upper(t)[0] + 180.0 * theta.sin(), upper(t)[1] + 180.0 * theta.cos()]
+        };
+        let things = [thing(0, lower, true), thing(0, upper, true)];
+        assert!(is_covered(&things[1]), "by itself it might be a thing that is covered");
+        assert_eq!(longest(&things, &["#c83424".to_owned()]).unwrap().marks, [1, 0]);
     }
 
     #[test]

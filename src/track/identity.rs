@@ -13,7 +13,7 @@ use super::chain::Chain;
 const CLEAR_MISFIT: f64 = 10.0;
 /// Frames in a row that must say the same.
 const FRAMES_AGREED: u32 = 5;
-/// Most answers that are tried in a frame: seven names in every order.
+/// Most answers that are tried in a frame (cost): as many as seven names have orders.
 const MOST_ANSWERS: usize = 5040;
 
 /// Sightings that belong to another mark.
@@ -116,25 +116,20 @@ impl Identity {
     /// The names of the marks in doubt, once they are clear.
     fn clear_answer(&mut self, seen_px: &[Option<[f64; 2]>], in_doubt: &[usize]) -> Option<Vec<usize>> {
         let choices: Vec<Vec<usize>> = in_doubt.iter().map(|mark| self.names_for(*mark)).collect();
-        // each mark in doubt takes a name of its colour from those that follow
-        let left = |place: usize| {
-            let hue = |place: usize| self.names[in_doubt[place]].hue;
-            choices[place].len().saturating_sub((0..place).filter(|before| hue(*before) == hue(place)).count()).max(1)
-        };
-        let answers = (0..choices.len()).map(left).fold(1usize, usize::saturating_mul);
-        if answers > MOST_ANSWERS {
-            return None;
-        }
         let mut best: (f64, Vec<usize>) = (f64::INFINITY, Vec::new());
         let mut next = f64::INFINITY;
-        for_each_answer(&choices, &mut Vec::new(), &mut |answer| {
+        let mut left = MOST_ANSWERS;
+        let tried_all = for_each_answer(&choices, &mut Vec::new(), &mut |answer| {
+            left = left.checked_sub(1)?;
             let misfit = self.chain.misfit(&renamed(seen_px, in_doubt, answer));
             if misfit < best.0 {
                 next = std::mem::replace(&mut best, (misfit, answer.to_vec())).0;
             } else {
                 next = next.min(misfit);
             }
+            Some(())
         });
+        tried_all?;
         let (misfit, answer) = best;
         if next == f64::INFINITY {
             // no other name is left: who is seen is known by elimination
@@ -192,21 +187,37 @@ fn renamed(seen_px: &[Option<[f64; 2]>], in_doubt: &[usize], answer: &[usize]) -
     renamed
 }
 
-/// Visits every way to take one name from each choice, none twice.
-fn for_each_answer(choices: &[Vec<usize>], answer: &mut Vec<usize>, visit: &mut dyn FnMut(&[usize])) {
+/// Visits every way to take one name from each choice, none twice, until a visit gives nothing.
+fn for_each_answer(
+    choices: &[Vec<usize>],
+    answer: &mut Vec<usize>,
+    visit: &mut dyn FnMut(&[usize]) -> Option<()>,
+) -> Option<()> {
     let Some(names) = choices.get(answer.len()) else { return visit(answer) };
     for name in names {
         if !answer.contains(name) {
             answer.push(*name);
-            for_each_answer(choices, answer, visit);
+            for_each_answer(choices, answer, visit)?;
             answer.pop();
         }
     }
+    Some(())
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn marks_that_were_never_certain_do_not_hide_how_many_answers_there_are() {
+        let mut identity = Identity::new(&[0; 18], None);
+        let seen_px: Vec<Option<[f64; 2]>> = (0..18).map(|k| Some([40.0 * f64::from(k), 10.0])).collect();
+        (0..9).for_each(|mark| identity.doubt(mark, 0));
+        (0..10).for_each(|frame| drop(identity.see(frame, &seen_px)));
+        (9..18).for_each(|mark| identity.doubt(mark, 10));
+        // of nine marks nine names: 362 880 answers
+        assert!((10..60).all(|frame| identity.see(frame, &seen_px).is_empty()));
+    }
 
     #[test]
     fn what_no_one_could_try_in_every_order_is_left_in_doubt() {

@@ -207,6 +207,12 @@ impl Twins {
         Self(best.effects.iter().flat_map(|name| others().map(move |twin| (*name, twin))).filter_map(odds).collect())
     }
 
+    /// Without those whose exchange in a hypothesis is among some sets of names.
+    fn but(&self, best: &Hypothesis, is_among: impl Fn(&[Effect]) -> bool) -> Self {
+        let exchanged = |name: Effect, twin: Effect| best.without(name).and(twin, best.dropped).effects;
+        Self(self.0.iter().copied().filter(|(name, twin, _)| !is_among(&exchanged(*name, *twin))).collect())
+    }
+
     /// The part of a hypothesis that is an effect's: what tells a name of it from others tells them apart beside a law, too, and nothing else does.
     fn share(&self, effect: Effect, hypothesis: &Hypothesis) -> f64 {
         let of_name = |name: Effect| self.0.iter().filter(move |own| own.0 == name && !hypothesis.has(own.1));
@@ -232,17 +238,17 @@ pub fn needed(
 ) -> Vec<Needed> {
     let weights = normalised(&order.iter().map(|own| -own.length).collect::<Vec<f64>>());
     let twins = Twins::of(posterior, effects);
+    // a set of names alone shares nothing with one that is a description of its own
+    let is_described =
+        |names: &[Effect]| order.iter().any(|own| own.terms.is_empty() && own.fit.hypothesis.effects == names);
+    let apart = twins.but(&posterior.best().hypothesis, is_described);
     let terms: Vec<Vec<Vec<(Effect, f64)>>> = order.iter().map(|own| own.stand_for(context, along)).collect();
     let of_effect = |effect: &Effect| {
         let mut needed = Needed { effect: *effect, probability: 0.0, replaced: 0.0 };
         for ((own, terms), weight) in order.iter().zip(&terms).zip(&weights) {
             let of_terms = terms.iter().flatten().filter(|own| own.0 == *effect).map(|own| own.1).fold(0.0, f64::max);
-            // sets of names alone are all among the descriptions
-            let of_names = match terms.is_empty() {
-                true => f64::from(u8::from(own.fit.hypothesis.has(*effect))),
-                false => twins.share(*effect, &own.fit.hypothesis),
-            };
-            let share = of_names.max(of_terms);
+            let twins = if terms.is_empty() { &apart } else { &twins };
+            let share = twins.share(*effect, &own.fit.hypothesis).max(of_terms);
             needed.probability += share * weight;
             if terms.iter().any(Vec::is_empty) {
                 needed.replaced += (1.0 - share) * weight;
