@@ -32,9 +32,10 @@ const PARTS_TRAVEL: f64 = 0.2;
 pub const LEAST_TURN: f64 = 0.02;
 /// [`kurtosis`] of normally distributed noise (statistics).
 const KURTOSIS_OF_NOISE: f64 = 3.0;
-/// Part of its own radius by which at least one thing of a chain swings (judgement: what covers a thing at its edge shifts it by
-/// less).
+/// Part of its own radius by which a thing swings at least (judgement: what covers a thing at its edge shifts it by less).
 const LEAST_TRAVEL: f64 = 0.25;
+/// Correlation of two paths from which on one moves with the other (judgement: half).
+const MOVES_WITH: f64 = 0.5;
 /// What a chain whose first mark swings by less than its own radius is worth less: anything else that swings comes first.
 const SLIGHT: f64 = 0.5;
 /// Marks that are looked for at most.
@@ -107,7 +108,7 @@ fn of_look(
     let crowd = movers.len();
     // every mover may be the one that the others are like; the largest set that hangs from something counts
     let sets = movers.iter().filter_map(|first| {
-        let mut marks = without_shadows(things, rigid_set(things, &movers, *first));
+        let mut marks = without_shadows(things, without_covered(things, rigid_set(things, &movers, *first)));
         order(things, &mut marks);
         hangs(things, &marks).filter(|_| !is_part(&marks)).map(|arc| (marks, arc))
     });
@@ -148,12 +149,9 @@ fn are_parts(things: &[Thing], marks: &[usize], bears: &dyn Fn(&Thing) -> bool) 
 }
 
 /// The circle on which the first mark swings; `Some(None)` where its path is so flat that it shows no centre. What
-/// hangs from a fixed point has no other path. Things each of which is only covered now and then hang from nothing.
+/// hangs from a fixed point has no other path.
 fn hangs(things: &[Thing], marks: &[usize]) -> Option<Option<Arc>> {
     let first = &things[*marks.first()?];
-    if marks.iter().all(|i| is_covered(&things[*i])) {
-        return None;
-    }
     let path = first.places_px();
     let most_px = MOST_OFF_ARC * first.travel_px;
     match Arc::of(&path, first.radius_px()) {
@@ -176,6 +174,15 @@ fn is_covered(thing: &Thing) -> bool {
     is_slight(thing) && kurtosis(&path) > KURTOSIS_OF_NOISE && !shows_centre()
 }
 
+/// The things without those that may only be covered now and then: all, where the one that moves farthest may be; otherwise those that do not move as that one does.
+/// The upper mark of a strip moves little, but with the lower one.
+fn without_covered(things: &[Thing], mut marks: Vec<usize>) -> Vec<usize> {
+    let farthest = marks.iter().copied().max_by(|a, b| things[*a].travel_px.total_cmp(&things[*b].travel_px));
+    let Some(farthest) = farthest.map(|i| &things[i]).filter(|thing| !is_covered(thing)) else { return Vec::new() };
+    marks.retain(|i| !is_covered(&things[*i]) || things[*i].correlation(farthest).abs() > MOVES_WITH);
+    marks
+}
+
 /// It moves by less than its own radius.
 fn is_slight(thing: &Thing) -> bool {
     thing.travel_px <= thing.radius_px()
@@ -193,7 +200,7 @@ fn kurtosis(points: &[[f64; 2]]) -> f64 {
 
 /// It swings by itself as a mark does.
 pub fn hangs_alone(thing: &Thing) -> bool {
-    thing.presence > LEAST_PRESENCE && hangs(std::slice::from_ref(thing), &[0]).is_some()
+    thing.presence > LEAST_PRESENCE && !is_covered(thing) && hangs(std::slice::from_ref(thing), &[0]).is_some()
 }
 
 /// Root mean square distance of points from the straight line through them.

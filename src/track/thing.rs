@@ -47,6 +47,22 @@ impl Thing {
         motion_px / self.travel_px.max(other.travel_px).max(f64::MIN_POSITIVE)
     }
 
+    /// Correlation with another of the places along the axis along which each moves farther, where both are seen.
+    pub fn correlation(&self, other: &Self) -> f64 {
+        let both = self.path.iter().zip(&other.path).filter_map(|(p, q)| (*p).zip(*q));
+        let (own, theirs): (Vec<[f64; 2]>, Vec<[f64; 2]>) = both.unzip();
+        let product = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
+        let deviations = |places: &[[f64; 2]]| {
+            let [x, y] = [0, 1].map(|axis| {
+                let mean = places.iter().map(|p| p[axis]).sum::<f64>() / places.len().max(1) as f64;
+                places.iter().map(|p| p[axis] - mean).collect::<Vec<f64>>()
+            });
+            if product(&x, &x) < product(&y, &y) { y } else { x }
+        };
+        let (own, theirs) = (deviations(&own), deviations(&theirs));
+        product(&own, &theirs) / (product(&own, &own) * product(&theirs, &theirs)).sqrt().max(f64::MIN_POSITIVE)
+    }
+
     /// Usual distance from another; `None` where they are never seen together.
     pub fn distance_px(&self, other: &Self) -> Option<f64> {
         let apart = |(p, q): (&Option<[f64; 2]>, &Option<[f64; 2]>)| {
