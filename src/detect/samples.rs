@@ -337,6 +337,20 @@ mod tests {
     }
 
     #[test]
+    fn a_picture_differs_from_the_others_where_something_is_that_they_do_not_show_there() {
+        let mut album = Album { pictures: (0..5).map(|i| picture(6 * i, 168, 108)).collect(), ..Album::default() };
+        album.shifts = [1, 1];
+        // the square of picture 2, in pixels of luma, and the wall beside it
+        let (own, wall) = ([2.0 * 14.0, 2.0 * 12.0], [2.0 * 35.0, 2.0 * 4.0]);
+        assert_eq!(album.differs(2, own, &[0, 1, 3, 4]), Some(true));
+        assert_eq!(album.differs(2, wall, &[0, 1, 3, 4]), Some(false));
+        assert_eq!(album.differs(0, own, &[1, 3, 4]), Some(false));
+        // nothing to compare with, and no such point
+        assert_eq!(album.differs(2, own, &[]), None);
+        assert_eq!(album.differs(2, [900.0, 0.0], &[0, 1]), None);
+    }
+
+    #[test]
     fn the_hue_of_what_moves_comes_before_that_of_what_stands() {
         let mut album = Album { pictures: (0..5).map(|i| picture(6 * i, 168, 108)).collect(), ..Album::default() };
         album.compare();
