@@ -121,6 +121,9 @@ pub fn look(path: &Path, options: &Options, folder: &Path, progress: &dyn Progre
             None => break,
         }
     }
+    if let Some(finding) = one_mark(path, &options, (folder, progress), &names)? {
+        return Ok(finding);
+    }
     // a motion that is no oscillation, as a double pendulum that turns over
     unsteady.sort_by(|a, b| b.0.total_cmp(&a.0));
     for (_, worn) in unsteady.into_iter().take(CHAINS) {
@@ -129,6 +132,29 @@ pub fn look(path: &Path, options: &Options, folder: &Path, progress: &dyn Progre
         }
     }
     Err(nothing_swings(path, &seen, &names, session.stream().stated_frames))
+}
+
+/// What swings before things of its own hue is one with them now and then, and lost among many: as `track` finds a single mark of that colour, by the threshold at which
+/// something swings.
+fn one_mark(
+    path: &Path,
+    options: &Options,
+    (folder, progress): (&Path, &dyn Progress),
+    names: &[String],
+) -> Result<Option<Finding>> {
+    let mut colours: Vec<&String> = names.iter().filter(|name| name.starts_with('#')).collect();
+    colours.truncate(CHAINS);
+    for name in colours {
+        let Ok(colour) = name.parse::<MarkColour>() else { continue };
+        let options = Options { marks: vec![colour], ..options.clone() };
+        // where there is no mark of that colour there may be one of the next
+        let Ok(mut session) = Session::open(path, &options, folder, progress) else { continue };
+        let looks = session.hues().iter().map(|hue| (hue.clone(), name.clone())).collect();
+        if let Some(finding) = measured(&mut session, looks, true, progress)? {
+            return Ok(Some(finding));
+        }
+    }
+    Ok(None)
 }
 
 /// Where the stretches after the first begin, the last first.
@@ -156,18 +182,19 @@ fn measured(
     let aspect = session.stream().pixel_aspect;
     let mut frames = square(session.gather(hues, progress)?, aspect);
     let mut all = things(&frames);
-    let found = hanging::longest(&all, &names).filter(|chain| !steady || chain.is_steady(&all));
-    let Some(mut chain) = found else { return Ok(None) };
-    let t_s: Vec<f64> = frames.iter().map(|frame| frame.t_s).collect();
-    if chain.marks.iter().any(|i| session.makes_a_difference(&t_s, &all[*i]) == Some(false)) {
-        return Ok(None);
-    }
+    let found = |frames: &[FrameBlobs], all: &[Thing]| {
+        let t_s: Vec<f64> = frames.iter().map(|frame| frame.t_s).collect();
+        let is_there = |i: &usize| session.makes_a_difference(&t_s, &all[*i]) != Some(false);
+        let chain = hanging::longest(all, &names)?;
+        ((!steady || chain.is_steady(all)) && chain.marks.iter().all(is_there)).then_some(chain)
+    };
+    let Some(mut chain) = found(&frames, &all) else { return Ok(None) };
     // a hand that holds a mark covers part of it, at one end of its arc
     let held_until_s = held_until_s(&frames, &chain.marks.iter().map(|i| &all[*i]).collect::<Vec<_>>());
     if let Some(held_s) = held_until_s {
         frames.retain(|frame| frame.t_s >= held_s);
         all = things(&frames);
-        chain = match hanging::longest(&all, &names) {
+        chain = match found(&frames, &all) {
             Some(chain) => chain,
             None => return Ok(None),
         };

@@ -30,6 +30,8 @@ const PARTS_REACH: f64 = 1.1;
 const PARTS_TRAVEL: f64 = 0.2;
 /// Motion of one thing against another, as a share of how far both move, below which they do not turn about each other.
 pub const LEAST_TURN: f64 = 0.02;
+/// The same in pixels: as much as their own errors, of which a roughly found place has a tenth or two (judgement).
+const LEAST_TURN_PX: f64 = 0.3;
 /// [`kurtosis`] of normally distributed noise (statistics).
 const KURTOSIS_OF_NOISE: f64 = 3.0;
 /// Part of its own radius by which a thing swings at least (judgement: what covers a thing at its edge shifts it by less).
@@ -262,7 +264,12 @@ fn without_shadows(things: &[Thing], mut marks: Vec<usize>) -> Vec<usize> {
     marks.sort_by(|a, b| off_arc_px(a).total_cmp(&off_arc_px(b)));
     let mut kept: Vec<usize> = Vec::new();
     for i in marks {
-        if kept.iter().all(|k| things[i].moves_against(&things[*k]) > LEAST_TURN) {
+        let turns = |k: &usize| {
+            let (one, other) = (&things[i], &things[*k]);
+            let against = one.moves_against(other);
+            against > LEAST_TURN && against * one.travel_px.max(other.travel_px) > LEAST_TURN_PX
+        };
+        if kept.iter().all(turns) {
             kept.push(i);
         }
     }
