@@ -42,16 +42,7 @@ impl Case {
                 theta_rad[link].push(Some(angle_rad + noise.sample(&mut random)));
             }
         }
-        Record {
-            path: "simulated".into(),
-            relative_sd: vec![vec![1.0; rows]; links],
-            t_s,
-            theta_rad,
-            in_step: 0.0,
-            rounding: 0.0,
-            continues: false,
-            stated_rad: Vec::new(),
-        }
+        Record::uniform("simulated", t_s, theta_rad)
     }
 }
 

@@ -22,9 +22,9 @@ const NOISE_OF_WIDTH: f64 = 0.005;
 const LEAST_STEP_PX: f64 = 2.0;
 const STILL_STEP: f64 = 0.15;
 const FEWEST_REPEATS: usize = 5;
+const LEAST_REPEATED: f64 = 0.05;
 /// Cosine between the steps before and after one, from which on the mark has not turned round between them (judgement: 60°).
 const GOES_ON: f64 = 0.5;
-const LEAST_REPEATED: f64 = 0.05;
 /// Share of the marks' own motion from which another thing's is no trembling.
 const LEAST_TRAVEL: f64 = 0.05;
 /// Change of the distance from a still thing, over the motion, up to which that is the hinge.

@@ -111,16 +111,7 @@ mod tests {
 
     #[test]
     fn a_strip_counted_anew_begins_in_as_many_shapes_as_it_has() {
-        let record = Record {
-            path: "made".into(),
-            t_s: (0..30).map(f64::from).collect(),
-            theta_rad: vec![vec![Some(0.1); 30]; 2],
-            relative_sd: vec![vec![1.0; 30]; 2],
-            in_step: 0.0,
-            rounding: 0.0,
-            continues: false,
-            stated_rad: Vec::new(),
-        };
+        let record = Record::uniform("made", (0..30).map(f64::from).collect(), vec![vec![Some(0.1); 30]; 2]);
         let mut experiment = Experiment::default();
         experiment.model.effects.distributed_flexibility = Some(1e-5);
         let problem =

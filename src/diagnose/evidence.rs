@@ -118,17 +118,8 @@ mod tests {
 
     fn records() -> [Record; 1] {
         let t_s: Vec<f64> = (0..30).map(|k| k as f64 / 30.0).collect();
-        let (theta_rad, relative_sd) = (vec![vec![Some(0.1); 30]; 2], vec![vec![1.0; 30]; 2]);
-        [Record {
-            path: "made".into(),
-            theta_rad,
-            relative_sd,
-            t_s,
-            in_step: 0.0,
-            rounding: 0.0,
-            continues: false,
-            stated_rad: Vec::new(),
-        }]
+        let theta_rad = vec![vec![Some(0.1); 30]; 2];
+        [Record::uniform("made", t_s, theta_rad)]
     }
 
     /// A fit with one effect of this size and standard deviation, that leaves so much in 60 values.

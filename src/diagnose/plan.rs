@@ -69,14 +69,9 @@ fn recorded(experiment: &Experiment, plan: &Plan) -> Result<Record> {
     let t_s: Vec<f64> = (0..rows).map(|row| row as f64 / plan.rate_hz).collect();
     let chords: Vec<Vec<f64>> = t_s.iter().map(|t| chord_angles_rad(model.chain(), &swing.at(*t).theta_rad)).collect();
     let marks = model.chain().groups().len();
-    Ok(Record {
-        path: "a planned recording".into(),
-        theta_rad: (0..marks).map(|link| chords.iter().map(|c| Some(c[link])).collect()).collect(),
-        relative_sd: vec![vec![1.0; rows]; marks],
+    Ok(Record::uniform(
+        "a planned recording",
         t_s,
-        in_step: 0.0,
-        rounding: 0.0,
-        continues: false,
-        stated_rad: Vec::new(),
-    })
+        (0..marks).map(|link| chords.iter().map(|c| Some(c[link])).collect()).collect(),
+    ))
 }

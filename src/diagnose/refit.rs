@@ -273,16 +273,7 @@ mod tests {
     fn only_starts_that_end_at_the_best_count_together() {
         let theta_rad = vec![vec![Some(0.1); 30]; 2];
         let t_s = (0..30).map(f64::from).collect();
-        let records = [Record {
-            path: "none".into(),
-            t_s,
-            theta_rad,
-            relative_sd: vec![vec![1.0; 30]; 2],
-            in_step: 0.0,
-            rounding: 0.0,
-            continues: false,
-            stated_rad: Vec::new(),
-        }];
+        let records = [Record::uniform("none", t_s, theta_rad)];
         let met = |own: f64, other: f64| {
             let mut fit = leaving(&records, own, 1);
             fit.meet(leaving(&records, other, 2), 0.2);

@@ -65,16 +65,7 @@ mod tests {
         let mut noise = || 1e-3 * random.random_range(-1.0..1.0);
         let theta_rad: Vec<Vec<Option<f64>>> =
             (0..2).map(|link| t_s.iter().map(|t| Some(swing.at(*t).theta_rad[link] + noise())).collect()).collect();
-        let record = Record {
-            path: "made".into(),
-            theta_rad,
-            relative_sd: vec![vec![1.0; t_s.len()]; 2],
-            t_s,
-            in_step: 0.0,
-            rounding: 0.0,
-            continues: false,
-            stated_rad: Vec::new(),
-        };
+        let record = Record::uniform("made", t_s, theta_rad);
         (record, experiment)
     }
 

@@ -40,16 +40,7 @@ mod tests {
             Some(swing(*t) + NOISE_RAD * noise)
         };
         let theta_rad = vec![t_s.iter().map(noisy).collect()];
-        Record {
-            path: "swing".into(),
-            relative_sd: vec![vec![1.0; t_s.len()]],
-            t_s,
-            theta_rad,
-            in_step: 0.0,
-            rounding: 0.0,
-            continues: false,
-            stated_rad: Vec::new(),
-        }
+        Record::uniform("swing", t_s, theta_rad)
     }
 
     fn is_noise(record: &Record, tolerance: f64) {

@@ -6,7 +6,6 @@ use std::path::PathBuf;
 use crate::error::{Error, Result};
 use crate::series::AngleSeries;
 use crate::series::noise::rounding_in_step;
-use crate::statistics::median;
 
 /// Errors of a tracked angle in step with the swing, as a share of its noise: 0.007 px beside a noise of 0.025 to 0.035 px in the training videos of the
 /// concealed benchmark.
@@ -36,6 +35,20 @@ pub struct Record {
 }
 
 impl Record {
+    /// Angles that are all known equally well, with nothing but noise in them.
+    pub fn uniform(path: impl Into<PathBuf>, t_s: Vec<f64>, theta_rad: Vec<Vec<Option<f64>>>) -> Self {
+        Self {
+            path: path.into(),
+            relative_sd: vec![vec![1.0; t_s.len()]; theta_rad.len()],
+            t_s,
+            theta_rad,
+            in_step: 0.0,
+            rounding: 0.0,
+            continues: false,
+            stated_rad: Vec::new(),
+        }
+    }
+
     /// The angles of a table with the given number of links; standard deviations in it count relative to each other.
     ///
     /// # Errors
@@ -50,7 +63,8 @@ impl Record {
             );
             return Err(Error::Table { path: series.path.clone(), line: None, message });
         }
-        let relative_sd = series.sd_rad.iter().map(|sd| relative(sd)).collect();
+        let usual_rad: Vec<Option<f64>> = (0..links).map(|link| series.usual_sd_rad(link)).collect();
+        let relative_sd = series.sd_rad.iter().zip(&usual_rad).map(|(sd, usual)| relative(sd, *usual)).collect();
         Ok(Self {
             path: series.path.clone(),
             t_s: series.t_s.clone(),
@@ -60,7 +74,7 @@ impl Record {
             rounding: if series.tracked { 0.0 } else { rounding_in_step(&series.t_s, &series.theta_rad) },
             continues: false,
             stated_rad: if series.tracked {
-                series.sd_rad.iter().map(|sd| usual(sd).unwrap_or(0.0)).collect()
+                usual_rad.into_iter().map(|usual| usual.unwrap_or(0.0)).collect()
             } else {
                 Vec::new()
             },
@@ -210,16 +224,11 @@ fn local_cubic(points: &[(f64, f64)]) -> Option<[f64; 3]> {
     Some([fitted[0], fitted[1] / scale, (left.norm_squared() / freedom).sqrt()])
 }
 
-/// Standard deviations over their median; a value without one counts like the median.
-fn relative(sd_rad: &[Option<f64>]) -> Vec<f64> {
-    let Some(median) = usual(sd_rad) else { return vec![1.0; sd_rad.len()] };
+/// Standard deviations over the usual one; a value without one counts like it.
+fn relative(sd_rad: &[Option<f64>], usual_rad: Option<f64>) -> Vec<f64> {
+    let Some(usual_rad) = usual_rad else { return vec![1.0; sd_rad.len()] };
     // a stated error of next to nothing must not outweigh everything else
-    sd_rad.iter().map(|sd| sd.map_or(1.0, |sd| (sd / median).clamp(0.3, 30.0))).collect()
-}
-
-/// The median of the standard deviations that are stated.
-fn usual(sd_rad: &[Option<f64>]) -> Option<f64> {
-    median(&mut sd_rad.iter().flatten().copied().filter(|sd| *sd > 0.0).collect::<Vec<_>>())
+    sd_rad.iter().map(|sd| sd.map_or(1.0, |sd| (sd / usual_rad).clamp(0.3, 30.0))).collect()
 }
 
 #[cfg(test)]
@@ -228,14 +237,12 @@ mod tests {
 
     fn record(rows: usize) -> Record {
         Record {
-            path: "made".into(),
-            t_s: (0..rows).map(|row| 0.1 * row as f64).collect(),
-            theta_rad: vec![(0..rows).map(|row| (row % 7 > 0).then_some(row as f64)).collect(); 2],
-            relative_sd: vec![vec![1.0; rows]; 2],
             in_step: 0.25,
-            rounding: 0.0,
-            continues: false,
-            stated_rad: Vec::new(),
+            ..Record::uniform(
+                "made",
+                (0..rows).map(|row| 0.1 * row as f64).collect(),
+                vec![(0..rows).map(|row| (row % 7 > 0).then_some(row as f64)).collect(); 2],
+            )
         }
     }
 

@@ -270,20 +270,7 @@ mod tests {
         let states: Vec<Vec<f64>> =
             t_s.iter().map(|t| swing.at(*t)).map(|s| [s.theta_rad, s.omega_rad_s].concat()).collect();
         let theta_rad = (0..2).map(|link| states.iter().map(|s| Some(s[link])).collect()).collect();
-        let rows = t_s.len();
-        (
-            Record {
-                path: "made".into(),
-                t_s,
-                theta_rad,
-                relative_sd: vec![vec![1.0; rows]; 2],
-                in_step: 0.0,
-                rounding: 0.0,
-                continues: false,
-                stated_rad: Vec::new(),
-            },
-            states,
-        )
+        (Record::uniform("made", t_s, theta_rad), states)
     }
 
     #[test]

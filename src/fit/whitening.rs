@@ -240,16 +240,8 @@ mod tests {
         let angle = |size: f64, other: f64| {
             t_s.iter().map(|t| Some(size * (6.0 * t).cos() + other * (17.0 * t).sin())).collect::<Vec<_>>()
         };
-        Record {
-            path: "made".into(),
-            theta_rad: vec![angle(0.4, 0.02), angle(0.5, -0.05)],
-            relative_sd: vec![vec![1.0; 200]; 2],
-            t_s,
-            in_step: 0.25,
-            rounding: 0.0,
-            continues: false,
-            stated_rad: Vec::new(),
-        }
+        let theta_rad = vec![angle(0.4, 0.02), angle(0.5, -0.05)];
+        Record { in_step: 0.25, ..Record::uniform("made", t_s, theta_rad) }
     }
 
     #[test]

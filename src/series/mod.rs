@@ -180,13 +180,19 @@ impl AngleSeries {
         Some((released_s, self.slice(self.rows(released_s, f64::INFINITY))))
     }
 
+    /// The median of an angle's stated standard deviations.
+    pub fn usual_sd_rad(&self, link: usize) -> Option<f64> {
+        median(&mut self.sd_rad.get(link)?.iter().flatten().copied().filter(|sd| *sd > 0.0).collect::<Vec<_>>())
+    }
+
     /// Without the values whose own standard deviation is more than so many times the usual one, and how many of each angle those are; `None` where there are none.
     pub fn without_unsure(&self, times: f64) -> Option<(Self, Vec<usize>)> {
         let mut sure = self.clone();
         let mut counts = vec![0; self.links()];
-        for ((theta, sd), count) in sure.theta_rad.iter_mut().zip(&self.sd_rad).zip(&mut counts) {
-            let Some(usual) = median(&mut sd.iter().flatten().copied().collect::<Vec<_>>()) else { continue };
-            for (value, _) in theta.iter_mut().zip(sd).filter(|(_, sd)| sd.is_some_and(|sd| sd > times * usual)) {
+        for (link, count) in counts.iter_mut().enumerate() {
+            let Some(usual_rad) = self.usual_sd_rad(link) else { continue };
+            let values = sure.theta_rad[link].iter_mut().zip(&self.sd_rad[link]);
+            for (value, _) in values.filter(|(_, sd)| sd.is_some_and(|sd| sd > times * usual_rad)) {
                 *count += usize::from(value.take().is_some());
             }
         }

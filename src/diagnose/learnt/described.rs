@@ -191,6 +191,11 @@ fn described<'a>(fitted: Vec<Begun<'a>>, prior: &Prior) -> Option<Vec<Described<
     Some(order)
 }
 
+/// The names of a hypothesis, another effect in the place of one.
+fn exchanged(best: &Hypothesis, name: Effect, twin: Effect) -> Vec<Effect> {
+    best.without(name).and(twin, best.dropped).effects
+}
+
 /// Effects that do as well in the place of a name, as the table's fits say, with their odds over it.
 struct Twins(Vec<(Effect, Effect, f64)>);
 
@@ -199,8 +204,7 @@ impl Twins {
     fn of(posterior: &Posterior<'_>, effects: &[Effect]) -> Self {
         let (likeliest, best) = (posterior.candidates[0].ln_posterior, &posterior.best().hypothesis);
         let odds = |(name, twin): (Effect, Effect)| {
-            let exchanged = best.without(name).and(twin, best.dropped).effects;
-            let ln_posterior = posterior.candidate(&exchanged)?.ln_posterior;
+            let ln_posterior = posterior.candidate(&exchanged(best, name, twin))?.ln_posterior;
             Some((name, twin, (ln_posterior - likeliest).exp()))
         };
         let others = || effects.iter().copied().filter(|effect| !best.has(*effect));
@@ -209,8 +213,7 @@ impl Twins {
 
     /// Without those whose exchange in a hypothesis is among some sets of names.
     fn but(&self, best: &Hypothesis, is_among: impl Fn(&[Effect]) -> bool) -> Self {
-        let exchanged = |name: Effect, twin: Effect| best.without(name).and(twin, best.dropped).effects;
-        Self(self.0.iter().copied().filter(|(name, twin, _)| !is_among(&exchanged(*name, *twin))).collect())
+        Self(self.0.iter().copied().filter(|(name, twin, _)| !is_among(&exchanged(best, *name, *twin))).collect())
     }
 
     /// The part of a hypothesis that is an effect's: what tells a name of it from others tells them apart beside a law, too, and nothing else does.

@@ -278,17 +278,7 @@ mod tests {
         let (mut random, noise) = (StdRng::seed_from_u64(1), Normal::new(0.0, 1e-4).unwrap());
         let mut angle = |link: usize, t_s: &f64| Some(swing.at(*t_s).theta_rad[link] + noise.sample(&mut random));
         let theta_rad = (0..2).map(|link| t_s.iter().map(|t| angle(link, t)).collect()).collect();
-        let relative_sd = vec![vec![1.0; t_s.len()]; 2];
-        let record = Record {
-            path: "made".into(),
-            theta_rad,
-            relative_sd,
-            t_s,
-            in_step: 0.0,
-            rounding: 0.0,
-            continues: false,
-            stated_rad: Vec::new(),
-        };
+        let record = Record::uniform("made", t_s, theta_rad);
         let (settings, stated) = (Settings::default(), two_arms(0.173, ""));
         let prepared = preparation::prepare(&[record], &stated, &settings).unwrap();
         let context = base::context(&prepared, &prepared.experiment, Taken::AtItsWord, &settings).unwrap();
