@@ -65,6 +65,12 @@ impl CameraShift {
         [self.shift_px[0] - self.turn_rad * y, self.shift_px[1] + self.turn_rad * x]
     }
 
+    /// Where a point of the reference picture lies in this one.
+    pub fn apply(&self, p: [f64; 2]) -> [f64; 2] {
+        let shift = self.at(p);
+        [p[0] + shift[0], p[1] + shift[1]]
+    }
+
     /// Where a point of this picture lies in the reference picture.
     pub fn undo(&self, p: [f64; 2]) -> [f64; 2] {
         let shift = self.at(p);

@@ -12,7 +12,7 @@ use super::samples::{Album, Samples, turn};
 use super::threshold::{self, LEAST_COMPONENT, LEAST_CONTRAST, Relief, Summit};
 use super::{Hue, LEAST_AREA_PX2, blobs::LEAST_ROUNDNESS};
 use crate::error::Result;
-use crate::experiment::Look;
+use crate::experiment::{Look, MarkColour};
 use crate::statistics::median;
 
 /// Half width of a family of hues, rad: of a name, and of a measured colour.
@@ -92,6 +92,12 @@ impl Album {
             trials.push(trial);
         }
         Ok(trials)
+    }
+
+    /// Whether a colour is of the hues that are looked for around a measured one.
+    pub fn is_of_family(&self, measured: &MarkColour, colour: &MarkColour) -> bool {
+        let [a, b] = [measured, colour].map(|own| hue_angle_rad(own, self.matrix));
+        turn(a - b).abs() < FAMILY_RAD[1]
     }
 
     fn best_trial(&self, hue: &Hue, angle: Option<f64>, others: &[f64], fixed: Option<f64>) -> Result<Option<Trial>> {
@@ -242,9 +248,14 @@ impl Album {
                 samples.extend(spot.part.points.iter().map(at));
             }
         }
+        // a spot may be one with a still thing of its hue
+        let moved = |(n, at): &(usize, usize)| self.moved.get(*n).is_some_and(|moved| moved[*at]);
+        if samples.iter().any(moved) {
+            samples.retain(moved);
+        }
         let [r, g, b] = self.colour_of(&samples)?;
         let name = format!("#{r:02x}{g:02x}{b:02x}");
-        name.parse::<crate::experiment::MarkColour>().ok().map(|_| name)
+        name.parse::<MarkColour>().ok().map(|_| name)
     }
 
     /// The component of a picture, nothing where nothing is looked at.

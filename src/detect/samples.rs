@@ -5,6 +5,7 @@ use std::ops::Range;
 use super::LEAST_AREA_PX2;
 use super::component::{HueAxis, luma_row};
 use crate::statistics::median;
+use crate::steady::CameraShift;
 use crate::video::{Matrix, Picture};
 
 /// One picture: luma and both colour differences at every chroma sample, 8-bit codes.
@@ -81,6 +82,8 @@ pub struct Album {
     pub full_range: bool,
     /// Which samples are looked at; all where absent.
     pub allowed: Option<Vec<bool>>,
+    /// Where the camera looks in every picture; empty where that is not known, or it stands still.
+    pub camera: Vec<CameraShift>,
 }
 
 impl Album {
@@ -105,40 +108,106 @@ impl Album {
         self.allowed.as_ref().is_none_or(|a| a[at])
     }
 
-    /// Finds what moves, once all pictures are there: what differs from what usually is there in the light of the picture.
+    /// Finds what moves, once all pictures are there: what differs from what usually is there in the light of the picture. Where the camera moves, what usually is there
+    /// is known to a sample, so that what a picture shows must differ from the neighbours of its place as well.
     pub fn compare(&mut self) {
         self.moved.clear();
         if self.pictures.len() < LEAST_PICTURES {
             return;
         }
         let usual = self.usual();
-        for picture in &self.pictures {
-            let light = self.light(picture, &usual[0]);
-            let mut moved = vec![false; usual[0].len()];
-            for (channel, ((codes, usual), least)) in
-                picture.channels().iter().zip(&usual).zip(LEAST_CHANGE).enumerate()
-            {
+        let around = (!self.camera.is_empty()).then(|| usual.each_ref().map(|plane| self.around(plane)));
+        for (index, picture) in self.pictures.iter().enumerate() {
+            let seen = self.seen_by(index, &usual);
+            let seen = seen.as_ref().unwrap_or(&usual);
+            let light = self.light(picture, &seen[0]);
+            let bounds = around.as_ref().map(|planes| planes.each_ref().map(|plane| self.seen_by(index, plane)));
+            let mut moved = vec![false; seen[0].len()];
+            for (channel, codes) in picture.channels().into_iter().enumerate() {
                 let zero = if channel == 0 { self.black() } else { NO_CHROMA };
                 let lit: [u8; 256] = std::array::from_fn(|code| (zero + light * (code as f64 - zero)).round() as u8);
-                for ((moved, code), usual) in moved.iter_mut().zip(*codes).zip(usual) {
-                    *moved |= code.abs_diff(lit[usize::from(*usual)]) > least;
+                let bounds = bounds.as_ref().and_then(|bounds| bounds[channel].as_ref());
+                let [least, most] = bounds.map_or([&seen[channel]; 2], |bounds| bounds.each_ref());
+                let change = LEAST_CHANGE[channel];
+                for ((moved, code), (least, most)) in moved.iter_mut().zip(codes).zip(least.iter().zip(most)) {
+                    let [least, most] = [least, most].map(|usual| lit[usize::from(*usual)]);
+                    *moved |= *code > most.saturating_add(change) || *code < least.saturating_sub(change);
                 }
             }
             self.moved.push(moved);
         }
     }
 
-    /// Whether a picture differs at a point from what others usually show there; `None` where there are none, or the point lies outside.
-    pub fn differs(&self, picture: usize, [x, y]: [f64; 2], others: &[usize]) -> Option<bool> {
-        let own = self.pictures.get(picture)?;
-        let [column, row] = [(x, self.shifts[0]), (y, self.shifts[1])].map(|(v, shift)| v.max(0.0) as usize >> shift);
-        let at = Some(row * own.width + column).filter(|_| column < own.width && row < own.height)?;
+    /// Where the camera looks in every picture. What moves is found anew where that is as much as half a sample, below which all stays where it is; whether it is.
+    pub fn steady(&mut self, shifts: Vec<CameraShift>) -> bool {
+        if shifts.len() != self.pictures.len() {
+            return false;
+        }
+        let half_px = 0.5 * f64::from(1u32 << self.shifts[0].max(self.shifts[1]));
+        let moves = shifts.iter().any(|shift| shift.size_px() > half_px);
+        self.camera = shifts;
+        if moves {
+            self.compare();
+        }
+        moves
+    }
+
+    /// Planes of the first picture as the camera sees them in another one, the border repeated; `None` where it stands still.
+    fn seen_by<const N: usize>(&self, picture: usize, planes: &[Vec<u8>; N]) -> Option<[Vec<u8>; N]> {
+        let camera = self.camera.get(picture)?;
+        let places = self.places(self.pictures.get(picture)?, |p| camera.undo(p));
+        Some(planes.each_ref().map(|plane| places.iter().map(|at| plane[*at]).collect()))
+    }
+
+    /// Least and greatest code within a sample of every sample.
+    fn around(&self, plane: &[u8]) -> [Vec<u8>; 2] {
+        let width = self.pictures.first().map_or(1, |p| p.width).max(1);
+        let of = |pick: fn(u8, u8) -> u8| {
+            let mut rows = Vec::with_capacity(plane.len());
+            for row in plane.chunks(width) {
+                let near = |x: usize| row[x.saturating_sub(1)..(x + 2).min(row.len())].iter().copied().reduce(pick);
+                rows.extend((0..row.len()).filter_map(near));
+            }
+            let last = plane.len() - 1;
+            (0..plane.len())
+                .map(|at| {
+                    let above = if at >= width { at - width } else { at };
+                    let below = if at + width <= last { at + width } else { at };
+                    pick(rows[at], pick(rows[above], rows[below]))
+                })
+                .collect()
+        };
+        [of(u8::min), of(u8::max)]
+    }
+
+    /// For every sample of a picture, the sample to which its place is shifted, at the border the nearest.
+    fn places(&self, picture: &Samples, shifted: impl Fn([f64; 2]) -> [f64; 2]) -> Vec<usize> {
+        let middle = |v: usize, shift: u32| (v << shift) as f64 + 0.5 * f64::from((1u32 << shift) - 1);
+        let within = |v: f64, shift: u32, size: usize| ((v + 0.5).max(0.0) as usize >> shift).min(size - 1);
+        let [across, down] = self.shifts;
+        let place = |at: usize| {
+            let [x, y] = shifted([middle(at % picture.width, across), middle(at / picture.width, down)]);
+            within(y, down, picture.height) * picture.width + within(x, across, picture.width)
+        };
+        (0..picture.width * picture.height).map(place).collect()
+    }
+
+    /// Whether a picture differs at a point (of the first picture, where the camera moves) from what others usually show there; `None` where there are none, or the
+    /// point lies outside.
+    pub fn differs(&self, picture: usize, point_px: [f64; 2], others: &[usize]) -> Option<bool> {
+        let at = |k: usize| {
+            let own = self.pictures.get(k)?;
+            let [x, y] = self.camera.get(k).map_or(point_px, |camera| camera.apply(point_px));
+            let [column, row] =
+                [(x, self.shifts[0]), (y, self.shifts[1])].map(|(v, shift)| v.max(0.0) as usize >> shift);
+            Some((own, row * own.width + column)).filter(|_| column < own.width && row < own.height)
+        };
+        let (own, here) = at(picture)?;
+        let elsewhere: Vec<(&Samples, usize)> = others.iter().filter_map(|k| at(*k)).collect();
         let changes = |channel: usize| {
-            let of = |picture: &Samples| picture.channels()[channel][at];
-            let usual = median(
-                &mut others.iter().filter_map(|k| Some(f64::from(of(self.pictures.get(*k)?)))).collect::<Vec<_>>(),
-            )?;
-            Some((f64::from(of(own)) - usual).abs() > f64::from(LEAST_CHANGE[channel]))
+            let of = |(picture, at): &(&Samples, usize)| f64::from(picture.channels()[channel][*at]);
+            let usual = median(&mut elsewhere.iter().map(of).collect::<Vec<_>>())?;
+            Some((of(&(own, here)) - usual).abs() > f64::from(LEAST_CHANGE[channel]))
         };
         Some([0, 1, 2].into_iter().map(changes).collect::<Option<Vec<bool>>>()?.contains(&true))
     }
@@ -159,10 +228,20 @@ impl Album {
         if self.full_range { 0.0 } else { 16.0 }
     }
 
-    /// The median picture: luma, C_b, C_r; of an even number of pictures the upper one of the two in the middle.
-    pub fn usual(&self) -> [Vec<u8>; 3] {
+    /// The median picture, as the camera sees it in the first: luma, C_b, C_r; of an even number of pictures the upper one of the two in the middle.
+    fn usual(&self) -> [Vec<u8>; 3] {
+        let shifted = self.pictures.iter().zip(&self.camera);
+        let places: Vec<Vec<usize>> =
+            shifted.map(|(picture, camera)| self.places(picture, |p| camera.apply(p))).collect();
         [0, 1, 2].map(|channel| {
-            let planes: Vec<&[u8]> = self.pictures.iter().map(|p| p.channels()[channel]).collect();
+            let steadied = self.pictures.iter().zip(&places);
+            let steadied: Vec<Vec<u8>> =
+                steadied.map(|(p, places)| places.iter().map(|at| p.channels()[channel][*at]).collect()).collect();
+            let planes: Vec<&[u8]> = if steadied.is_empty() {
+                self.pictures.iter().map(|p| p.channels()[channel]).collect()
+            } else {
+                steadied.iter().map(Vec::as_slice).collect()
+            };
             let length = planes.first().map_or(0, |p| p.len());
             (0..length).step_by(STRETCH).flat_map(|at| medians(&planes, at..(at + STRETCH).min(length))).collect()
         })

@@ -121,7 +121,7 @@ pub fn look(path: &Path, options: &Options, folder: &Path, progress: &dyn Progre
             None => break,
         }
     }
-    if let Some(finding) = one_mark(path, &options, (folder, progress), &names)? {
+    if let Some(finding) = one_mark(path, &options, (folder, progress), (&names, session.album()))? {
         return Ok(finding);
     }
     // a motion that is no oscillation, as a double pendulum that turns over
@@ -140,12 +140,18 @@ fn one_mark(
     path: &Path,
     options: &Options,
     (folder, progress): (&Path, &dyn Progress),
-    names: &[String],
+    (names, album): (&[String], &Album),
 ) -> Result<Option<Finding>> {
-    let mut colours: Vec<&String> = names.iter().filter(|name| name.starts_with('#')).collect();
-    colours.truncate(CHAINS);
-    for name in colours {
+    let mut colours: Vec<(&String, MarkColour)> = Vec::new();
+    for name in names.iter().filter(|name| name.starts_with('#')) {
         let Ok(colour) = name.parse::<MarkColour>() else { continue };
+        // `track` looks for the hues around the one that is named
+        if colours.iter().all(|(_, other)| !album.is_of_family(other, &colour)) {
+            colours.push((name, colour));
+        }
+    }
+    colours.truncate(CHAINS);
+    for (name, colour) in colours {
         let options = Options { marks: vec![colour], ..options.clone() };
         // where there is no mark of that colour there may be one of the next
         let Ok(mut session) = Session::open(path, &options, folder, progress) else { continue };

@@ -18,6 +18,7 @@ use crate::rejected::Rejected;
 use crate::steady::Background;
 use crate::track::{FrameBlobs, MarkSlot, Thing, Tracker, Tracks};
 use crate::video::{DamageSpread, Decoded, Outcome, OwnedPicture, Recording, StillTimes, StreamInfo, Timing};
+use survey::SurveyedCamera;
 use view::{Seen, View, frame_blobs};
 
 /// Whether the camera's own motion is taken out.
@@ -166,10 +167,16 @@ impl<'a> Session<'a> {
         let area = Area::new(&options.rig, folder, stream.orientation.size(stream.stored_size_px))?;
         let (mut hues, slots) = hues_of(&options.marks);
         let (pictures, sampled_s) = survey::pictures(&recording, &options.rig)?;
-        let album = survey::album(&pictures, &area, stream.orientation);
+        let mut album = survey::album(&pictures, &area, stream.orientation);
+        let sought = hues.clone();
         let marks = || album.calibrate(&mut hues, options.threshold);
-        let (trials, (background, camera)) = rayon::join(marks, || survey::camera(&pictures, options, &stream));
-        let trials = trials?;
+        let (trials, surveyed) = rayon::join(marks, || survey::camera(&pictures, options, &stream));
+        let mut trials = trials?;
+        let SurveyedCamera { background, camera, shifts } = surveyed;
+        if album.steady(shifts) {
+            hues = sought;
+            trials = album.calibrate(&mut hues, options.threshold)?;
+        }
         let (path, stamps_s) = (path.to_owned(), Vec::new());
         let mut session = Self {
             path,
@@ -236,8 +243,8 @@ impl<'a> Session<'a> {
             self.album.differs(picture, stored_px, &others)
         };
         let seen: Vec<bool> = places.iter().enumerate().filter_map(makes_one).collect();
-        (seen.len() >= FEWEST_TELLING && !self.camera.taken_out)
-            .then(|| 2 * seen.iter().filter(|own| **own).count() >= seen.len())
+        let told = !self.camera.taken_out || !self.album.camera.is_empty();
+        (seen.len() >= FEWEST_TELLING && told).then(|| 2 * seen.iter().filter(|own| **own).count() >= seen.len())
     }
 
     /// Its stream.

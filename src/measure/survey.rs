@@ -74,9 +74,20 @@ fn over<S: Send>(
     Ok(seen.into_iter().reduce(with))
 }
 
+/// What the pictures show of the camera.
+#[derive(Default)]
+pub struct SurveyedCamera {
+    /// Against what its motion is taken out, where it is.
+    pub background: Option<Background>,
+    /// How far it moves.
+    pub camera: Camera,
+    /// Where it looks in every picture, where its motion is taken out.
+    pub shifts: Vec<CameraShift>,
+}
+
 /// How far the camera moves, and against what it is taken out, where it is.
-pub fn camera(pictures: &[OwnedPicture], options: &Options, stream: &StreamInfo) -> (Option<Background>, Camera) {
-    let Some((first, others)) = pictures.split_first() else { return (None, Camera::default()) };
+pub fn camera(pictures: &[OwnedPicture], options: &Options, stream: &StreamInfo) -> SurveyedCamera {
+    let Some((first, others)) = pictures.split_first() else { return SurveyedCamera::default() };
     let stored = |p: &[f64; 2]| stream.orientation.stored_point(*p, stream.stored_size_px);
     let points_px: Vec<[f64; 2]> = options.rig.reference_marks.iter().map(stored).collect();
     let mut background = Background::of(&first.view(), &points_px);
@@ -94,6 +105,8 @@ pub fn camera(pictures: &[OwnedPicture], options: &Options, stream: &StreamInfo)
     let greatest_px = sizes_px.get(1).copied().unwrap_or(0.0);
     // pictures that do not show where the camera looks
     let silent = located.iter().any(Option::is_none);
+    let still = CameraShift::default();
+    let shifts: Vec<CameraShift> = std::iter::once(still).chain(located.iter().flatten().map(|(c, _)| *c)).collect();
     let agreed: Vec<Vec<bool>> = located.into_iter().flatten().map(|(_, agreed)| agreed).collect();
     let taken_out = match options.steadying {
         Steadying::Always => true,
@@ -108,5 +121,10 @@ pub fn camera(pictures: &[OwnedPicture], options: &Options, stream: &StreamInfo)
     let taken_out = taken_out && background.is_usable();
     let greatest_shift_px = if silent { 0.0 } else { greatest_px };
     let camera = Camera { greatest_shift_px, taken_out, ..Camera::default() };
-    (taken_out.then_some(background), camera)
+    SurveyedCamera {
+        background: taken_out.then_some(background),
+        camera,
+        // of an undecided picture nothing is known
+        shifts: if taken_out && !silent { shifts } else { Vec::new() },
+    }
 }

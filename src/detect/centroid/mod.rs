@@ -123,10 +123,12 @@ pub fn measure(
             shares = again;
         }
     }
-    if let Some(Fit { disc, covariance_px2, .. }) = fitted {
+    if let Some(Fit { disc, covariance_px2, by_parts_px2 }) = fitted {
         (centroid.x_px, centroid.y_px) = (f64::from(disc.centre_px[0]), f64::from(disc.centre_px[1]));
         let samples_sharing = PIXELS_SHARING / f64::from(last.pixels_each);
-        centroid.variance_px2 = covariance_px2.map(|v| samples_sharing * v);
+        let [xx, yy, xy] = covariance_px2.map(|v| samples_sharing * v);
+        let [x, y] = [(xx, 0), (yy, 1)].map(|(v, axis)| (by_parts_px2[axis] / v).max(1.0));
+        centroid.variance_px2 = [x * xx, y * yy, (x * y).sqrt() * xy];
     }
     centroid.chroma_share = share::of_chroma(&shares);
     let reach = patch.reach_px();
@@ -150,7 +152,7 @@ fn resurvey(
     let of_disc = rim.of_disc(disc);
     let mut backgrounds = rim.backgrounds(&surroundings);
     let mut rests = rim.rests(&of_disc, &surroundings.shares(outline)?, &backgrounds);
-    if let Some(extruded) = surroundings.extruded(patch, zones, outline, disc) {
+    for extruded in surroundings.extruded(patch, zones, outline, disc) {
         let behind = rim.backgrounds(&extruded);
         let others = rim.rests(&of_disc, &extruded.shares(outline)?, &behind);
         if extruded.misfit(&others) < surroundings.misfit(&rests) {

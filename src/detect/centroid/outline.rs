@@ -39,7 +39,7 @@ pub enum Zone {
 /// Width of the ring from which the background is read.
 pub const RING_PX: f32 = 3.0;
 /// Standard deviations of the blur in which an edge fades to a hundredth.
-const FADE: f32 = 2.3;
+pub const FADE: f32 = 2.3;
 
 impl Outline {
     /// From the mask: around its convex hull.

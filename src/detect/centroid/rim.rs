@@ -3,7 +3,7 @@
 use nalgebra::Vector3;
 
 use super::disc::{Disc, LANES};
-use super::fit::Band;
+use super::fit::{Band, PARTS};
 use super::patch::{Levels, Sample};
 use super::share::Share;
 use super::surroundings::Surroundings;
@@ -44,11 +44,12 @@ impl Rim<'_> {
     pub fn mixtures(&self, shares: &[Share], backgrounds: &[Levels]) -> Band {
         let mut band = Band::default();
         for (sample, background) in self.samples.iter().zip(backgrounds) {
-            let share = &shares[usize::from(sample.sector)];
+            let sector = usize::from(sample.sector);
+            let share = &shares[sector];
             if share.variance.is_finite()
                 && let Some(part) = share.of(sample.levels, *background)
             {
-                band.push([sample.dx_px, sample.dy_px], part, share.variance);
+                band.push([sample.dx_px, sample.dy_px], (sector * PARTS / shares.len()) as u8, part, share.variance);
             }
         }
         band

@@ -45,7 +45,7 @@ pub struct Surroundings {
     /// Which channels count.
     channels: Channels,
     /// Where the background is better explained so.
-    extrusion: Option<(Extrusion, Disc)>,
+    extrusion: Option<Extrusion>,
 }
 
 /// Bound of a single pixel's misfit, squared standard deviations: a burnt-in line does not decide.
@@ -127,7 +127,7 @@ impl Surroundings {
     /// The background of a sector continued from the ring to a pixel.
     #[inline]
     pub fn background_at(&self, sector: usize, sample: &Sample) -> Levels {
-        let extruded = self.extrusion.as_ref().and_then(|(e, _)| e.at(sample.dx_px, sample.dy_px));
+        let extruded = self.extrusion.as_ref().and_then(|e| e.at(sample.dx_px, sample.dy_px));
         if let Some(levels) = extruded {
             return levels;
         }
@@ -146,7 +146,7 @@ impl Surroundings {
             // the background where the mark ends, not where the ring is read
             let inward = radius / sector.ring_px[0].hypot(sector.ring_px[1]).max(1e-3);
             let [x, y] = sector.ring_px.map(|p| inward * p);
-            let extruded = self.extrusion.as_ref().and_then(|(e, disc)| e.under(disc, x, y));
+            let extruded = self.extrusion.as_ref().and_then(|e| e.under(x, y));
             let background = extruded.unwrap_or_else(|| self.continued(sector, x, y));
             let reach_px = x.hypot(y).max(1e-3);
             let mark: Levels =
@@ -165,10 +165,10 @@ impl Surroundings {
         shares.iter().any(|s| s.variance.is_finite()).then_some(shares)
     }
 
-    /// The same, with a background that continues along one direction; `None` where it has none.
-    pub fn extruded(&self, patch: &Patch, zones: &Zones<'_>, outline: &Outline, disc: &Disc) -> Option<Self> {
-        let extrusion = Extrusion::of(patch, zones, outline, disc)?;
-        Some(Self { extrusion: Some((extrusion, *disc)), ..self.clone() })
+    /// The same, with a background that continues along one direction, in the ways that it may.
+    pub fn extruded(&self, patch: &Patch, zones: &Zones<'_>, outline: &Outline, disc: &Disc) -> Vec<Self> {
+        let ways = Extrusion::of(patch, zones, outline, disc).into_iter();
+        ways.map(|extrusion| Self { extrusion: Some(extrusion), ..self.clone() }).collect()
     }
 
     /// Mean square of what the band holds beside background and mark, in the channels' noise, single pixels bounded.

@@ -94,6 +94,18 @@ fn a_dark_line_through_the_mark_and_a_distant_object_do_not_move_it() {
     assert!(worst < 0.1 && mean[0].abs() < 0.04, "{worst} {mean:?}");
 }
 
+#[test]
+fn a_strip_hardly_wider_than_the_mark_and_bent_at_it_does_not_draw_it() {
+    for bend_rad in [-0.12f64, 0.0, 0.12] {
+        let (worst, mean) = errors(|x, y, t| {
+            let turn_rad = if y < t[1] { bend_rad } else { -bend_rad };
+            let across = (x - t[0]) * turn_rad.cos() + (y - t[1]) * turn_rad.sin();
+            if across.abs() < 12.5 { [0.82; 3] } else { [0.08, 0.08, 0.1] }
+        });
+        assert!(worst < 0.04 && mean[0].abs() < 0.015 && mean[1].abs() < 0.015, "{bend_rad}: {worst} {mean:?}");
+    }
+}
+
 /// A green ball of 40 px, lit from the upper left, before a beige wall.
 fn ball(truth: [f64; 2]) -> OwnedPicture {
     paint(84, 80, |x, y| {
