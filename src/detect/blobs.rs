@@ -2,7 +2,7 @@
 
 use std::rc::Rc;
 
-use super::centroid::{self, Centroid, Channels, Shading, Silhouette};
+use super::centroid::{self, Centroid, Channels, Conditions, Shading, Silhouette};
 use super::component::HueAxis;
 use super::mask::{Mask, Part};
 use super::plane::Plane;
@@ -67,7 +67,7 @@ const MOST_BLOBS: usize = 40;
 pub(super) fn find(
     picture: &Picture<'_>,
     target: &Target,
-    channels: Channels,
+    conditions: &Conditions<'_>,
     planes: &mut Planes,
     blobs: &mut Vec<Blob>,
 ) -> Result<()> {
@@ -76,12 +76,12 @@ pub(super) fn find(
         let silhouette = silhouette(picture, target, part, plane.as_deref());
         let samples = part.points.len() as u32;
         let binary_px = silhouette.centre_px;
-        let centroid = match channels {
+        let centroid = match conditions.channels {
             Channels::Chroma => None,
             _ if part.is_target() => centroid::of_target(picture, &silhouette),
             _ => None,
         };
-        let measure = || centroid::measure(picture, target.axis, &silhouette, channels, target.shading);
+        let measure = || centroid::measure(picture, target.axis, &silhouette, conditions);
         if let Some(centroid) = centroid.or_else(measure) {
             blobs.push(Blob { hue: target.hue, centroid, binary_px, samples });
         }
@@ -125,6 +125,8 @@ pub(super) fn glance(picture: &Picture<'_>, target: &Target, planes: &mut Planes
             area_px2: samples * sides_px[0] * sides_px[1],
             chroma_share: 0.0,
             cut: false,
+            known_behind: false,
+            misfit: 0.0,
         };
         if samples > 0.0 {
             blobs.push(Blob { hue: target.hue, centroid, binary_px, samples: part.points.len() as u32 });

@@ -11,25 +11,30 @@ mod morphology;
 mod plane;
 mod region;
 mod samples;
+mod scene;
 mod shading;
 mod siting;
 mod threshold;
 
 pub use blobs::Blob;
 pub use calibration::{COUNTS, Spot, Trial};
-pub use centroid::{Centroid, Channels, Shading};
+use centroid::Conditions;
+pub use centroid::{Centroid, Channels, Mixing, Shading};
 pub use mask::Part;
 pub use samples::{Album, HuePeak};
+pub use scene::scene;
 pub use shading::ShadingSurvey;
 pub use siting::{Siting, SitingSurvey};
 pub use threshold::LEAST_COMPONENT;
+
+use std::sync::Arc;
 
 use blobs::{Planes, Target};
 use component::{HueAxis, from_255};
 
 use crate::error::Result;
 use crate::experiment::MarkColour;
-use crate::video::{Layout, Matrix, Picture};
+use crate::video::{Layout, Matrix, OwnedPicture, Picture};
 
 /// What marks look like, and how they are found.
 #[derive(Debug, Clone, PartialEq)]
@@ -95,6 +100,8 @@ pub struct Detector {
     hues: Vec<Hue>,
     least_area_px2: f64,
     siting: Option<Siting>,
+    scene: Option<Arc<OwnedPicture>>,
+    mixing: Mixing,
 }
 
 /// Smallest mark that is looked for.
@@ -103,12 +110,28 @@ pub const LEAST_AREA_PX2: f64 = 12.0;
 impl Detector {
     /// A detector for `hues`.
     pub fn new(hues: Vec<Hue>) -> Self {
-        Self { hues, least_area_px2: LEAST_AREA_PX2, siting: None }
+        Self { hues, least_area_px2: LEAST_AREA_PX2, siting: None, scene: None, mixing: Mixing::default() }
     }
 
     /// With chroma samples where the recording shows them to lie.
     pub fn with_siting(self, siting: Option<Siting>) -> Self {
         Self { siting, ..self }
+    }
+
+    /// With marks that mix in this way with what is behind them.
+    pub const fn with_mixing(mut self, mixing: Mixing) -> Self {
+        self.mixing = mixing;
+        self
+    }
+
+    /// With a picture of what stands still.
+    pub fn with_scene(self, scene: Option<Arc<OwnedPicture>>) -> Self {
+        Self { scene, ..self }
+    }
+
+    /// Where it takes the chroma samples to lie.
+    pub const fn siting(&self) -> Option<Siting> {
+        self.siting
     }
 
     /// The hues it looks for.
@@ -138,8 +161,14 @@ impl Detector {
     /// As [`Detector::detect`].
     pub fn detect_by(&self, picture: &Picture<'_>, channels: Channels) -> Result<Vec<Blob>> {
         let (mut blobs, mut planes) = (Vec::new(), Planes::default());
+        let size = |layout: &Layout| (layout.width_px, layout.height_px, layout.bits);
+        let scene = self.scene.as_ref().filter(|scene| size(&scene.layout) == size(&picture.layout));
+        let scene = scene.map(|scene| Picture { layout: picture.layout, ..scene.view() });
         for (index, hue) in self.hues.iter().enumerate() {
-            blobs::find(picture, &self.target(index, hue, picture), channels, &mut planes, &mut blobs)?;
+            let target = self.target(index, hue, picture);
+            let (shading, mixing, scene) = (target.shading, self.mixing, scene.as_ref());
+            let conditions = Conditions { channels, shading, mixing, scene };
+            blobs::find(picture, &target, &conditions, &mut planes, &mut blobs)?;
         }
         Ok(blobs)
     }

@@ -1,9 +1,8 @@
 //! Pictures of a recording, kept at chroma resolution, and what moves between them.
 
-use std::ops::Range;
-
 use super::LEAST_AREA_PX2;
 use super::component::{HueAxis, luma_row};
+use super::scene::median_plane;
 use crate::statistics::median;
 use crate::steady::CameraShift;
 use crate::video::{Matrix, Picture};
@@ -242,8 +241,7 @@ impl Album {
             } else {
                 steadied.iter().map(Vec::as_slice).collect()
             };
-            let length = planes.first().map_or(0, |p| p.len());
-            (0..length).step_by(STRETCH).flat_map(|at| medians(&planes, at..(at + STRETCH).min(length))).collect()
+            median_plane(&planes)
         })
     }
 
@@ -251,24 +249,6 @@ impl Album {
     pub fn sample_px2(&self) -> f64 {
         f64::from(1u32 << (self.shifts[0] + self.shifts[1]))
     }
-}
-
-/// Samples of a plane whose medians are found together.
-const STRETCH: usize = 4096;
-
-/// The median over the planes of every sample in a range.
-fn medians(planes: &[&[u8]], range: Range<usize>) -> Vec<u8> {
-    let mut sorted: Vec<Vec<u8>> = planes.iter().map(|plane| plane[range.clone()].to_vec()).collect();
-    // sorted by exchanging neighbours, all samples at once: plain loops over bytes, which the compiler turns into vector instructions
-    for last in (1..sorted.len()).rev() {
-        for at in 0..last {
-            let (lower, upper) = sorted.split_at_mut(at + 1);
-            for (a, b) in lower[at].iter_mut().zip(&mut upper[0]) {
-                (*a, *b) = ((*a).min(*b), (*a).max(*b));
-            }
-        }
-    }
-    sorted.swap_remove(planes.len() / 2)
 }
 
 /// A hue that things in the pictures have.

@@ -146,7 +146,8 @@ pub struct Session<'a> {
     /// Its pictures, where it is not known yet what is sought.
     pictures: Vec<OwnedPicture>,
     hues: Vec<Hue>,
-    siting: Option<Siting>,
+    /// It knows what the pictures show of all marks.
+    detector: Detector,
     slots: Vec<MarkSlot>,
     background: Option<Background>,
     /// As the pictures looked at beforehand show it.
@@ -189,7 +190,7 @@ impl<'a> Session<'a> {
             sampled_s,
             pictures,
             hues,
-            siting: None,
+            detector: Detector::new(Vec::new()),
             slots,
             background,
             first_camera: camera,
@@ -205,10 +206,10 @@ impl<'a> Session<'a> {
         Ok(session)
     }
 
-    /// Shading of the marks and siting of the chroma, from pictures that are not needed any more.
+    /// Shading of the marks, siting of the chroma and what lies behind, from pictures that are not needed any more.
     fn survey_light(&mut self) -> Result<()> {
-        survey::shade(&self.pictures, &mut self.hues)?;
-        self.siting = survey::siting(&self.pictures, &self.hues)?;
+        self.detector = survey::detector(&self.pictures, self.hues.clone(), self.background.is_none())?;
+        self.hues = self.detector.hues().to_vec();
         self.pictures.clear();
         Ok(())
     }
@@ -274,7 +275,7 @@ impl<'a> Session<'a> {
     fn attempt(&mut self, progress: &dyn Progress) -> Result<Measurement> {
         self.rewind()?;
         let mut tracker = Tracker::new(self.slots.clone(), self.options.rig.pivot_px);
-        let detector = Detector::new(self.hues.clone()).with_siting(self.siting);
+        let detector = self.detector.clone();
         let decoded = self.each_frame(&detector, progress, &mut |frame| tracker.push(frame))?;
         progress.begin("angles", None);
         self.conclude(decoded, tracker)
@@ -284,11 +285,9 @@ impl<'a> Session<'a> {
     ///
     /// # Errors
     /// As [`measure`].
-    pub fn gather(&mut self, mut hues: Vec<Hue>, progress: &dyn Progress) -> Result<Vec<FrameBlobs>> {
+    pub fn gather(&mut self, hues: Vec<Hue>, progress: &dyn Progress) -> Result<Vec<FrameBlobs>> {
         self.rewind()?;
-        survey::shade(&self.pictures, &mut hues)?;
-        let siting = survey::siting(&self.pictures, &hues)?;
-        let detector = Detector::new(hues).with_siting(siting);
+        let detector = survey::detector(&self.pictures, hues, self.background.is_none())?;
         let mut frames = Vec::new();
         self.each_frame(&detector, progress, &mut |frame| frames.push(frame))?;
         self.camera.finish(self.stamps_s.len());
@@ -360,7 +359,7 @@ impl<'a> Session<'a> {
         let angles = angles_from_tracks(&tracks, &self.calibration, rig.pivot_px, self.options.angle_source)?;
         self.camera.finish(self.stamps_s.len());
         let (stream, hues, camera) = (self.stream.clone(), self.hues.clone(), self.camera);
-        let siting = self.siting;
+        let siting = self.detector.siting();
         let marks = self.slots.iter().map(|slot| hues[usize::from(slot.hue)].colour.clone()).collect();
         Ok(Measurement { stream, decoded, timing, hues, marks, tracks, angles, file_t_s, time_scale, camera, siting })
     }

@@ -1,11 +1,15 @@
 //! What pictures spread over a recording show before it is measured: what moves, whether the camera does, where the
 //! chroma samples lie.
 
+use std::sync::Arc;
+
 use rayon::iter::{IntoParallelRefIterator, ParallelIterator};
 
 use super::{Camera, Options, Steadying};
 use crate::area::Area;
-use crate::detect::{Album, Detector, Hue, Shading, ShadingSurvey, Siting, SitingSurvey};
+use crate::detect::{
+    Album, Blob, Detector, Hue, Mixing, Shading, ShadingSurvey, Siting, SitingSurvey, scene as scene_of,
+};
 use crate::error::Result;
 use crate::experiment::Rig;
 use crate::steady::{Background, CameraShift};
@@ -18,6 +22,10 @@ const CAMERA_MOVES_PX: f64 = 0.3;
 /// Standard deviations beyond which a shift is one, and pictures that must show it.
 const SURE_SHIFT: f64 = 5.0;
 const FEWEST_PICTURES: usize = 3;
+
+/// Standard deviations of the mean by which marks that are mixed by their light must fit better (the one-standard-error rule of Breiman et al., Classification and
+/// Regression Trees, 1984).
+const BETTER_MIXING: f64 = 1.0;
 
 /// The pictures, of the part of the recording that is measured, and their stamps.
 pub fn pictures(recording: &Recording, rig: &Rig) -> Result<(Vec<OwnedPicture>, Vec<f64>)> {
@@ -43,8 +51,19 @@ pub fn album(pictures: &[OwnedPicture], area: &Area, orientation: Orientation) -
     album
 }
 
+/// A detector of these hues that knows what the pictures show of all of them: from which side marks are lit, how they mix with what is behind them, where the chroma
+/// samples lie, and, where the camera stands `still`, what is behind them.
+pub fn detector(pictures: &[OwnedPicture], mut hues: Vec<Hue>, still: bool) -> Result<Detector> {
+    shade(pictures, &mut hues)?;
+    let mixing = mixing(pictures, &hues)?;
+    let siting = siting(pictures, &hues, mixing)?;
+    let detector = Detector::new(hues).with_mixing(mixing).with_siting(siting);
+    let scene = if still { scene(pictures, &detector)? } else { None };
+    Ok(detector.with_scene(scene))
+}
+
 /// From which side the marks are lit, learnt by every hue.
-pub fn shade(pictures: &[OwnedPicture], hues: &mut [Hue]) -> Result<()> {
+fn shade(pictures: &[OwnedPicture], hues: &mut [Hue]) -> Result<()> {
     let detector = Detector::new(hues.to_vec());
     let survey = over(pictures, |picture| ShadingSurvey::see(picture, &detector), ShadingSurvey::with)?;
     let shadings = survey.unwrap_or_default().conclude();
@@ -52,16 +71,50 @@ pub fn shade(pictures: &[OwnedPicture], hues: &mut [Hue]) -> Result<()> {
     Ok(())
 }
 
+/// How the marks mix with what is behind them: as explains better what their edges hold.
+fn mixing(pictures: &[OwnedPicture], hues: &[Hue]) -> Result<Mixing> {
+    let [codes, light] = [Mixing::Codes, Mixing::Light].map(|mixing| Detector::new(hues.to_vec()).with_mixing(mixing));
+    let of_picture = |picture: &Picture<'_>| -> Result<Vec<f64>> {
+        let (by_codes, by_light) = (codes.detect(picture)?, light.detect(picture)?);
+        let better = |blob: &Blob| {
+            // the same mask gave both
+            let same = by_light.iter().find(|other| (other.hue, other.binary_px) == (blob.hue, blob.binary_px))?;
+            let [codes, light] = [blob, same].map(|blob| f64::from(blob.centroid.misfit));
+            (codes > 0.0 && light > 0.0).then(|| (codes / light).ln())
+        };
+        Ok(by_codes.iter().filter_map(better).collect())
+    };
+    let better = over(pictures, of_picture, |a, b| [a, b].concat())?.unwrap_or_default();
+    let n = better.len() as f64;
+    let mean = better.iter().sum::<f64>() / n.max(1.0);
+    let variance = better.iter().map(|own| (own - mean).powi(2)).sum::<f64>() / (n - 1.0).max(1.0);
+    Ok(if mean > BETTER_MIXING * (variance / n.max(1.0)).sqrt() { Mixing::Light } else { Mixing::Codes })
+}
+
 /// Where the chroma samples lie, from the marks.
-pub fn siting(pictures: &[OwnedPicture], hues: &[Hue]) -> Result<Option<Siting>> {
+fn siting(pictures: &[OwnedPicture], hues: &[Hue], mixing: Mixing) -> Result<Option<Siting>> {
     let survey = |hues: Vec<Hue>| {
-        let detector = Detector::new(hues);
+        let detector = Detector::new(hues).with_mixing(mixing);
         over(pictures, |picture| SitingSurvey::see(picture, &detector), SitingSurvey::with)
     };
     let even = |hue: &Hue| Hue { shading: Shading::default(), ..hue.clone() };
     let are_lit = hues.iter().any(|hue| hue.shading != Shading::default());
     let unshaded = if are_lit { survey(hues.iter().map(even).collect())? } else { None };
     Ok(survey(hues.to_vec())?.and_then(|survey| survey.conclude(unshaded.as_ref())))
+}
+
+/// What stands still behind the marks, where the pictures show it and it explains what lies around most marks better than what a single picture shows: a wall of one
+/// colour, or a strip that the marks are on, needs no second picture.
+fn scene(pictures: &[OwnedPicture], detector: &Detector) -> Result<Option<Arc<OwnedPicture>>> {
+    let Some(still) = scene_of(pictures) else { return Ok(None) };
+    let still = Arc::new(still);
+    let detector = detector.clone().with_scene(Some(Arc::clone(&still)));
+    let known = |picture: &Picture<'_>| {
+        let blobs = detector.detect(picture)?;
+        Ok([blobs.iter().filter(|blob| blob.centroid.known_behind).count(), blobs.len()])
+    };
+    let seen = over(pictures, known, |a, b| [a[0] + b[0], a[1] + b[1]])?;
+    Ok(seen.is_some_and(|[known, all]| 2 * known > all).then_some(still))
 }
 
 /// What all pictures show, put together; `None` where there is none.

@@ -59,6 +59,12 @@ impl Disc {
         [x - part * sx, y - part * sy]
     }
 
+    /// The same, swept across.
+    pub const fn turned(&self) -> Self {
+        let [x, y] = self.sweep_px;
+        Self { sweep_px: [-y, x], ..*self }
+    }
+
     /// Length of the sweep.
     pub fn sweep_length_px(&self) -> f32 {
         self.sweep_px[0].hypot(self.sweep_px[1])

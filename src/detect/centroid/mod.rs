@@ -33,16 +33,19 @@ mod surroundings;
 mod symmetry;
 mod zones;
 
+use std::rc::Rc;
+
 use super::component::HueAxis;
 use crate::video::Picture;
 use disc::Disc;
-use fit::{Band, Fit};
+use fit::Fit;
 pub use limb::Shading;
 use outline::Outline;
 use patch::Patch;
 use profile::Profile;
-use rim::Rim;
-use share::Share;
+use rim::{Rim, Shares};
+pub use share::Mixing;
+use share::{Mixture, Share};
 pub use silhouette::Silhouette;
 use surroundings::Surroundings;
 pub use symmetry::of_target;
@@ -57,6 +60,19 @@ pub enum Channels {
     Luma,
     /// The colour differences alone.
     Chroma,
+}
+
+/// What is known beforehand of how marks look.
+#[derive(Debug, Clone, Copy)]
+pub struct Conditions<'a> {
+    /// Which channels they are measured by.
+    pub channels: Channels,
+    /// How their levels differ around their edges.
+    pub shading: Shading,
+    /// How they mix with what is behind them.
+    pub mixing: Mixing,
+    /// What stands still behind them, if that is known.
+    pub scene: Option<&'a Picture<'a>>,
 }
 
 /// A mark, measured.
@@ -74,6 +90,10 @@ pub struct Centroid {
     pub chroma_share: f64,
     /// The boundary band reaches over the picture's edge.
     pub cut: bool,
+    /// What lies behind the mark is known from pictures in which it is elsewhere.
+    pub known_behind: bool,
+    /// Mean square of what the mark's edge holds beside mark and background, in the noise around it; 0 where that is not known.
+    pub misfit: f32,
 }
 
 /// Pixels that share one independent error: chroma samples of four pixels, and interpolation.
@@ -90,13 +110,14 @@ pub fn measure(
     picture: &Picture<'_>,
     axis: HueAxis,
     silhouette: &Silhouette,
-    channels: Channels,
-    shading: Shading,
+    conditions: &Conditions<'_>,
 ) -> Option<Centroid> {
     let mut outline = Outline::of(picture, axis, silhouette);
     let patch = Patch::read(picture, &outline);
+    let scene = conditions.scene.map(|scene| Rc::new(Patch::planes_of(scene, &outline)));
     let zones = Zones::of(&patch, &outline);
-    let surroundings = Surroundings::survey(&zones, &outline, channels, shading)?;
+    let mixture = Mixture::new(conditions.mixing, &picture.layout);
+    let surroundings = Surroundings::survey(&zones, &outline, (conditions.channels, conditions.shading, mixture))?;
     let shares = surroundings.shares(&outline)?;
     // the mask's outline is a staircase of chroma samples: the shares of mark give a finer one
     outline.refine(&sector_areas(&zones, &outline, &surroundings, &shares));
@@ -109,23 +130,26 @@ pub fn measure(
     let mut centroid = moments.centroid()?;
     let blur_px = BLUR_PX[usize::from(picture.layout.chroma_shift_x == 0)];
     let rim = Rim { samples: &zones.band };
-    let band = rim.mixtures(&shares, &rim.backgrounds(&surroundings));
+    let band = rim.mixtures(&Shares { by_sector: &shares, each: false }, &rim.backgrounds(&surroundings));
     let mut fitted = fit::fit(moments.disc(blur_px), &band, ROUGHLY_PX);
-    let reread;
-    let mut last = &zones;
+    let mut cut = zones.are_cut(&outline, picture);
+    let samples_sharing = PIXELS_SHARING / f64::from(zones.pixels_each);
     if let Some(first) = &fitted {
-        // mask and moments know the outline to a pixel, the disc to a tenth: the ring is read again
-        outline = outline.of_disc(&first.disc);
-        reread = Zones::of(&patch, &outline);
-        last = &reread;
-        if let Some((band, again)) = resurvey(&patch, &reread, &outline, &first.disc, &surroundings) {
-            fitted = fit::fit(first.disc, &band, EXACTLY_PX).or(fitted);
-            shares = again;
+        let look = |disc: &Disc| Look::at((picture, &patch, scene.as_ref()), &outline, disc, &surroundings);
+        // before clutter, moments may show the sweep across its true direction
+        let across = scene.is_some().then(|| first.disc.turned());
+        let mut looks: Vec<Look> = std::iter::once(first.disc).chain(across).filter_map(|disc| look(&disc)).collect();
+        if looks.len() > 1 {
+            // how well either explains what is seen shows once it is fitted
+            looks = looks.iter().filter_map(|found| look(&found.fit.as_ref()?.disc)).collect();
+        }
+        if let Some(best) = looks.into_iter().min_by(|a, b| a.misfit.total_cmp(&b.misfit)) {
+            (centroid.known_behind, centroid.misfit, cut) = (best.known, best.misfit, best.cut);
+            (fitted, shares) = (best.fit.or(fitted), best.shares);
         }
     }
     if let Some(Fit { disc, covariance_px2, by_parts_px2 }) = fitted {
         (centroid.x_px, centroid.y_px) = (f64::from(disc.centre_px[0]), f64::from(disc.centre_px[1]));
-        let samples_sharing = PIXELS_SHARING / f64::from(last.pixels_each);
         let [xx, yy, xy] = covariance_px2.map(|v| samples_sharing * v);
         let [x, y] = [(xx, 0), (yy, 1)].map(|(v, axis)| (by_parts_px2[axis] / v).max(1.0));
         centroid.variance_px2 = [x * xx, y * yy, (x * y).sqrt() * xy];
@@ -135,33 +159,56 @@ pub fn measure(
     let inside = centroid.x_px.abs() < reach && centroid.y_px.abs() < reach;
     centroid.x_px += outline.centre_px[0];
     centroid.y_px += outline.centre_px[1];
-    centroid.cut = last.are_cut(&outline, picture);
+    centroid.cut = cut;
     inside.then_some(centroid)
 }
 
-/// The surroundings of a disc, with what every sector's band holds beside it and the background, and the band itself.
-fn resurvey(
-    patch: &Patch,
-    zones: &Zones<'_>,
-    outline: &Outline,
-    disc: &Disc,
-    before: &Surroundings,
-) -> Option<(Band, Vec<Share>)> {
-    let mut surroundings = before.anew(zones, outline)?;
-    let rim = Rim { samples: &zones.band };
-    let of_disc = rim.of_disc(disc);
-    let mut backgrounds = rim.backgrounds(&surroundings);
-    let mut rests = rim.rests(&of_disc, &surroundings.shares(outline)?, &backgrounds);
-    for extruded in surroundings.extruded(patch, zones, outline, disc) {
-        let behind = rim.backgrounds(&extruded);
-        let others = rim.rests(&of_disc, &extruded.shares(outline)?, &behind);
-        if extruded.misfit(&others) < surroundings.misfit(&rests) {
-            (surroundings, rests, backgrounds) = (extruded, others, behind);
+/// A look at the surroundings of a disc that is roughly known: mask and moments know the outline to a pixel, the disc to a tenth, so the ring is read again.
+struct Look {
+    /// Its band reaches over the picture's edge.
+    cut: bool,
+    /// Of the disc that was known, by the background which explains its band best.
+    misfit: f32,
+    /// The background is that of other pictures.
+    known: bool,
+    shares: Vec<Share>,
+    fit: Option<Fit>,
+}
+
+impl Look {
+    /// With what every sector's band holds beside the disc and the background.
+    fn at(
+        (picture, patch, scene): (&Picture<'_>, &Patch, Option<&Rc<Patch>>),
+        before: &Outline,
+        disc: &Disc,
+        surroundings: &Surroundings,
+    ) -> Option<Self> {
+        let outline = before.of_disc(disc);
+        let zones = &Zones::of(patch, &outline);
+        let ring = surroundings.anew(zones, &outline)?;
+        let rim = Rim { samples: &zones.band };
+        let of_disc = rim.of_disc(disc);
+        let fitted = |surroundings: Surroundings| {
+            let backgrounds = rim.backgrounds(&surroundings);
+            let by_sector = surroundings.shares(&outline)?;
+            let shares = Shares { by_sector: &by_sector, each: surroundings.is_known() };
+            let rests = rim.rests(&of_disc, &shares, &backgrounds);
+            Some((ring.misfit(&rests), surroundings, rests, backgrounds))
+        };
+        let mut best = fitted(ring.clone())?;
+        let known = scene.and_then(|scene| ring.known(Rc::clone(scene), zones, &outline));
+        for other in ring.extruded(patch, zones, &outline, disc).into_iter().chain(known).filter_map(fitted) {
+            if other.0 < best.0 {
+                best = other;
+            }
         }
+        let (misfit, mut surroundings, rests, backgrounds) = best;
+        surroundings.learn_scatter(rim.samples.iter().map(|s| s.sector).zip(&rests));
+        let (shares, known) = (surroundings.shares(&outline)?, surroundings.is_known());
+        let band = rim.mixtures(&Shares { by_sector: &shares, each: known }, &backgrounds);
+        let fit = fit::fit(*disc, &band, EXACTLY_PX);
+        Some(Self { cut: zones.are_cut(&outline, picture), misfit, known, shares, fit })
     }
-    surroundings.learn_scatter(rim.samples.iter().map(|s| s.sector).zip(&rests));
-    let shares = surroundings.shares(outline)?;
-    Some((rim.mixtures(&shares, &backgrounds), shares))
 }
 
 /// Area of mark in every sector.
@@ -265,6 +312,8 @@ impl Moments {
             area_px2: self.area,
             chroma_share: 0.0,
             cut: false,
+            known_behind: false,
+            misfit: 0.0,
         })
     }
 }

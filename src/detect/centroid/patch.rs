@@ -53,6 +53,10 @@ impl Sample {
 /// How much farther a refined outline may reach.
 const REFINED_PX: f32 = 3.0;
 
+fn reach_of(outline: &Outline) -> f32 {
+    (outline.reach_px() + REFINED_PX).ceil()
+}
+
 /// The pixels within reach of a mark.
 pub struct Patch {
     left: usize,
@@ -68,8 +72,15 @@ pub struct Patch {
 impl Patch {
     /// Reads core, band and ring, and a little more for an outline that is refined later.
     pub fn read(picture: &Picture<'_>, outline: &Outline) -> Self {
+        let mut patch = Self::planes_of(picture, outline);
+        patch.gather(outline, reach_of(outline));
+        patch
+    }
+
+    /// The same pixels without their places.
+    pub fn planes_of(picture: &Picture<'_>, outline: &Outline) -> Self {
         let layout = picture.layout;
-        let reach = (outline.reach_px() + REFINED_PX).ceil();
+        let reach = reach_of(outline);
         let from = |c: f64, size: usize| (c - f64::from(reach)).clamp(0.0, size as f64) as usize;
         let to = |c: f64, size: usize| (c + f64::from(reach) + 1.0).clamp(0.0, size as f64) as usize;
         let [cx, cy] = outline.centre_px;
@@ -80,9 +91,14 @@ impl Patch {
         if width > 0 && height > 0 {
             patch.planes =
                 [patch.luma(picture), patch.chroma(picture, &picture.cb), patch.chroma(picture, &picture.cr)];
-            patch.gather(outline, reach);
         }
         patch
+    }
+
+    /// What lies at the place of another patch's sample, which was read around the same outline.
+    #[inline]
+    pub fn levels_at(&self, sample: &Sample) -> Levels {
+        [0, 1, 2].map(|k: usize| self.planes[k][sample.place as usize])
     }
 
     /// Luma is softened along both axes.
@@ -109,6 +125,9 @@ impl Patch {
     }
 
     fn gather(&mut self, outline: &Outline, reach: f32) {
+        if self.width == 0 || self.height == 0 {
+            return;
+        }
         self.samples.reserve(self.width * self.height);
         // whole rows first, in loops that the compiler can turn into vector instructions
         let dx: Vec<f32> = (0..self.width).map(|i| ((self.left + i) as f64 - outline.centre_px[0]) as f32).collect();

@@ -35,23 +35,39 @@ impl Rim<'_> {
     }
 
     /// What every pixel holds beside the disc and the background.
-    pub fn rests(&self, of_disc: &[f32], shares: &[Share], backgrounds: &[Levels]) -> Vec<Vector3<f32>> {
+    pub fn rests(&self, of_disc: &[f32], shares: &Shares<'_>, backgrounds: &[Levels]) -> Vec<Vector3<f32>> {
         let each = self.samples.iter().zip(of_disc).zip(backgrounds);
-        each.map(|((s, share), background)| shares[usize::from(s.sector)].rest(s.levels, *background, *share)).collect()
+        each.map(|((s, share), background)| shares.of(s, *background).rest(s.levels, *background, *share)).collect()
     }
 
     /// Those that are mixtures of mark and background, with the share of mark.
-    pub fn mixtures(&self, shares: &[Share], backgrounds: &[Levels]) -> Band {
+    pub fn mixtures(&self, shares: &Shares<'_>, backgrounds: &[Levels]) -> Band {
         let mut band = Band::default();
         for (sample, background) in self.samples.iter().zip(backgrounds) {
-            let sector = usize::from(sample.sector);
-            let share = &shares[sector];
+            let share = shares.of(sample, *background);
             if share.variance.is_finite()
                 && let Some(part) = share.of(sample.levels, *background)
             {
-                band.push([sample.dx_px, sample.dy_px], (sector * PARTS / shares.len()) as u8, part, share.variance);
+                let boundary = usize::from(sample.sector) * PARTS / shares.by_sector.len();
+                band.push([sample.dx_px, sample.dy_px], boundary as u8, part, share.variance);
             }
         }
         band
+    }
+}
+
+/// How the share of mark is read in every pixel.
+pub struct Shares<'a> {
+    /// By sector.
+    pub by_sector: &'a [Share],
+    /// Every pixel has a background of its own.
+    pub each: bool,
+}
+
+impl Shares<'_> {
+    #[inline]
+    fn of(&self, sample: &Sample, background: Levels) -> Share {
+        let share = self.by_sector[usize::from(sample.sector)];
+        if self.each { share.before(background) } else { share }
     }
 }

@@ -8,18 +8,78 @@
 //! α = n·(V − B),   n = M⁻¹ c / (cᵀ M⁻¹ c),   var α = 1 / (cᵀ M⁻¹ c),   M = N + S,   c = F − B
 //! ```
 //! so a direction in which the surroundings vary counts for nothing, and luma counts where one background explains it.
+//!
+//! A camera adds up light and then codes it, nearly as its square root, so that a pixel half mark and half bright background is brighter than the mean of their codes.
+//! With m what the code of an even mixture is above that mean,
+//!
+//! ```text
+//! V(α) ≈ B + α c + 4 α (1 − α) m,   n·(V − B) = α + κ α (1 − α),   κ = 4 n·m
+//! ```
 
 use nalgebra::{Matrix3, Vector3};
 
 use super::patch::Levels;
+use crate::video::{Layout, Matrix};
+
+/// How mark and background mix in a pixel.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub enum Mixing {
+    /// By their codes, as in most drawn pictures.
+    #[default]
+    Codes,
+    /// By their light, which is coded afterwards, as in a camera.
+    Light,
+}
+
+/// Mixing, and how colours are coded.
+#[derive(Debug, Clone, Copy)]
+pub struct Mixture {
+    mixing: Mixing,
+    matrix: Matrix,
+    /// Codes of black, and from black to white; and from neutral to a colour difference of 1.
+    luma: [f64; 2],
+    chroma: f64,
+}
+
+impl Mixture {
+    /// In a picture of this layout.
+    pub fn new(mixing: Mixing, layout: &Layout) -> Self {
+        let (luma, chroma) = if layout.full_range { ([0.0, 255.0], 255.0) } else { ([16.0, 219.0], 224.0) };
+        Self { mixing, matrix: layout.matrix, luma, chroma }
+    }
+
+    /// m of two colours.
+    fn bow(&self, mark: &Vector3<f32>, background: &Vector3<f32>) -> Vector3<f32> {
+        if self.mixing == Mixing::Codes {
+            return Vector3::zeros();
+        }
+        let [black, span] = self.luma;
+        let rgb = |codes: &Vector3<f32>| {
+            let [y, cb, cr] = [codes[0], codes[1], codes[2]].map(f64::from);
+            self.matrix.rgb([(y - black) / span, cb / self.chroma, cr / self.chroma]).map(|c| c.max(0.0))
+        };
+        let (mark, background) = (rgb(mark), rgb(background));
+        let above =
+            |k: usize| (0.5 * (mark[k].powi(2) + background[k].powi(2))).sqrt() - 0.5 * (mark[k] + background[k]);
+        let [y, cb, cr] = self.matrix.ycbcr([0, 1, 2].map(above));
+        Vector3::new((span * y) as f32, (self.chroma * cb) as f32, (self.chroma * cr) as f32)
+    }
+}
 
 /// How the three channels of a pixel in one sector give its share of mark.
 #[derive(Debug, Clone, Copy)]
 pub struct Share {
+    /// F.
+    mark: Vector3<f32>,
     /// n.
     factors: Vector3<f32>,
     /// c.
     contrast: Vector3<f32>,
+    mixture: Mixture,
+    /// 4 m.
+    bow: Vector3<f32>,
+    /// κ.
+    curvature: f32,
     /// M⁻¹.
     weight: Matrix3<f32>,
     /// Variance of the share.
@@ -33,23 +93,52 @@ const FOREIGN: f32 = 100.0;
 
 impl Share {
     /// For a mark of colour `mark` before `background`, with the covariance `M` of what is neither.
-    pub fn new(mark: Levels, background: Levels, covariance: &Matrix3<f32>) -> Self {
-        let contrast = Vector3::from(mark) - Vector3::from(background);
+    pub fn new(mark: Levels, background: Levels, covariance: &Matrix3<f32>, mixture: Mixture) -> Self {
         let weight = covariance.try_inverse().unwrap_or_else(Matrix3::zeros);
+        Self::weighted(Vector3::from(mark), background, weight, mixture)
+    }
+
+    /// The same before another background.
+    #[inline]
+    pub fn before(&self, background: Levels) -> Self {
+        Self::weighted(self.mark, background, self.weight, self.mixture)
+    }
+
+    #[inline]
+    fn weighted(mark: Vector3<f32>, background: Levels, weight: Matrix3<f32>, mixture: Mixture) -> Self {
+        let background = Vector3::from(background);
+        let contrast = mark - background;
         let direction = weight * contrast;
         let information = contrast.dot(&direction);
-        if !(information > 1e-6) {
-            return Self { factors: Vector3::zeros(), contrast, weight, variance: f32::INFINITY };
-        }
-        Self { factors: direction / information, contrast, weight, variance: 1.0 / information }
+        let (factors, variance) = if information > 1e-6 {
+            (direction / information, 1.0 / information)
+        } else {
+            (Vector3::zeros(), f32::INFINITY)
+        };
+        let bow = 4.0 * mixture.bow(&mark, &background);
+        Self { mark, factors, contrast, mixture, bow, curvature: factors.dot(&bow).clamp(-0.9, 0.9), weight, variance }
+    }
+
+    /// What a share of mark adds to the background.
+    #[inline]
+    fn added(&self, share: f32) -> Vector3<f32> {
+        let within = share.clamp(0.0, 1.0);
+        share * self.contrast + within * (1.0 - within) * self.bow
     }
 
     /// The share, or `None` for a pixel that is no mixture of mark and background.
     #[inline]
     pub fn of(&self, levels: Levels, background: Levels) -> Option<f32> {
         let above = Vector3::from(levels) - Vector3::from(background);
-        let share = self.factors.dot(&above);
-        let rest = above - share * self.contrast;
+        let seen = self.factors.dot(&above);
+        let share = if (0.0..=1.0).contains(&seen) {
+            // of α + κ α (1 − α) = seen, the root between 0 and 1
+            let linear = 1.0 + self.curvature;
+            2.0 * seen / (linear + (linear * linear - 4.0 * self.curvature * seen).max(0.0).sqrt())
+        } else {
+            seen
+        };
+        let rest = above - self.added(share);
         let foreign =
             !(-BEYOND_MIXTURE..=1.0 + BEYOND_MIXTURE).contains(&share) || rest.dot(&(self.weight * rest)) > FOREIGN;
         (!foreign).then_some(share)
@@ -58,7 +147,7 @@ impl Share {
     /// What a pixel holds beside `share` of the mark.
     #[inline]
     pub fn rest(&self, levels: Levels, background: Levels, share: f32) -> Vector3<f32> {
-        Vector3::from(levels) - Vector3::from(background) - share * self.contrast
+        Vector3::from(levels) - Vector3::from(background) - self.added(share)
     }
 }
 

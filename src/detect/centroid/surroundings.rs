@@ -1,5 +1,7 @@
 //! What lies around a mark: its background in every sector, the mark's own levels, the noise.
 
+use std::rc::Rc;
+
 use nalgebra::{Matrix3, Vector3};
 
 use super::Channels;
@@ -8,7 +10,7 @@ use super::extrusion::Extrusion;
 use super::limb::Shading;
 use super::outline::{Outline, RING_PX};
 use super::patch::{CHANNELS, Levels, Patch, Sample};
-use super::share::Share;
+use super::share::{Mixture, Share};
 use super::zones::Zones;
 use crate::statistics::median;
 
@@ -44,18 +46,36 @@ pub struct Surroundings {
     scatter: Vec<Matrix3<f32>>,
     /// Which channels count.
     channels: Channels,
-    /// Where the background is better explained so.
-    extrusion: Option<Extrusion>,
+    mixture: Mixture,
+    /// How the background goes on from the ring to the mark.
+    behind: Behind,
+}
+
+/// How the background goes on from the ring to the mark.
+#[derive(Clone)]
+enum Behind {
+    /// As it is in the ring, sector by sector.
+    Ring,
+    /// As it continues along a direction.
+    Along(Extrusion),
+    /// As other pictures show it, the light of this one added.
+    Known(Rc<Patch>, Levels),
 }
 
 /// Bound of a single pixel's misfit, squared standard deviations: a burnt-in line does not decide.
 const MOST_MISFIT: f32 = 400.0;
+/// Least information on the mark's edge before a known background, as a share of what there is before the ring's.
+const LEAST_SEEN: f32 = 0.5;
 /// Variance of a channel that does not count, squared codes.
 const UNUSED: f32 = 1e6;
 
 impl Surroundings {
     /// Reads ring and core. `None` where most of the ring lies outside the picture.
-    pub fn survey(zones: &Zones<'_>, outline: &Outline, channels: Channels, shading: Shading) -> Option<Self> {
+    pub fn survey(
+        zones: &Zones<'_>,
+        outline: &Outline,
+        (channels, shading, mixture): (Channels, Shading, Mixture),
+    ) -> Option<Self> {
         // a mark narrower than its band has no core: its deepest pixel stands for it
         let mark = if zones.core.len() >= 4 {
             [0, 1, 2].map(|k| median(&mut zones.core.iter().map(|s| s.levels[k]).collect::<Vec<_>>()).unwrap_or(0.0))
@@ -72,7 +92,8 @@ impl Surroundings {
             slope: Default::default(),
             scatter,
             channels,
-            extrusion: None,
+            mixture,
+            behind: Behind::Ring,
         };
         surroundings.read_ring(&zones.ring, outline)?;
         surroundings.slope = [0, 1, 2].map(|k| background_slope(&surroundings.sectors, k, surroundings.noise[k]));
@@ -81,7 +102,7 @@ impl Surroundings {
 
     /// The same by another outline.
     pub fn anew(&self, zones: &Zones<'_>, outline: &Outline) -> Option<Self> {
-        Self::survey(zones, outline, self.channels, self.shading)
+        Self::survey(zones, outline, (self.channels, self.shading, self.mixture))
     }
 
     fn read_ring(&mut self, ring: &[&Sample], outline: &Outline) -> Option<()> {
@@ -127,11 +148,17 @@ impl Surroundings {
     /// The background of a sector continued from the ring to a pixel.
     #[inline]
     pub fn background_at(&self, sector: usize, sample: &Sample) -> Levels {
-        let extruded = self.extrusion.as_ref().and_then(|e| e.at(sample.dx_px, sample.dy_px));
-        if let Some(levels) = extruded {
-            return levels;
-        }
-        self.continued(&self.sectors[sector], sample.dx_px, sample.dy_px)
+        let levels = match &self.behind {
+            Behind::Ring => None,
+            Behind::Along(extrusion) => extrusion.at(sample.dx_px, sample.dy_px),
+            Behind::Known(scene, light) => Some(lit(scene.levels_at(sample), *light)),
+        };
+        levels.unwrap_or_else(|| self.continued(&self.sectors[sector], sample.dx_px, sample.dy_px))
+    }
+
+    /// Every pixel has a background of its own.
+    pub const fn is_known(&self) -> bool {
+        matches!(self.behind, Behind::Known(..))
     }
 
     #[inline]
@@ -146,7 +173,10 @@ impl Surroundings {
             // the background where the mark ends, not where the ring is read
             let inward = radius / sector.ring_px[0].hypot(sector.ring_px[1]).max(1e-3);
             let [x, y] = sector.ring_px.map(|p| inward * p);
-            let extruded = self.extrusion.as_ref().and_then(|e| e.under(x, y));
+            let extruded = match &self.behind {
+                Behind::Along(extrusion) => extrusion.under(x, y),
+                Behind::Ring | Behind::Known(..) => None,
+            };
             let background = extruded.unwrap_or_else(|| self.continued(sector, x, y));
             let reach_px = x.hypot(y).max(1e-3);
             let mark: Levels =
@@ -159,7 +189,7 @@ impl Surroundings {
             };
             let variances = Vector3::new(variance(0) + luma, variance(1) + chroma, variance(2) + chroma);
             let noise = Matrix3::from_diagonal(&variances);
-            Share::new(mark, background, &(noise + scatter))
+            Share::new(mark, background, &(noise + scatter), self.mixture)
         };
         let shares: Vec<Share> = self.sectors.iter().zip(&outline.radii_px).zip(&self.scatter).map(share).collect();
         shares.iter().any(|s| s.variance.is_finite()).then_some(shares)
@@ -168,7 +198,27 @@ impl Surroundings {
     /// The same, with a background that continues along one direction, in the ways that it may.
     pub fn extruded(&self, patch: &Patch, zones: &Zones<'_>, outline: &Outline, disc: &Disc) -> Vec<Self> {
         let ways = Extrusion::of(patch, zones, outline, disc).into_iter();
-        ways.map(|extrusion| Self { extrusion: Some(extrusion), ..self.clone() }).collect()
+        ways.map(|extrusion| Self { behind: Behind::Along(extrusion), ..self.clone() }).collect()
+    }
+
+    /// The same, with a background that other pictures show; `None` where they show the mark itself there, so that it would hardly stand out.
+    pub fn known(&self, scene: Rc<Patch>, zones: &Zones<'_>, outline: &Outline) -> Option<Self> {
+        let off = |sample: &&Sample, k: usize| sample.levels[k] - scene.levels_at(sample)[k];
+        let offs = |k: usize| zones.ring.iter().map(|s| off(s, k)).collect::<Vec<f32>>();
+        let light = [0, 1, 2].map(|k| median(&mut offs(k)).unwrap_or(0.0));
+        let scatter = |k: usize| {
+            let mut sizes: Vec<f32> = offs(k).iter().map(|off| (off - light[k]).abs()).collect();
+            (1.4826 * median(&mut sizes).unwrap_or(0.0)).max(LEAST_NOISE)
+        };
+        let known = Self { noise: [0, 1, 2].map(scatter), behind: Behind::Known(scene, light), ..self.clone() };
+        let shares = self.shares(outline)?;
+        let (mut by_ring, mut by_scene) = (0.0, 0.0);
+        for sample in &zones.band {
+            let sector = usize::from(sample.sector);
+            by_ring += 1.0 / shares[sector].variance;
+            by_scene += 1.0 / shares[sector].before(known.background_at(sector, sample)).variance;
+        }
+        (by_scene > LEAST_SEEN * by_ring).then_some(known)
     }
 
     /// Mean square of what the band holds beside background and mark, in the channels' noise, single pixels bounded.
@@ -195,6 +245,10 @@ impl Surroundings {
             }
         }
     }
+}
+
+fn lit(levels: Levels, light: Levels) -> Levels {
+    [0, 1, 2].map(|k| levels[k] + light[k])
 }
 
 /// The levels of samples, those of the first sector first, and where in them each of `count` sectors ends.

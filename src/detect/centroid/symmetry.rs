@@ -40,6 +40,8 @@ pub fn of_target(picture: &Picture<'_>, silhouette: &Silhouette) -> Option<Centr
                 area_px2,
                 chroma_share: 0.0,
                 cut: false,
+                known_behind: false,
+                misfit: 0.0,
             });
         }
     }
