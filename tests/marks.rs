@@ -141,6 +141,9 @@ fn what_init_writes_is_enough_to_track_and_says_what_is_still_to_be_measured() {
     assert_eq!(column(&bench.table(), "theta2_rad").len(), column(&bench.table(), "t_s").len());
     let words = refused(&bench.freeswing(&["fit", "angles.csv", "--config", "experiment.toml"]));
     assert!(words.contains("specimen.link_lengths_m is still to be measured"), "{words}");
+    // frequency and damping need no ruler
+    let words = done(&bench.freeswing(&["identify", "angles.csv", "--config", "experiment.toml"]));
+    assert!(words.contains("still to be measured") && words.contains("going on without the specimen"), "{words}");
     assert!(refused(&bench.freeswing(&["init", "swing.mp4"])).contains("exists already"));
 }
 

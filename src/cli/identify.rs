@@ -50,7 +50,7 @@ impl IdentifyArgs {
     /// # Errors
     /// One line: what, where, what to do.
     pub fn run(&self, console: &Console) -> Result<()> {
-        let experiment = self.config.as_deref().map(Experiment::read).transpose()?;
+        let experiment = self.config.as_deref().map(Experiment::read_as_far_as_measured).transpose()?;
         let experiment = experiment.filter(|experiment| describes_specimen(experiment, console));
         let json = self.json.as_deref().map(OutputFile::create).transpose()?;
         let (series, measured) = AngleSeries::read_motion(&self.angles)?;

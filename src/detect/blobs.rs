@@ -23,6 +23,13 @@ pub struct Blob {
     pub samples: u32,
 }
 
+impl Blob {
+    /// The same mask of the same picture gave both.
+    pub fn has_mask_of(&self, other: &Self) -> bool {
+        (self.hue, self.binary_px) == (other.hue, other.binary_px)
+    }
+}
+
 /// What is looked for.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Target {
@@ -125,7 +132,7 @@ pub(super) fn glance(picture: &Picture<'_>, target: &Target, planes: &mut Planes
             area_px2: samples * sides_px[0] * sides_px[1],
             chroma_share: 0.0,
             cut: false,
-            known_behind: false,
+            known_behind: None,
             misfit: 0.0,
         };
         if samples > 0.0 {

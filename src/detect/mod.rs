@@ -161,8 +161,9 @@ impl Detector {
     /// As [`Detector::detect`].
     pub fn detect_by(&self, picture: &Picture<'_>, channels: Channels) -> Result<Vec<Blob>> {
         let (mut blobs, mut planes) = (Vec::new(), Planes::default());
-        let size = |layout: &Layout| (layout.width_px, layout.height_px, layout.bits);
-        let scene = self.scene.as_ref().filter(|scene| size(&scene.layout) == size(&picture.layout));
+        let site = picture.layout.chroma_site_px;
+        let is_alike = |layout: &Layout| Layout { chroma_site_px: site, ..*layout } == picture.layout;
+        let scene = self.scene.as_ref().filter(|scene| is_alike(&scene.layout));
         let scene = scene.map(|scene| Picture { layout: picture.layout, ..scene.view() });
         for (index, hue) in self.hues.iter().enumerate() {
             let target = self.target(index, hue, picture);

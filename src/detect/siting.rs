@@ -5,8 +5,8 @@
 //! colour differences alone; the difference of the two is the error of the stated site. Sites lie at a luma sample or
 //! midway between two: each has a probability, and mean and standard deviation over them are what is used.
 
+use super::Detector;
 use super::centroid::Channels;
-use super::{Blob, Detector};
 use crate::error::Result;
 use crate::video::{Layout, Picture};
 
@@ -55,9 +55,7 @@ impl SitingSurvey {
         let luma = detector.detect_by(picture, Channels::Luma)?;
         let colour = detector.detect_by(picture, Channels::Chroma)?;
         for a in &luma {
-            // the same mask gave both
-            let same = |b: &&Blob| (a.hue, a.binary_px) == (b.hue, b.binary_px);
-            let Some(b) = colour.iter().find(same) else { continue };
+            let Some(b) = colour.iter().find(|b| b.has_mask_of(a)) else { continue };
             let (p, q) = (&a.centroid, &b.centroid);
             survey.differences[0].push([p.x_px - q.x_px, p.variance_px2[0] + q.variance_px2[0]]);
             survey.differences[1].push([p.y_px - q.y_px, p.variance_px2[1] + q.variance_px2[1]]);

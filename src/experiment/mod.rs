@@ -90,6 +90,18 @@ impl Experiment {
         Ok(experiment)
     }
 
+    /// The same for work that says more where the specimen is described: a key that is still to be measured is one that is missing.
+    ///
+    /// # Errors
+    /// As [`Experiment::read`].
+    pub fn read_as_far_as_measured(path: &Path) -> Result<Self> {
+        let text = std::fs::read_to_string(path).map_err(|e| Error::unreadable(path, e))?;
+        let waiting = unmeasured::refuse(&text, path).err();
+        let mut experiment = Self::parse(&unmeasured::without(&text), path)?;
+        experiment.missing = waiting.map(|error| error.to_string()).or(experiment.missing);
+        Ok(experiment)
+    }
+
     /// The same for work that needs the specimen.
     ///
     /// # Errors

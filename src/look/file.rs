@@ -44,7 +44,7 @@ pub fn to_toml(finding: &Finding, video: &str, part: &Rig) -> String {
          # Next: track {video} --config THIS_FILE --out angles.csv\n\
          # then: freeswing identify angles.csv\n\
          # Lengths and mass are marked \"MEASURE\": put numbers there before `freeswing fit` or `diagnose`; `track` and\n\
-         # `identify` without --config do not need them.\n\n"
+         # `identify` do not need them.\n\n"
     );
     specimen(&mut text, finding);
     rig(&mut text, finding);

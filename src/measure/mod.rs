@@ -150,6 +150,8 @@ pub struct Session<'a> {
     detector: Detector,
     slots: Vec<MarkSlot>,
     background: Option<Background>,
+    /// The camera stands still.
+    still: bool,
     /// As the pictures looked at beforehand show it.
     first_camera: Camera,
     camera: Camera,
@@ -173,7 +175,7 @@ impl<'a> Session<'a> {
         let marks = || album.calibrate(&mut hues, options.threshold);
         let (trials, surveyed) = rayon::join(marks, || survey::camera(&pictures, options, &stream));
         let mut trials = trials?;
-        let SurveyedCamera { background, camera, shifts } = surveyed;
+        let SurveyedCamera { background, camera, still, shifts } = surveyed;
         if album.steady(shifts) {
             hues = sought;
             trials = album.calibrate(&mut hues, options.threshold)?;
@@ -193,6 +195,7 @@ impl<'a> Session<'a> {
             detector: Detector::new(Vec::new()),
             slots,
             background,
+            still,
             first_camera: camera,
             camera,
             stamps_s,
@@ -208,7 +211,7 @@ impl<'a> Session<'a> {
 
     /// Shading of the marks, siting of the chroma and what lies behind, from pictures that are not needed any more.
     fn survey_light(&mut self) -> Result<()> {
-        self.detector = survey::detector(&self.pictures, self.hues.clone(), self.background.is_none())?;
+        self.detector = survey::detector(&self.pictures, self.hues.clone(), self.still)?;
         self.hues = self.detector.hues().to_vec();
         self.pictures.clear();
         Ok(())
@@ -287,7 +290,11 @@ impl<'a> Session<'a> {
     /// As [`measure`].
     pub fn gather(&mut self, hues: Vec<Hue>, progress: &dyn Progress) -> Result<Vec<FrameBlobs>> {
         self.rewind()?;
-        let detector = survey::detector(&self.pictures, hues, self.background.is_none())?;
+        let detector = if self.detector.hues() == hues {
+            self.detector.clone()
+        } else {
+            survey::detector(&self.pictures, hues, self.still)?
+        };
         let mut frames = Vec::new();
         self.each_frame(&detector, progress, &mut |frame| frames.push(frame))?;
         self.camera.finish(self.stamps_s.len());

@@ -26,6 +26,10 @@ const FEWEST_PICTURES: usize = 3;
 /// Standard deviations of the mean by which marks that are mixed by their light must fit better (the one-standard-error rule of Breiman et al., Classification and
 /// Regression Trees, 1984).
 const BETTER_MIXING: f64 = 1.0;
+/// What is at the same place to this, px, in most pictures stands still.
+const AT_REST_PX: f64 = 2.0;
+/// Fewest marks that tell how they mix.
+const FEWEST_MIXED: usize = 4;
 
 /// The pictures, of the part of the recording that is measured, and their stamps.
 pub fn pictures(recording: &Recording, rig: &Rig) -> Result<(Vec<OwnedPicture>, Vec<f64>)> {
@@ -55,11 +59,15 @@ pub fn album(pictures: &[OwnedPicture], area: &Area, orientation: Orientation) -
 /// samples lie, and, where the camera stands `still`, what is behind them.
 pub fn detector(pictures: &[OwnedPicture], mut hues: Vec<Hue>, still: bool) -> Result<Detector> {
     shade(pictures, &mut hues)?;
-    let mixing = mixing(pictures, &hues)?;
-    let siting = siting(pictures, &hues, mixing)?;
-    let detector = Detector::new(hues).with_mixing(mixing).with_siting(siting);
-    let scene = if still { scene(pictures, &detector)? } else { None };
-    Ok(detector.with_scene(scene))
+    let by = |mixing: Mixing| -> Result<Detector> {
+        let siting = siting(pictures, &hues, mixing)?;
+        Ok(Detector::new(hues.clone()).with_mixing(mixing).with_siting(siting))
+    };
+    let detector = by(Mixing::Codes)?;
+    let Some(scene) = (if still { scene(pictures, &detector)? } else { None }) else { return Ok(detector) };
+    // before one background all around, mixing changes opposite sides alike and pulls no centre
+    let detector = if mixing(pictures, &hues)? == Mixing::Light { by(Mixing::Light)? } else { detector };
+    Ok(detector.with_scene(Some(scene)))
 }
 
 /// From which side the marks are lit, learnt by every hue.
@@ -74,21 +82,27 @@ fn shade(pictures: &[OwnedPicture], hues: &mut [Hue]) -> Result<()> {
 /// How the marks mix with what is behind them: as explains better what their edges hold.
 fn mixing(pictures: &[OwnedPicture], hues: &[Hue]) -> Result<Mixing> {
     let [codes, light] = [Mixing::Codes, Mixing::Light].map(|mixing| Detector::new(hues.to_vec()).with_mixing(mixing));
-    let of_picture = |picture: &Picture<'_>| -> Result<Vec<f64>> {
-        let (by_codes, by_light) = (codes.detect(picture)?, light.detect(picture)?);
-        let better = |blob: &Blob| {
-            // the same mask gave both
-            let same = by_light.iter().find(|other| (other.hue, other.binary_px) == (blob.hue, blob.binary_px))?;
-            let [codes, light] = [blob, same].map(|blob| f64::from(blob.centroid.misfit));
-            (codes > 0.0 && light > 0.0).then(|| (codes / light).ln())
-        };
-        Ok(by_codes.iter().filter_map(better).collect())
+    let of_picture = |picture: &Picture<'_>| Ok(vec![(codes.detect(picture)?, light.detect(picture)?)]);
+    let seen = over(pictures, of_picture, |a, b| [a, b].concat())?.unwrap_or_default();
+    // the edges of what stands still say how sharp the picture is; how light adds up is told by what moves while the shutter is open
+    let is_at = |blobs: &[Blob], [x, y]: [f64; 2]| {
+        blobs.iter().any(|other| (other.binary_px[0] - x).hypot(other.binary_px[1] - y) < AT_REST_PX)
     };
-    let better = over(pictures, of_picture, |a, b| [a, b].concat())?.unwrap_or_default();
+    let moves = |blob: &Blob| 2 * seen.iter().filter(|(blobs, _)| is_at(blobs, blob.binary_px)).count() <= seen.len();
+    let better = |(blob, by_light): (&Blob, &[Blob])| {
+        let same = by_light.iter().find(|other| other.has_mask_of(blob))?;
+        let [codes, light] = [blob, same].map(|blob| f64::from(blob.centroid.misfit));
+        (codes > 0.0 && light > 0.0).then(|| (codes / light).ln())
+    };
+    let pairs = seen.iter().flat_map(|(by_codes, by_light)| by_codes.iter().map(|blob| (blob, by_light.as_slice())));
+    let better: Vec<f64> = pairs.filter(|(blob, _)| moves(blob)).filter_map(better).collect();
+    if better.len() < FEWEST_MIXED {
+        return Ok(Mixing::default());
+    }
     let n = better.len() as f64;
-    let mean = better.iter().sum::<f64>() / n.max(1.0);
-    let variance = better.iter().map(|own| (own - mean).powi(2)).sum::<f64>() / (n - 1.0).max(1.0);
-    Ok(if mean > BETTER_MIXING * (variance / n.max(1.0)).sqrt() { Mixing::Light } else { Mixing::Codes })
+    let mean = better.iter().sum::<f64>() / n;
+    let variance = better.iter().map(|own| (own - mean).powi(2)).sum::<f64>() / (n - 1.0);
+    Ok(if mean > BETTER_MIXING * (variance / n).sqrt() { Mixing::Light } else { Mixing::Codes })
 }
 
 /// Where the chroma samples lie, from the marks.
@@ -111,7 +125,8 @@ fn scene(pictures: &[OwnedPicture], detector: &Detector) -> Result<Option<Arc<Ow
     let detector = detector.clone().with_scene(Some(Arc::clone(&still)));
     let known = |picture: &Picture<'_>| {
         let blobs = detector.detect(picture)?;
-        Ok([blobs.iter().filter(|blob| blob.centroid.known_behind).count(), blobs.len()])
+        let known = || blobs.iter().filter_map(|blob| blob.centroid.known_behind);
+        Ok([known().filter(|best| *best).count(), known().count()])
     };
     let seen = over(pictures, known, |a, b| [a[0] + b[0], a[1] + b[1]])?;
     Ok(seen.is_some_and(|[known, all]| 2 * known > all).then_some(still))
@@ -134,6 +149,8 @@ pub struct SurveyedCamera {
     pub background: Option<Background>,
     /// How far it moves.
     pub camera: Camera,
+    /// Most pictures show that it stands still.
+    pub still: bool,
     /// Where it looks in every picture, where its motion is taken out.
     pub shifts: Vec<CameraShift>,
 }
@@ -177,6 +194,7 @@ pub fn camera(pictures: &[OwnedPicture], options: &Options, stream: &StreamInfo)
     SurveyedCamera {
         background: taken_out.then_some(background),
         camera,
+        still: !silent && !taken_out && greatest_px <= CAMERA_MOVES_PX,
         // of an undecided picture nothing is known
         shifts: if taken_out && !silent { shifts } else { Vec::new() },
     }

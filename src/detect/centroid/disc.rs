@@ -51,14 +51,6 @@ pub struct Evaluator {
 }
 
 impl Disc {
-    /// The point of the boundary at rest, from the centre, that passes a point of the swept disc's boundary first or last.
-    pub fn at_rest(&self, [x, y]: [f32; 2]) -> [f32; 2] {
-        let [sx, sy] = self.sweep_px;
-        let along = (x * sx + y * sy) / (sx * sx + sy * sy).max(1e-6);
-        let part = along.clamp(-0.5, 0.5);
-        [x - part * sx, y - part * sy]
-    }
-
     /// The same, swept across.
     pub const fn turned(&self) -> Self {
         let [x, y] = self.sweep_px;

@@ -15,8 +15,9 @@ use super::zones::Zones;
 /// The background across a direction.
 #[derive(Debug, Clone)]
 pub struct Extrusion {
-    /// Unit vector along u, and that of either side where the strip is bent at the mark.
+    /// Unit vector along u.
     across: [f32; 2],
+    /// That of either side, where the strip is bent at the mark.
     of_side: [[f32; 2]; 2],
     /// The mark, at whose centre the sides meet.
     disc: Disc,
@@ -38,6 +39,11 @@ struct Bin {
     near: bool,
 }
 
+/// Fewest pixels of a bin that has a level.
+const LEAST_PIXELS: f32 = 0.5;
+/// Cosine of the greatest angle between either side and the straight direction (judgement: 30°; a shelf that a strip hangs before goes another way).
+const MOST_BENT: f32 = 0.866;
+
 /// How much larger the gradients along one direction must be than across it.
 const LEAST_ANISOTROPY: f32 = 4.0;
 
@@ -50,8 +56,10 @@ impl Extrusion {
         let of_side = [false, true].map(|below| {
             direction(patch, zones.ring.iter().copied().filter(|s| (straight.v(s.dx_px, s.dy_px) > 0.0) == below))
         });
-        if let [Some(above), Some(below)] = of_side {
-            let alike = |[x, y]: [f32; 2]| if x * across[0] + y * across[1] < 0.0 { [-x, -y] } else { [x, y] };
+        if let [Some(above), Some(below)] = of_side
+            && [above, below].iter().all(|own| cosine(*own, across).abs() > MOST_BENT)
+        {
+            let alike = |own: [f32; 2]| if cosine(own, across) < 0.0 { own.map(|v| -v) } else { own };
             found.push(Self::along_sides(across, [alike(above), alike(below)], zones, outline, disc));
         }
         found
@@ -68,27 +76,28 @@ impl Extrusion {
         let count = (2.0 * reach) as usize + 2;
         let sides = [vec![Bin::default(); count], vec![Bin::default(); count]];
         let mut extrusion = Self { across, of_side, disc: *disc, from_px: -reach, sides, edges_px: [None; 2] };
-        let of_ring = zones.ring.iter().map(|sample| (sample, true));
-        for (sample, near) in of_ring.chain(zones.beyond.iter().map(|sample| (sample, false))) {
-            let v = extrusion.v(sample.dx_px, sample.dy_px);
-            let side = usize::from(v > 0.0);
-            let (i, t) = extrusion.bin(side, sample.dx_px, sample.dy_px);
-            for (bin, weight) in [(i, 1.0 - t), (i + 1, t)] {
-                let bin = &mut extrusion.sides[side][bin];
-                // the strip may end not far beyond the ring
-                if near {
-                    bin.near = true;
-                } else if bin.near {
-                    continue;
-                }
+        zones.ring.iter().for_each(|sample| extrusion.read(sample, |_| true));
+        // the strip may end not far beyond the ring
+        extrusion.sides.iter_mut().flatten().for_each(|bin| bin.near = bin.pixels > LEAST_PIXELS);
+        zones.beyond.iter().for_each(|sample| extrusion.read(sample, |bin| !bin.near));
+        extrusion.sides.iter_mut().flatten().for_each(Bin::finish);
+        extrusion.edges_px = [-1.0, 1.0].map(|sign| extrusion.edge_px(sign, outline.reach_px()));
+        extrusion
+    }
+
+    /// Adds a pixel to the bins of its u that take it.
+    fn read(&mut self, sample: &Sample, takes: impl Fn(&Bin) -> bool) {
+        let v = self.v(sample.dx_px, sample.dy_px);
+        let side = usize::from(v > 0.0);
+        let (i, t) = self.bin(side, sample.dx_px, sample.dy_px);
+        for (bin, weight) in [(i, 1.0 - t), (i + 1, t)] {
+            let bin = &mut self.sides[side][bin];
+            if takes(bin) {
                 (0..CHANNELS).for_each(|k| bin.levels[k] += weight * sample.levels[k]);
                 bin.v_px += weight * v;
                 bin.pixels += weight;
             }
         }
-        extrusion.sides.iter_mut().flatten().for_each(Bin::finish);
-        extrusion.edges_px = [-1.0, 1.0].map(|sign| extrusion.edge_px(sign, outline.reach_px()));
-        extrusion
     }
 
     /// Along the direction, from the mark's centre.
@@ -108,7 +117,7 @@ impl Extrusion {
         let (i, t) = self.bin(usize::from(self.v(dx, dy) > 0.0), dx, dy);
         let of_side = |side: usize| {
             let (a, b) = (self.sides[side][i], self.sides[side][i + 1]);
-            match (a.pixels > 0.5, b.pixels > 0.5) {
+            match (a.pixels > LEAST_PIXELS, b.pixels > LEAST_PIXELS) {
                 (true, true) => Some((mix(a.levels, b.levels, t), a.v_px + t * (b.v_px - a.v_px))),
                 (true, false) => Some((a.levels, a.v_px)),
                 (false, true) => Some((b.levels, b.v_px)),
@@ -128,9 +137,7 @@ impl Extrusion {
     /// strip, blurred by that, still has half of its height where the edge of the sharp strip is: what lies on the mark's side of it is as the strip is beyond the blur.
     pub fn under(&self, dx: f32, dy: f32) -> Option<Levels> {
         let across @ [x, y] = self.of_side[usize::from(self.v(dx, dy) > 0.0)];
-        let along = |[dx, dy]: [f32; 2]| dx * x + dy * y;
-        let from_centre = [dx - self.disc.centre_px[0], dy - self.disc.centre_px[1]];
-        let at_rest = along(self.disc.at_rest(from_centre));
+        let at_rest = (dx - self.disc.centre_px[0]) * x + (dy - self.disc.centre_px[1]) * y;
         let size = match self.edges_px[usize::from(at_rest > 0.0)] {
             Some(edge_px) if at_rest.abs() <= edge_px => {
                 at_rest.abs().min((edge_px - self.blurred_px(across)).max(0.0))
@@ -138,7 +145,7 @@ impl Extrusion {
             Some(edge_px) => at_rest.abs().max(edge_px + self.blurred_px(across)),
             None => at_rest.abs(),
         };
-        let back = size.copysign(at_rest) - along(from_centre);
+        let back = size.copysign(at_rest) - at_rest;
         self.at(dx + back * x, dy + back * y)
     }
 
@@ -148,7 +155,7 @@ impl Extrusion {
         0.5 * (sx * x + sy * y).abs() + FADE * self.disc.blur_px
     }
 
-    /// How far from the mark's centre the strip has an edge to one side: where the background is half of what it is under the mark and half of what it is beside it. `None`
+    /// How far from the mark's centre the strip has an edge to one side: where the background is midway between that under the mark and that beside it. `None`
     /// where it goes over more slowly than a blurred edge does.
     fn edge_px(&self, sign: f32, reach_px: f32) -> Option<f32> {
         let [cx, cy] = self.disc.centre_px;
@@ -157,16 +164,20 @@ impl Extrusion {
         let centre = level(0)?;
         let beside = (1..=reach_px as usize).rev().find_map(level)?;
         let change = beside - centre;
+        if change.norm_squared() == 0.0 {
+            return None;
+        }
         let part = |u: usize| Some((level(u)? - centre).dot(&change) / change.norm_squared());
         let first_beyond = |share: f32| {
-            let (mut before, mut u) = (0.0, 0);
-            loop {
+            let mut before = 0.0;
+            for u in 0..self.sides[0].len() {
                 let after = part(u + 1)?;
                 if after >= share {
                     return Some(u as f32 + (share - before) / (after - before));
                 }
-                (before, u) = (after, u + 1);
+                before = after;
             }
+            None
         };
         let (half_px, most_px) = (first_beyond(0.5)?, first_beyond(0.9)?);
         (most_px - half_px <= self.blurred_px(self.across)).then_some(half_px)
@@ -175,11 +186,16 @@ impl Extrusion {
 
 impl Bin {
     fn finish(&mut self) {
-        if self.pixels > 0.5 {
+        if self.pixels > LEAST_PIXELS {
             self.levels = self.levels.map(|l| l / self.pixels);
             self.v_px /= self.pixels;
         }
     }
+}
+
+/// Of the angle between two unit vectors.
+fn cosine(a: [f32; 2], b: [f32; 2]) -> f32 {
+    a[0] * b[0] + a[1] * b[1]
 }
 
 fn mix(a: Levels, b: Levels, share: f32) -> Levels {
@@ -195,7 +211,7 @@ fn direction<'a>(patch: &Patch, samples: impl Iterator<Item = &'a Sample>) -> Op
         }
     }
     let (middle, half) = (0.5 * (xx + yy), (0.5 * (xx - yy)).hypot(xy));
-    if middle + half < LEAST_ANISOTROPY * (middle - half) {
+    if middle + half == 0.0 || middle + half < LEAST_ANISOTROPY * (middle - half) {
         return None;
     }
     let (sin, cos) = (0.5 * (2.0 * xy).atan2(xx - yy)).sin_cos();

@@ -12,8 +12,6 @@ struct Pack {
     share: Lanes,
     /// 1 / variance of the share; 0 where there is no pixel.
     weight: Lanes,
-    /// Part of the boundary.
-    part: [u8; LANES],
 }
 
 /// The pixels of the boundary band that are mixtures of mark and background.
@@ -24,9 +22,9 @@ pub struct Band {
 }
 
 impl Band {
-    /// Adds a pixel, from the outline's centre, in one of [`PARTS`] parts of the boundary, with its share of mark and the share's variance.
+    /// Adds a pixel, from the outline's centre, with its share of mark and the share's variance.
     #[inline]
-    pub fn push(&mut self, at_px: [f32; 2], part: u8, share: f32, variance: f32) {
+    pub fn push(&mut self, at_px: [f32; 2], share: f32, variance: f32) {
         let lane = self.count % LANES;
         if lane == 0 {
             self.packs.push(Pack::default());
@@ -34,7 +32,7 @@ impl Band {
         self.count += 1;
         if let Some(pack) = self.packs.last_mut() {
             [pack.x_px[lane], pack.y_px[lane]] = at_px;
-            (pack.share[lane], pack.weight[lane], pack.part[lane]) = (share, 1.0 / variance, part);
+            (pack.share[lane], pack.weight[lane]) = (share, 1.0 / variance);
         }
     }
 }
@@ -46,12 +44,7 @@ pub struct Fit {
     pub disc: Disc,
     /// Covariance (xx, yy, xy) of its centre for independent pixels, px².
     pub covariance_px2: [f64; 3],
-    /// Variances (xx, yy) of its centre where all pixels of a part of the boundary err together, as before the edge of something behind the mark, px².
-    pub by_parts_px2: [f64; 2],
 }
-
-/// Parts of the boundary.
-pub const PARTS: usize = 16;
 
 /// Most steps of Gauss and Newton.
 const MOST_STEPS: usize = 12;
@@ -116,32 +109,10 @@ pub fn fit(start: Disc, band: &Band, small_step_px: f64) -> Option<Fit> {
             // the residuals' own scale where it is larger than the stated one
             let misfit = f64::from(scale * scale).max(1.0);
             let covariance_px2 = [inverse[(0, 0)], inverse[(1, 1)], inverse[(0, 1)]].map(|v| v * misfit);
-            let disc = disc_of(&parameters);
-            let by_parts_px2 = by_parts(band, &disc.evaluator(positions), scale, 0.5 / parameters[3], &inverse);
-            return Some(Fit { disc, covariance_px2, by_parts_px2 });
+            return Some(Fit { disc: disc_of(&parameters), covariance_px2 });
         }
     }
     None
-}
-
-/// Variances of the centre from what the parts of the boundary pull, each by itself (cluster-robust: Liang and Zeger, Biometrika 73 (1986) 13), with the inverse of the
-/// normal equations. The fourth parameter's slope counts `factor` times.
-fn by_parts(band: &Band, shape: &Evaluator, scale: f32, factor: f64, inverse: &Matrix4<f64>) -> [f64; 2] {
-    let bound = 1.0 / (TUKEY * scale).powi(2);
-    let mut pulls = [Vector4::<f64>::zeros(); PARTS];
-    for pack in &band.packs {
-        let value = shape.at(&pack.x_px, &pack.y_px);
-        for i in 0..LANES {
-            let residual = pack.share[i] - value.share[i];
-            let inlying = (1.0 - residual * residual * pack.weight[i] * bound).max(0.0);
-            let pull = f64::from(inlying * inlying * pack.weight[i] * residual);
-            let slope = Vector4::from_fn(|a, _| f64::from(value.slope[a][i]) * if a == 3 { factor } else { 1.0 });
-            pulls[usize::from(pack.part[i])] += pull * slope;
-        }
-    }
-    let few = PARTS as f64 / (PARTS as f64 - 1.0);
-    let moved = pulls.map(|pull| inverse * pull);
-    [0, 1].map(|axis| few * moved.iter().map(|m| m[axis] * m[axis]).sum::<f64>())
 }
 
 /// The upper triangle of Σ w ∇α ∇αᵀ row by row, and Σ w (share − α) ∇α.

@@ -3,7 +3,8 @@
 //! The mask only says where to look. Around the mark's rough centre the picture is read in polar sectors. In each
 //! sector the ring outside the mark gives the background there (a strip, its edge, the dark chamber), the core
 //! gives the mark, lit as its [limb] shows, and every pixel of the boundary band its [share of mark](share) α, from luma
-//! and both colour differences, so that what scatters in the surroundings does not count.
+//! and both colour differences, so that what scatters in the surroundings does not count. Under the band the background
+//! is as in the ring, or continues along an [extrusion], or is known from other pictures: as explains the band best.
 //!
 //! 1. The moments of α give a first centre, the radius and the sweep.
 //! 2. A [swept disc](disc) is [fitted](fit) to α. All its other parameters act alike on opposite sides, so they
@@ -90,9 +91,9 @@ pub struct Centroid {
     pub chroma_share: f64,
     /// The boundary band reaches over the picture's edge.
     pub cut: bool,
-    /// What lies behind the mark is known from pictures in which it is elsewhere.
-    pub known_behind: bool,
-    /// Mean square of what the mark's edge holds beside mark and background, in the noise around it; 0 where that is not known.
+    /// What lies behind the mark is known best from pictures in which it is elsewhere; `None` where they do not show that.
+    pub known_behind: Option<bool>,
+    /// Mean square of what the mark's edge holds beside mark and background by the first fit, in the noise around it; 0 where that is not known.
     pub misfit: f32,
 }
 
@@ -137,22 +138,21 @@ pub fn measure(
     if let Some(first) = &fitted {
         let look = |disc: &Disc| Look::at((picture, &patch, scene.as_ref()), &outline, disc, &surroundings);
         // before clutter, moments may show the sweep across its true direction
-        let across = scene.is_some().then(|| first.disc.turned());
+        let is_swept = first.disc.sweep_length_px() > blur_px;
+        let across = (scene.is_some() && is_swept).then(|| first.disc.turned());
         let mut looks: Vec<Look> = std::iter::once(first.disc).chain(across).filter_map(|disc| look(&disc)).collect();
         if looks.len() > 1 {
-            // how well either explains what is seen shows once it is fitted
-            looks = looks.iter().filter_map(|found| look(&found.fit.as_ref()?.disc)).collect();
+            // the ring of a disc that was swept another way is not yet its own
+            looks = looks.iter().filter_map(|found| look(&found.fit.disc)).collect();
         }
         if let Some(best) = looks.into_iter().min_by(|a, b| a.misfit.total_cmp(&b.misfit)) {
-            (centroid.known_behind, centroid.misfit, cut) = (best.known, best.misfit, best.cut);
-            (fitted, shares) = (best.fit.or(fitted), best.shares);
+            (centroid.known_behind, centroid.misfit, cut) = (best.known, best.before, best.cut);
+            (fitted, shares) = (Some(best.fit), best.shares);
         }
     }
-    if let Some(Fit { disc, covariance_px2, by_parts_px2 }) = fitted {
+    if let Some(Fit { disc, covariance_px2 }) = fitted {
         (centroid.x_px, centroid.y_px) = (f64::from(disc.centre_px[0]), f64::from(disc.centre_px[1]));
-        let [xx, yy, xy] = covariance_px2.map(|v| samples_sharing * v);
-        let [x, y] = [(xx, 0), (yy, 1)].map(|(v, axis)| (by_parts_px2[axis] / v).max(1.0));
-        centroid.variance_px2 = [x * xx, y * yy, (x * y).sqrt() * xy];
+        centroid.variance_px2 = covariance_px2.map(|v| samples_sharing * v);
     }
     centroid.chroma_share = share::of_chroma(&shares);
     let reach = patch.reach_px();
@@ -167,25 +167,27 @@ pub fn measure(
 struct Look {
     /// Its band reaches over the picture's edge.
     cut: bool,
-    /// Of the disc that was known, by the background which explains its band best.
+    /// Of the disc that was known, in the noise of its own ring.
+    before: f32,
+    /// Of the disc that is fitted, in the noise of the first look, so that looks can be compared.
     misfit: f32,
-    /// The background is that of other pictures.
-    known: bool,
+    /// The background is that of other pictures; `None` where they show none there.
+    known: Option<bool>,
     shares: Vec<Share>,
-    fit: Option<Fit>,
+    fit: Fit,
 }
 
 impl Look {
     /// With what every sector's band holds beside the disc and the background.
     fn at(
         (picture, patch, scene): (&Picture<'_>, &Patch, Option<&Rc<Patch>>),
-        before: &Outline,
+        outline: &Outline,
         disc: &Disc,
-        surroundings: &Surroundings,
+        before: &Surroundings,
     ) -> Option<Self> {
-        let outline = before.of_disc(disc);
+        let outline = outline.of_disc(disc);
         let zones = &Zones::of(patch, &outline);
-        let ring = surroundings.anew(zones, &outline)?;
+        let ring = before.anew(zones, &outline)?;
         let rim = Rim { samples: &zones.band };
         let of_disc = rim.of_disc(disc);
         let fitted = |surroundings: Surroundings| {
@@ -193,21 +195,25 @@ impl Look {
             let by_sector = surroundings.shares(&outline)?;
             let shares = Shares { by_sector: &by_sector, each: surroundings.is_known() };
             let rests = rim.rests(&of_disc, &shares, &backgrounds);
-            Some((ring.misfit(&rests), surroundings, rests, backgrounds))
+            Some((before.misfit(&rests), surroundings, rests, backgrounds))
         };
         let mut best = fitted(ring.clone())?;
-        let known = scene.and_then(|scene| ring.known(Rc::clone(scene), zones, &outline));
-        for other in ring.extruded(patch, zones, &outline, disc).into_iter().chain(known).filter_map(fitted) {
+        let by_scene = scene.and_then(|scene| ring.known(Rc::clone(scene), zones, &outline));
+        let is_seen = by_scene.is_some();
+        for other in ring.extruded(patch, zones, &outline, disc).into_iter().chain(by_scene).filter_map(fitted) {
             if other.0 < best.0 {
                 best = other;
             }
         }
-        let (misfit, mut surroundings, rests, backgrounds) = best;
+        let (_, mut surroundings, rests, backgrounds) = best;
+        let misfit_before = ring.misfit(&rests);
         surroundings.learn_scatter(rim.samples.iter().map(|s| s.sector).zip(&rests));
-        let (shares, known) = (surroundings.shares(&outline)?, surroundings.is_known());
-        let band = rim.mixtures(&Shares { by_sector: &shares, each: known }, &backgrounds);
-        let fit = fit::fit(*disc, &band, EXACTLY_PX);
-        Some(Self { cut: zones.are_cut(&outline, picture), misfit, known, shares, fit })
+        let (shares, each) = (surroundings.shares(&outline)?, surroundings.is_known());
+        let by = Shares { by_sector: &shares, each };
+        let fit = fit::fit(*disc, &rim.mixtures(&by, &backgrounds), EXACTLY_PX)?;
+        let misfit = before.misfit(&rim.rests(&rim.of_disc(&fit.disc), &by, &backgrounds));
+        let known = is_seen.then_some(each);
+        Some(Self { cut: zones.are_cut(&outline, picture), before: misfit_before, misfit, known, shares, fit })
     }
 }
 
@@ -234,7 +240,7 @@ fn for_each_share(
     for sample in &zones.band {
         let sector = usize::from(sample.sector);
         match shares[sector].of(sample.levels, surroundings.background_at(sector, sample)) {
-            Some(share) => visit(sample, share, shares[sector].variance),
+            Some((share, variance)) => visit(sample, share, variance),
             None => foreign.push(sample),
         }
     }
@@ -312,7 +318,7 @@ impl Moments {
             area_px2: self.area,
             chroma_share: 0.0,
             cut: false,
-            known_behind: false,
+            known_behind: None,
             misfit: 0.0,
         })
     }

@@ -77,7 +77,7 @@ impl Patch {
         patch
     }
 
-    /// The same pixels without their places.
+    /// The planes alone, no samples.
     pub fn planes_of(picture: &Picture<'_>, outline: &Outline) -> Self {
         let layout = picture.layout;
         let reach = reach_of(outline);

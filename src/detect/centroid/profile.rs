@@ -19,7 +19,7 @@ impl Profile {
         for sample in &zones.band {
             let sector = usize::from(sample.sector);
             let depth = sample.depth_px(outline);
-            if let Some(share) = shares[sector].of(sample.levels, surroundings.background_at(sector, sample)) {
+            if let Some((share, _)) = shares[sector].of(sample.levels, surroundings.background_at(sector, sample)) {
                 profile.add(depth, share);
             }
         }

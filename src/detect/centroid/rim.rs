@@ -3,7 +3,7 @@
 use nalgebra::Vector3;
 
 use super::disc::{Disc, LANES};
-use super::fit::{Band, PARTS};
+use super::fit::Band;
 use super::patch::{Levels, Sample};
 use super::share::Share;
 use super::surroundings::Surroundings;
@@ -46,10 +46,9 @@ impl Rim<'_> {
         for (sample, background) in self.samples.iter().zip(backgrounds) {
             let share = shares.of(sample, *background);
             if share.variance.is_finite()
-                && let Some(part) = share.of(sample.levels, *background)
+                && let Some((part, variance)) = share.of(sample.levels, *background)
             {
-                let boundary = usize::from(sample.sector) * PARTS / shares.by_sector.len();
-                band.push([sample.dx_px, sample.dy_px], boundary as u8, part, share.variance);
+                band.push([sample.dx_px, sample.dy_px], part, variance);
             }
         }
         band

@@ -36,8 +36,9 @@ pub enum Mixing {
 pub struct Mixture {
     mixing: Mixing,
     matrix: Matrix,
-    /// Codes of black, and from black to white; and from neutral to a colour difference of 1.
+    /// Codes of black, and from black to white.
     luma: [f64; 2],
+    /// Codes from neutral to a colour difference of 1.
     chroma: f64,
 }
 
@@ -91,6 +92,9 @@ const BEYOND_MIXTURE: f32 = 0.3;
 /// Squared standard deviations between a pixel and the nearest mixture beyond which it is a foreign thing.
 const FOREIGN: f32 = 100.0;
 
+/// κ, at most: below 1 the mixture rises from background to mark all the way.
+const MOST_CURVATURE: f32 = 0.9;
+
 impl Share {
     /// For a mark of colour `mark` before `background`, with the covariance `M` of what is neither.
     pub fn new(mark: Levels, background: Levels, covariance: &Matrix3<f32>, mixture: Mixture) -> Self {
@@ -116,32 +120,42 @@ impl Share {
             (Vector3::zeros(), f32::INFINITY)
         };
         let bow = 4.0 * mixture.bow(&mark, &background);
-        Self { mark, factors, contrast, mixture, bow, curvature: factors.dot(&bow).clamp(-0.9, 0.9), weight, variance }
+        let curvature = factors.dot(&bow);
+        // beyond, the parabola is none any more that rises all the way
+        let part = if curvature.abs() > MOST_CURVATURE { MOST_CURVATURE / curvature.abs() } else { 1.0 };
+        Self { mark, factors, contrast, mixture, bow: part * bow, curvature: part * curvature, weight, variance }
     }
 
-    /// What a share of mark adds to the background.
+    /// What a share of mark adds to the background; beyond 0 and 1 as it goes on there.
     #[inline]
     fn added(&self, share: f32) -> Vector3<f32> {
         let within = share.clamp(0.0, 1.0);
-        share * self.contrast + within * (1.0 - within) * self.bow
+        let slope = self.contrast + (1.0 - 2.0 * within) * self.bow;
+        within * self.contrast + within * (1.0 - within) * self.bow + (share - within) * slope
     }
 
-    /// The share, or `None` for a pixel that is no mixture of mark and background.
+    /// The share and its variance, or `None` for a pixel that is no mixture of mark and background.
     #[inline]
-    pub fn of(&self, levels: Levels, background: Levels) -> Option<f32> {
+    pub fn of(&self, levels: Levels, background: Levels) -> Option<(f32, f32)> {
         let above = Vector3::from(levels) - Vector3::from(background);
         let seen = self.factors.dot(&above);
-        let share = if (0.0..=1.0).contains(&seen) {
-            // of α + κ α (1 − α) = seen, the root between 0 and 1
-            let linear = 1.0 + self.curvature;
-            2.0 * seen / (linear + (linear * linear - 4.0 * self.curvature * seen).max(0.0).sqrt())
-        } else {
-            seen
-        };
+        let within = seen.clamp(0.0, 1.0);
+        // of α + κ α (1 − α) = seen, the root between 0 and 1; beyond as it goes on there
+        let linear = 1.0 + self.curvature;
+        let root = 2.0 * within / (linear + (linear * linear - 4.0 * self.curvature * within).max(0.0).sqrt());
+        let slope = 1.0 + self.curvature * (1.0 - 2.0 * root);
+        let share = root + (seen - within) / slope;
         let rest = above - self.added(share);
         let foreign =
             !(-BEYOND_MIXTURE..=1.0 + BEYOND_MIXTURE).contains(&share) || rest.dot(&(self.weight * rest)) > FOREIGN;
-        (!foreign).then_some(share)
+        (!foreign).then_some((share, self.variance / (slope * slope)))
+    }
+
+    /// 1 / variance of the share before another background, as far as it is that of codes.
+    #[inline]
+    pub fn information_before(&self, background: Levels) -> f32 {
+        let contrast = self.mark - Vector3::from(background);
+        contrast.dot(&(self.weight * contrast))
     }
 
     /// What a pixel holds beside `share` of the mark.

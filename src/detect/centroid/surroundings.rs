@@ -64,7 +64,7 @@ enum Behind {
 
 /// Bound of a single pixel's misfit, squared standard deviations: a burnt-in line does not decide.
 const MOST_MISFIT: f32 = 400.0;
-/// Least information on the mark's edge before a known background, as a share of what there is before the ring's.
+/// Least information on the mark before a known background, as a share of what there is before the ring's: there is next to none where the mark itself is shown.
 const LEAST_SEEN: f32 = 0.5;
 /// Variance of a channel that does not count, squared codes.
 const UNUSED: f32 = 1e6;
@@ -203,22 +203,28 @@ impl Surroundings {
 
     /// The same, with a background that other pictures show; `None` where they show the mark itself there, so that it would hardly stand out.
     pub fn known(&self, scene: Rc<Patch>, zones: &Zones<'_>, outline: &Outline) -> Option<Self> {
-        let off = |sample: &&Sample, k: usize| sample.levels[k] - scene.levels_at(sample)[k];
-        let offs = |k: usize| zones.ring.iter().map(|s| off(s, k)).collect::<Vec<f32>>();
-        let light = [0, 1, 2].map(|k| median(&mut offs(k)).unwrap_or(0.0));
-        let scatter = |k: usize| {
-            let mut sizes: Vec<f32> = offs(k).iter().map(|off| (off - light[k]).abs()).collect();
-            (1.4826 * median(&mut sizes).unwrap_or(0.0)).max(LEAST_NOISE)
+        let off = |sample: &&Sample| {
+            let behind = scene.levels_at(sample);
+            [0, 1, 2].map(|k| sample.levels[k] - behind[k])
         };
-        let known = Self { noise: [0, 1, 2].map(scatter), behind: Behind::Known(scene, light), ..self.clone() };
+        let offs: Vec<Levels> = zones.ring.iter().map(off).collect();
+        let over = |of: &dyn Fn(&Levels) -> f32| median(&mut offs.iter().map(of).collect::<Vec<_>>()).unwrap_or(0.0);
+        let light = [0, 1, 2].map(|k: usize| over(&|off| off[k]));
+        let noise = [0, 1, 2].map(|k: usize| (1.4826 * over(&|off| (off[k] - light[k]).abs())).max(LEAST_NOISE));
+        let known = Self { noise, behind: Behind::Known(scene, light), ..self.clone() };
         let shares = self.shares(outline)?;
-        let (mut by_ring, mut by_scene) = (0.0, 0.0);
-        for sample in &zones.band {
+        let seen_at = |sample: &&Sample| {
             let sector = usize::from(sample.sector);
-            by_ring += 1.0 / shares[sector].variance;
-            by_scene += 1.0 / shares[sector].before(known.background_at(sector, sample)).variance;
-        }
-        (by_scene > LEAST_SEEN * by_ring).then_some(known)
+            let share = &shares[sector];
+            let before = [known.background_at(sector, sample), self.background_at(sector, sample)];
+            before.map(|background| share.information_before(background))
+        };
+        // over the mark itself, and at its edge
+        let mut parts = zones.core.iter().map(seen_at).map(|[scene, ring]| scene / ring.max(1e-6)).collect::<Vec<_>>();
+        let is_elsewhere = median(&mut parts).is_none_or(|part| part > LEAST_SEEN);
+        let sum = |sums: [f32; 2], own: [f32; 2]| [sums[0] + own[0], sums[1] + own[1]];
+        let [by_scene, by_ring] = zones.band.iter().map(seen_at).fold([0.0; 2], sum);
+        (is_elsewhere && by_scene > LEAST_SEEN * by_ring).then_some(known)
     }
 
     /// Mean square of what the band holds beside background and mark, in the channels' noise, single pixels bounded.

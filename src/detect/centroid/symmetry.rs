@@ -40,7 +40,7 @@ pub fn of_target(picture: &Picture<'_>, silhouette: &Silhouette) -> Option<Centr
                 area_px2,
                 chroma_share: 0.0,
                 cut: false,
-                known_behind: false,
+                known_behind: None,
                 misfit: 0.0,
             });
         }
