@@ -117,16 +117,19 @@ impl Album {
         let usual = self.usual();
         let around = (!self.camera.is_empty()).then(|| usual.each_ref().map(|plane| self.around(plane)));
         for (index, picture) in self.pictures.iter().enumerate() {
-            let seen = self.seen_by(index, &usual);
+            // where every sample of the picture lies in the first one
+            let places = self.camera.get(index).map(|camera| self.places(picture, |p| camera.undo(p)));
+            let seen = places.as_ref().map(|places| usual.each_ref().map(|plane| at_places(plane, places)));
             let seen = seen.as_ref().unwrap_or(&usual);
             let light = self.light(picture, &seen[0]);
-            let bounds = around.as_ref().map(|planes| planes.each_ref().map(|plane| self.seen_by(index, plane)));
+            let bounds = around.as_ref().zip(places.as_ref()).map(|(planes, places)| {
+                planes.each_ref().map(|bounds| bounds.each_ref().map(|plane| at_places(plane, places)))
+            });
             let mut moved = vec![false; seen[0].len()];
             for (channel, codes) in picture.channels().into_iter().enumerate() {
                 let zero = if channel == 0 { self.black() } else { NO_CHROMA };
                 let lit: [u8; 256] = std::array::from_fn(|code| (zero + light * (code as f64 - zero)).round() as u8);
-                let bounds = bounds.as_ref().and_then(|bounds| bounds[channel].as_ref());
-                let [least, most] = bounds.map_or([&seen[channel]; 2], |bounds| bounds.each_ref());
+                let [least, most] = bounds.as_ref().map_or([&seen[channel]; 2], |bounds| bounds[channel].each_ref());
                 let change = LEAST_CHANGE[channel];
                 for ((moved, code), (least, most)) in moved.iter_mut().zip(codes).zip(least.iter().zip(most)) {
                     let [least, most] = [least, most].map(|usual| lit[usize::from(*usual)]);
@@ -149,13 +152,6 @@ impl Album {
             self.compare();
         }
         moves
-    }
-
-    /// Planes of the first picture as the camera sees them in another one, the border repeated; `None` where it stands still.
-    fn seen_by<const N: usize>(&self, picture: usize, planes: &[Vec<u8>; N]) -> Option<[Vec<u8>; N]> {
-        let camera = self.camera.get(picture)?;
-        let places = self.places(self.pictures.get(picture)?, |p| camera.undo(p));
-        Some(planes.each_ref().map(|plane| places.iter().map(|at| plane[*at]).collect()))
     }
 
     /// Least and greatest code within a sample of every sample.
@@ -234,8 +230,7 @@ impl Album {
             shifted.map(|(picture, camera)| self.places(picture, |p| camera.apply(p))).collect();
         [0, 1, 2].map(|channel| {
             let steadied = self.pictures.iter().zip(&places);
-            let steadied: Vec<Vec<u8>> =
-                steadied.map(|(p, places)| places.iter().map(|at| p.channels()[channel][*at]).collect()).collect();
+            let steadied: Vec<Vec<u8>> = steadied.map(|(p, places)| at_places(p.channels()[channel], places)).collect();
             let planes: Vec<&[u8]> = if steadied.is_empty() {
                 self.pictures.iter().map(|p| p.channels()[channel]).collect()
             } else {
@@ -249,6 +244,11 @@ impl Album {
     pub fn sample_px2(&self) -> f64 {
         f64::from(1u32 << (self.shifts[0] + self.shifts[1]))
     }
+}
+
+/// The samples of a plane at these places.
+fn at_places(plane: &[u8], places: &[usize]) -> Vec<u8> {
+    places.iter().map(|at| plane[*at]).collect()
 }
 
 /// A hue that things in the pictures have.

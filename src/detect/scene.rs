@@ -57,22 +57,12 @@ fn medians(planes: &[&[u8]], range: Range<usize>) -> Vec<u8> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::video::{Layout, Matrix};
+    use crate::video::Layout;
 
     #[test]
     fn what_passes_is_not_in_the_scene_with_one_byte_or_two() {
         for bits in [8, 10] {
-            let layout = Layout {
-                width_px: 40,
-                height_px: 4,
-                bits,
-                low_bits: 0,
-                chroma_shift_x: 1,
-                chroma_shift_y: 1,
-                chroma_site_px: [0.0, 0.5],
-                full_range: false,
-                matrix: Matrix::Bt709,
-            };
+            let layout = Layout::subsampled(40, 4, bits);
             let picture = |n: usize| {
                 let mut picture = OwnedPicture::black(layout);
                 for at in 0..160 {

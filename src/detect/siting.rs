@@ -160,17 +160,7 @@ mod tests {
     }
 
     fn surveyed(differences: [&[f64]; 2], stated_px: [f64; 2]) -> SitingSurvey {
-        let layout = Layout {
-            width_px: 64,
-            height_px: 64,
-            bits: 8,
-            low_bits: 0,
-            chroma_shift_x: 1,
-            chroma_shift_y: 1,
-            chroma_site_px: stated_px,
-            full_range: false,
-            matrix: crate::video::Matrix::Bt709,
-        };
+        let layout = Layout { chroma_site_px: stated_px, ..Layout::subsampled(64, 64, 8) };
         let with_variance = |d: &[f64]| d.iter().map(|d| [*d, 0.05f64.powi(2)]).collect();
         SitingSurvey { layout: Some(layout), differences: differences.map(with_variance) }
     }

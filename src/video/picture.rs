@@ -100,6 +100,24 @@ impl Layout {
     }
 }
 
+#[cfg(test)]
+impl Layout {
+    /// 4:2:0 as most files have it: limited range, BT.709, chroma to the left.
+    pub const fn subsampled(width_px: usize, height_px: usize, bits: u32) -> Self {
+        Self {
+            width_px,
+            height_px,
+            bits,
+            low_bits: 0,
+            chroma_shift_x: 1,
+            chroma_shift_y: 1,
+            chroma_site_px: [0.0, 0.5],
+            full_range: false,
+            matrix: Matrix::Bt709,
+        }
+    }
+}
+
 /// One plane of samples, borrowed.
 #[derive(Debug, Clone, Copy)]
 pub struct Plane<'a> {
@@ -250,17 +268,7 @@ mod tests {
 
     #[test]
     fn siting_maps_chroma_to_luma_and_back() {
-        let layout = Layout {
-            width_px: 7,
-            height_px: 5,
-            bits: 8,
-            low_bits: 0,
-            chroma_shift_x: 1,
-            chroma_shift_y: 1,
-            chroma_site_px: [0.0, 0.5],
-            full_range: false,
-            matrix: Matrix::Bt709,
-        };
+        let layout = Layout::subsampled(7, 5, 8);
         assert_eq!(layout.chroma_size(), (4, 3));
         assert_eq!(layout.chroma_to_luma(3.0, 2.0), (6.0, 4.5));
         assert_eq!(layout.luma_to_chroma(6.0, 4.5), (3.0, 2.0));

@@ -37,7 +37,7 @@ pub struct Mixture {
     mixing: Mixing,
     matrix: Matrix,
     /// Codes of black, and from black to white.
-    luma: [f64; 2],
+    luma: (f64, f64),
     /// Codes from neutral to a colour difference of 1.
     chroma: f64,
 }
@@ -45,8 +45,10 @@ pub struct Mixture {
 impl Mixture {
     /// In a picture of this layout.
     pub fn new(mixing: Mixing, layout: &Layout) -> Self {
-        let (luma, chroma) = if layout.full_range { ([0.0, 255.0], 255.0) } else { ([16.0, 219.0], 224.0) };
-        Self { mixing, matrix: layout.matrix, luma, chroma }
+        // levels are 8-bit codes, whatever the picture's are
+        let eight = Layout { bits: 8, ..*layout };
+        let (_, chroma) = eight.chroma_scale();
+        Self { mixing, matrix: layout.matrix, luma: eight.luma_scale(), chroma }
     }
 
     /// m of two colours.
@@ -54,7 +56,7 @@ impl Mixture {
         if self.mixing == Mixing::Codes {
             return Vector3::zeros();
         }
-        let [black, span] = self.luma;
+        let (black, span) = self.luma;
         let rgb = |codes: &Vector3<f32>| {
             let [y, cb, cr] = [codes[0], codes[1], codes[2]].map(f64::from);
             self.matrix.rgb([(y - black) / span, cb / self.chroma, cr / self.chroma]).map(|c| c.max(0.0))

@@ -1,20 +1,10 @@
 use super::super::{Detector, Hue, ShadingSurvey};
 use crate::experiment::MarkColour;
-use crate::video::{Layout, Matrix, OwnedPicture};
+use crate::video::{Layout, OwnedPicture};
 
 /// A 4:2:0 picture of `colour(x, y)`, each luma pixel the mean of 6×6 points, chroma co-sited to the left.
 fn paint(width: usize, height: usize, colour: impl Fn(f64, f64) -> [f64; 3]) -> OwnedPicture {
-    let layout = Layout {
-        width_px: width,
-        height_px: height,
-        bits: 8,
-        low_bits: 0,
-        chroma_shift_x: 1,
-        chroma_shift_y: 1,
-        chroma_site_px: [0.0, 0.5],
-        full_range: false,
-        matrix: Matrix::Bt709,
-    };
+    let layout = Layout::subsampled(width, height, 8);
     let fine = |x: usize, y: usize| -> [f64; 3] {
         let mut sum = [0.0; 3];
         for i in 0..36 {
