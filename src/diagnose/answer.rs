@@ -15,7 +15,7 @@ use super::report::{
 use super::settings::CertificateSettings;
 use super::torque::MissingTorque;
 use super::verdict::Status;
-use super::{energy, locate};
+use super::{energy, evidence, locate};
 use crate::fit::{Record, recordings, rms_of_pieces};
 use crate::model::Parameter;
 
@@ -46,15 +46,16 @@ impl Diagnosis {
     /// From all that was found about a specimen of some name.
     pub fn of(findings: &Findings<'_>, specimen: &str) -> Self {
         let best = findings.posterior.best();
-        let candidates = findings.posterior.candidates.iter().take(WRITTEN);
-        let certificate = &findings.context.settings.certificate;
+        let settings = &findings.context.settings;
+        let is_possible = |candidate: &&Candidate<'_>| evidence::is_possible(&candidate.fit, &settings.prior);
+        let candidates = findings.posterior.candidates.iter().filter(is_possible).take(WRITTEN);
         let energy_shares = energy::energy_shares(best);
         Self {
             schema: "freeswing.diagnosis/1",
             specimen: specimen.to_owned(),
             baseline: Baseline::of(findings),
             location: Location::of(findings, energy_shares),
-            candidates: candidates.map(|candidate| Hypothetical::of(candidate, certificate)).collect(),
+            candidates: candidates.map(|candidate| Hypothetical::of(candidate, &settings.certificate)).collect(),
             verdict: Answer::of(findings),
             heldout: Proof::of(findings),
             detectable: Limits(findings.adequacy.detectable.clone()),
@@ -84,7 +85,7 @@ impl Baseline {
             noise_rad: noise_rad(base, 0),
             noise_correlation: noise.colour.iter().map(|colour| colour.rho).collect(),
             noise_share_correlated: noise.colour.iter().map(|colour| colour.share).collect(),
-            noise_correlation_across: noise.across,
+            noise_correlation_across: noise.across.strongest(),
             adequate: findings.verdict.status == Status::Adequate,
             p_value: findings.adequacy.p_value,
         }

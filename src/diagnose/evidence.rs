@@ -58,6 +58,11 @@ fn ways(count: f64, chosen: usize) -> f64 {
     (0..chosen).map(|k| (count - k as f64).max(1.0) / (k + 1) as f64).product::<f64>().max(1.0)
 }
 
+/// Whether its coefficients may be what the effects are named for, whatever they leave.
+pub fn is_possible(fit: &Refit<'_>, settings: &PriorSettings) -> bool {
+    fit.hypothesis.effects.iter().all(|effect| law_of(*effect).is_possible(fit, settings))
+}
+
 /// ln Z of a fitted hypothesis; −∞ where a coefficient is not told from zero. `least_without` is the least χ² of all hypotheses that lack an effect of
 /// it: where far more than noise is left, it says better than the tangent whether that effect is needed (a fall by `counts` variances).
 pub fn ln_evidence(

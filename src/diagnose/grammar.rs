@@ -48,8 +48,8 @@ impl Term {
     /// Its formula with the numbers of its coefficients.
     pub fn with_numbers(&self) -> String {
         let number = |word: &str| self.law.parameters.get(word).map(|own| format!("{:.3e}", own.start));
-        // a negative amplitude turns the sign before it
-        with_words(&self.law.formula, number).replace("--", "")
+        // a negative number turns the sign before it
+        with_words(&self.law.formula, number).replace("--", "").replace("- -", "+ ")
     }
 }
 
@@ -285,8 +285,8 @@ mod tests {
             term.law.parameters.get_mut("a").unwrap().start = a;
             term.with_numbers()
         };
-        assert_eq!(of(0.002), "-2.000e-3 * exp(-((angle - -2.500e-1) / 7.500e-2) ^ 2 / 2)");
-        assert_eq!(of(-0.002), "2.000e-3 * exp(-((angle - -2.500e-1) / 7.500e-2) ^ 2 / 2)");
+        assert_eq!(of(0.002), "-2.000e-3 * exp(-((angle + 2.500e-1) / 7.500e-2) ^ 2 / 2)");
+        assert_eq!(of(-0.002), "2.000e-3 * exp(-((angle + 2.500e-1) / 7.500e-2) ^ 2 / 2)");
         assert_eq!(with_words("a * ab + 2", |word| (word == "a").then(|| "x".to_owned())), "x * ab + 2");
     }
 

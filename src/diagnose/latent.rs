@@ -265,10 +265,11 @@ impl<'a> Filter<'a> {
         let sd_rad: Vec<f64> = self.of_noise().enumerate().map(fresh).collect();
         for (mark, place) in self.of_noise().enumerate() {
             p[(place, place)] += sd_rad[mark] * sd_rad[mark];
-            if mark > 0 {
-                let both = self.noise.across * sd_rad[mark - 1] * sd_rad[mark];
-                p[(place - 1, place)] += both;
-                p[(place, place - 1)] += both;
+            for before in 0..mark {
+                let both = self.noise.across.between(before, mark) * sd_rad[before] * sd_rad[mark];
+                let other = place - (mark - before);
+                p[(other, place)] += both;
+                p[(place, other)] += both;
             }
         }
     }
@@ -288,6 +289,7 @@ impl<'a> Filter<'a> {
         p[(input, input)] = size * size;
         let mut moved = DMatrix::zeros(total, total);
         let (mut slopes, mut gain) = (DVector::zeros(total), DVector::zeros(total));
+        let goes_together = !self.noise.across.is_none();
         for k in 0..self.around.rows.len() {
             if k > 0 {
                 let transition = &self.transitions[k - 1];
@@ -300,12 +302,10 @@ impl<'a> Filter<'a> {
             self.add_noise(k, &mut p);
             hear(Stage::Row(&z, &p));
             let row = &self.around.rows[k];
-            let mut beside: Option<(f64, DVector<f64>, f64)> = None;
+            // of the marks above: which, what is left, how it is seen, its white noise
+            let mut above: Vec<(usize, f64, DVector<f64>, f64)> = Vec::new();
             for (mark, left) in row.left_rad.iter().enumerate() {
-                let Some(mut left) = *left else {
-                    beside = None;
-                    continue;
-                };
+                let Some(mut left) = *left else { continue };
                 (0..n).for_each(|i| slopes[i] = row.observed[(mark, i)]);
                 if self.input == Input::Camera {
                     slopes[input] = 1.0;
@@ -317,15 +317,17 @@ impl<'a> Filter<'a> {
                     slopes.rows_mut(first, IN_STEP_SHAPES).copy_from_slice(&own);
                 }
                 let mut white_rad = self.white_sd_rad(k, mark);
-                if self.noise.across != 0.0 {
-                    let own = (left, slopes.clone(), white_rad);
-                    if let Some((other, of_other, other_rad)) = &beside {
-                        let shared = self.noise.across * white_rad / other_rad;
+                if goes_together {
+                    let own = (mark, left, slopes.clone(), white_rad);
+                    let marks: Vec<usize> = above.iter().map(|other| other.0).collect();
+                    let given = self.noise.across.given(mark, &marks);
+                    for ((_, other, of_other, other_rad), part) in above.iter().zip(&given.beta) {
+                        let shared = part * white_rad / other_rad;
                         left -= shared * other;
                         slopes.axpy(-shared, of_other, 1.0);
-                        white_rad *= (1.0 - self.noise.across * self.noise.across).sqrt();
                     }
-                    beside = Some(own);
+                    white_rad *= given.sd;
+                    above.push(own);
                 }
                 p.mul_to(&slopes, &mut gain);
                 let variance = white_rad * white_rad + slopes.dot(&gain);

@@ -3,6 +3,7 @@
 use super::context::FitContext;
 use super::noise;
 use super::refit::Refit;
+use crate::fit::across::Across;
 use crate::fit::noise::least_noise_rad;
 use crate::fit::whitening::{Colour, RecordNoise};
 use crate::model::observe::chord_angles_rad;
@@ -30,6 +31,8 @@ pub fn learnt_noise(context: &FitContext<'_>, by: &Refit<'_>) -> Option<Vec<Reco
             angles[value.link].0[ticks[value.row]] =
                 (measured_rad - value.predicted_rad) / data.relative_sd[value.link][value.row];
         }
+        // whether hardly more than noise is left of an angle, where that is found anew
+        let mut is_noise = vec![None; data.links()];
         for (link, (left, motion)) in angles.iter_mut().enumerate() {
             motion.extend(chords.iter().map(|chord| chord[link]));
             let (known_rad, known_colour) = (&mut known.sd_rad[link], &mut known.colour[link]);
@@ -42,17 +45,23 @@ pub fn learnt_noise(context: &FitContext<'_>, by: &Refit<'_>) -> Option<Vec<Reco
                 None if whole.sd < *known_rad => whole,
                 None => continue,
             };
-            // where far more is left its colour is no weight for the rows
-            let colour = if whole.sd > settings.beyond * noise.sd { Colour::default() } else { noise.colour };
+            // where far more is left its colour is no weight for the rows, nor what it shares with other angles
+            let plain = whole.sd <= settings.beyond * noise.sd;
+            is_noise[link] = Some(plain);
+            let colour = if plain { noise.colour } else { Colour::default() };
             let sd_rad = noise.sd.max(least_noise_rad(context.records, record, link));
             changed |= (sd_rad / *known_rad - 1.0).abs() > settings.changes || colour.differs_from(*known_colour);
             (*known_rad, *known_colour) = (sd_rad, colour);
         }
-        if let [first, second] = &angles[..] {
-            let across = noise::across([first, second].map(|(left, motion)| (&left[..], &motion[..])), settings);
-            changed |= (across - known.across).abs() > settings.changes;
-            known.across = across;
-        }
+        let across = Across::of(angles.len(), |i, j| match (is_noise[i], is_noise[j]) {
+            (Some(true), Some(true)) => {
+                noise::across([i, j].map(|link| (&angles[link].0[..], &angles[link].1[..])), settings)
+            }
+            (Some(_), Some(_)) => 0.0,
+            _ => known.across.between(i, j),
+        });
+        changed |= across.difference(&known.across) > settings.changes;
+        known.across = across;
     }
     changed.then_some(all)
 }

@@ -68,7 +68,7 @@ pub struct Baseline {
     pub noise_correlation: Vec<f64>,
     /// … and which share of it does.
     pub noise_share_correlated: Vec<f64>,
-    /// Its correlation from angle to angle.
+    /// Its correlation from angle to angle, the strongest.
     pub noise_correlation_across: f64,
     /// Whether the base model is enough.
     pub adequate: bool,

@@ -211,12 +211,12 @@ fn to_decide(effects: &[Effect], class: &[Effect], marks: usize) -> Option<Strin
     let has = |of: &[Effect]| of.iter().filter(|c| class.contains(c)).count() > 1;
     let mut advice: Vec<&str> = Vec::new();
     if has(&[Effect::CameraTilt, Effect::SideForce, Effect::RestCurl]) {
-        advice.push("film a plumb line beside the strip, and the strip turned about its length by half a turn");
+        advice.push("film a plumb line beside the specimen, and the specimen turned about its length by half a turn");
     }
     let of_pace = has(&[Effect::TimeBase, Effect::HingeStiffness, Effect::AddedMass, Effect::DistributedFlexibility]);
     if of_pace {
         advice.push(
-            "film a clock with the strip, and release it at a much larger angle: only a spring's share in the frequency falls with amplitude",
+            "film a clock beside the specimen, and release the specimen at a much larger angle: only a spring's share in the frequency falls with amplitude",
         );
     }
     if has(&[Effect::HingeViscous, Effect::AirLinear, Effect::JointHysteretic]) {
@@ -248,7 +248,7 @@ fn to_decide(effects: &[Effect], class: &[Effect], marks: usize) -> Option<Strin
     }
     // one clock is enough
     if has(&[Effect::DifferentialLag, Effect::DroppedFrames, Effect::TimeBase]) && !of_pace {
-        advice.push("film a running clock beside the strip");
+        advice.push("film a running clock beside the specimen");
     }
     if advice.is_empty() {
         advice.push("a longer recording with less noise, from a larger release and from another shape of release");

@@ -50,7 +50,16 @@ impl Findings<'_> {
                     let _ = write!(others, ", or something outside the table that it resembles ({unknown:.0} %)");
                 }
                 let (effects, remark, more) = (words(&verdict.effects), self.remark(), self.more());
-                format!("Missing: most likely {effects} ({percent:.0} %){others}.{remark}{more}")
+                let statement = format!("Missing: most likely {effects} ({percent:.0} %){others}.{remark}{more}");
+                match self.posterior.candidate(&[]).map(|base| base.probability) {
+                    // the names of the class together are likelier than none of them, each set by itself is not
+                    Some(alone) if alone > verdict.probability => format!(
+                        "It is not certain that anything is missing: the base model alone ({:.0} %) is likelier than with any one set of effects. {}",
+                        1e2 * alone,
+                        statement.replacen("Missing: most likely", "If something is, it is most likely", 1)
+                    ),
+                    _ => statement,
+                }
             }
         };
         statement + &self.law() + &reservation
@@ -84,15 +93,18 @@ impl Findings<'_> {
         let settings = &self.context.settings.verdict;
         let mut others = verdict::not_told_apart(&self.posterior.candidates, |w| w.if_named, settings.told_apart);
         others.retain(|effect| !effects.contains(effect));
+        let likely = match 1e2 * named.if_named {
+            percent if percent >= 1.0 => format!(" ({percent:.0} % among the named)"),
+            _ => String::new(),
+        };
         let apart = match others.len() {
             0 => String::new(),
             _ => format!("; the recording does not tell {them} from {}", names(&others, "")),
         };
         format!(
-            ". Of the table {} {comes} nearest ({:.0} % among the named): {explains} {:.1} % of what the base model leaves beyond the noise{apart}",
+            ". Of the table {} {comes} nearest{likely}: {explains} {} of what the base model leaves beyond the noise{apart}",
             words(effects),
-            1e2 * named.if_named,
-            1e2 * self.explained()
+            percent_of_all(self.explained())
         )
     }
 
@@ -212,7 +224,7 @@ impl Findings<'_> {
         let mut statement = match place {
             Place::Hinge => "It acts at the hinge",
             Place::Joint => "It acts in the joint",
-            Place::Air => "It acts from outside along the strip",
+            Place::Air => "It acts from outside along the specimen",
             Place::Camera if self.verdict.effects.iter().any(|effect| effect.place() != Place::Camera) => {
                 "What explains most is an error of the camera"
             }
@@ -244,8 +256,10 @@ impl Findings<'_> {
         if let Some(torque) = self.missing_torque.as_ref().filter(|t| t.place != Place::Camera && t.place == place) {
             let _ = write!(statement, ". {}", words_of_torque(torque, phase));
         }
+        // names that are not the answer do not say where the energy goes
+        let is_known = self.verdict.status != Status::Unknown;
         let shares = energy_shares;
-        if shares.iter().sum::<f64>() > 0.0 {
+        if is_known && shares.iter().sum::<f64>() > 0.0 {
             let [hinge, joint, air] = shares.map(|share| format!("{:.0} %", 1e2 * share));
             let in_joint = if self.context.marks() > 1 { format!(", {joint} in the joint") } else { String::new() };
             let _ = write!(statement, ". Of the energy lost {hinge} go at the hinge{in_joint}, {air} to the air");
@@ -277,7 +291,7 @@ fn in_place(place: Place) -> &'static str {
     match place {
         Place::Hinge => "at the hinge",
         Place::Joint => "in the joint",
-        Place::Air => "along the strip",
+        Place::Air => "along the specimen",
         Place::Camera => "in what the camera sees",
     }
 }

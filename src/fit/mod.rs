@@ -10,6 +10,7 @@
 //! | [`horizon`] | how far a motion can be foretold |
 //! | [`predict`] | what the model says the camera sees |
 //! | [`problem`] | what is fitted to what |
+//! | [`across`] | how the noise of its angles goes together |
 //! | [`begin`] | where a fit begins: with the seen modes |
 //! | [`shooting`] | multiple shooting: start values that cannot be out of step |
 //! | [`search`] | several beginnings, the best end: the robust fit of `fit` and of a diagnosis' base model |
@@ -22,6 +23,7 @@
 //! Output error: the motion from the first row on is the model's own, and the residual is what the recording shows beyond it. Each recording's
 //! initial angles and rates are free.
 
+pub mod across;
 pub mod base;
 pub mod begin;
 pub mod descent;

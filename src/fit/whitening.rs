@@ -1,14 +1,14 @@
 //! Residuals in units of their noise: divided by it, less what the noise before and beside foretells, and with errors in step with the swing discounted.
 //!
 //! A value's noise has the standard deviation σ. The share s of its variance goes on from row to row with the correlation ρ, the rest is white; what is
-//! new in it goes with that of the next angle by κ: the mark between them is seen once, so that what tilts one tilts the other back. Beside it a tracked angle has errors that come again whenever the
+//! new in it goes with that of the other angles ([`super::across`]). Beside it a tracked angle has errors that come again whenever the
 //! specimen is where it was: what a mark stands on shifts it by a hundredth of a pixel, and turns with the strip. They are Φb, b normal of unit variance:
 //!
 //! ```text
 //! r ← r/σ                                       of every value
 //! r ← (r − ρĉ)/√S,  ĉ ← ρĉ + K(r − ρĉ)          from row to row (ĉ: what goes on, as seen so far; S = P + 1 − s, K = P/S,
 //!                                               P ← ρ²(P − KP) + s(1 − ρ²), at first s)
-//! r ← (r − κ r_beside)/√(1 − κ²)                from angle to angle
+//! r ← (r − βᵀ r_before)/√(1 − βᵀc)              from angle to angle
 //! r ← (1 + ΦΦᵀ)^(−1/2) r                        Φ with its rows like r's
 //! Φ of an angle: share · σ · [1, u, u³, w]      u: the angle,  w: the next link's less it;  each of root mean square 1
 //! (1 + ΦΦᵀ)^(∓1/2) = 1 + Ψ diag(((1 + λ)^(∓1/2) − 1)/λ) Ψᵀ        Ψ = ΦV,  ΦᵀΦ = VΛVᵀ
@@ -17,8 +17,10 @@
 //! so that residuals become independent and of unit variance, and their derivatives with them.
 
 use nalgebra::{DMatrix, DVector};
+use smallvec::SmallVec;
 
 use super::Problem;
+use super::across::{Across, Given};
 use super::predict::Value;
 use super::record::Record;
 use crate::statistics::median_step_s;
@@ -55,8 +57,8 @@ pub struct RecordNoise {
     pub sd_rad: Vec<f64>,
     /// How each angle's noise goes on from row to row.
     pub colour: Vec<Colour>,
-    /// Correlation of the noise of an angle and the next one's (κ), after that from row to row.
-    pub across: f64,
+    /// Correlations of what is new in the angles' noise at a row.
+    pub across: Across,
     /// Errors in step with the swing that each angle may have, as a share of its noise.
     pub in_step: f64,
 }
@@ -64,7 +66,8 @@ pub struct RecordNoise {
 impl RecordNoise {
     /// White and independent.
     pub fn white(sd_rad: Vec<f64>) -> Self {
-        Self { colour: vec![Colour::default(); sd_rad.len()], sd_rad, across: 0.0, in_step: 0.0 }
+        let across = Across::none(sd_rad.len());
+        Self { colour: vec![Colour::default(); sd_rad.len()], sd_rad, across, in_step: 0.0 }
     }
 
     /// Whether every row is new.
@@ -84,6 +87,20 @@ struct Foretold {
     sd: f64,
 }
 
+/// What other angles of a row say of a value.
+#[derive(Debug, Clone)]
+struct Beside {
+    /// Where their values stand, and by how much each counts.
+    of: SmallVec<[(usize, f64); 2]>,
+    sd: f64,
+}
+
+impl Beside {
+    fn said(&self, column: &[f64]) -> f64 {
+        self.of.iter().map(|(place, part)| part * column[*place]).sum()
+    }
+}
+
 /// What makes residuals of some rows of a recording independent and of unit variance.
 #[derive(Debug, Clone)]
 pub struct Whitening {
@@ -91,9 +108,8 @@ pub struct Whitening {
     weights: Vec<f64>,
     /// What the values before say of each; nothing where the noise is white.
     foretold: Vec<Foretold>,
-    /// The value of the angle above at the same row; of no use where κ is zero.
-    beside: Vec<Option<usize>>,
-    across: f64,
+    /// What the values of the angles above at the same row say of each; nothing where no angle says anything of another.
+    beside: Vec<Beside>,
     /// Ψ and λ.
     in_step: Option<(DMatrix<f64>, DVector<f64>)>,
 }
@@ -105,8 +121,7 @@ impl Whitening {
         let mut whitening = Self {
             weights: values.iter().map(|v| 1.0 / problem.sd_rad(record, v.link, v.row)).collect(),
             foretold: foretold(problem, record, values),
-            beside: if problem.noise[record].across != 0.0 { beside(data, values) } else { Vec::new() },
-            across: problem.noise[record].across,
+            beside: beside(data, &problem.noise[record].across, values),
             in_step: None,
         };
         if problem.noise[record].in_step > 0.0 {
@@ -138,13 +153,9 @@ impl Whitening {
             goes_on += of.gain * new;
             *value = new / of.sd;
         }
-        if self.across != 0.0 {
-            // the last angle first, so that those beside are as they were
-            for i in (0..column.len()).rev() {
-                if let Some(beside) = self.beside[i] {
-                    column[i] = (column[i] - self.across * column[beside]) / (1.0 - self.across * self.across).sqrt();
-                }
-            }
+        // the last angle first, so that those beside are as they were
+        for (i, beside) in self.beside.iter().enumerate().rev() {
+            column[i] = (column[i] - beside.said(column)) / beside.sd;
         }
         self.stretch(column, -0.5);
     }
@@ -152,12 +163,8 @@ impl Whitening {
     /// Makes noise of as many independent numbers of unit variance: the inverse of [`Whitening::whiten`].
     pub fn colour(&self, column: &mut [f64]) {
         self.stretch(column, 0.5);
-        if self.across != 0.0 {
-            for i in 0..column.len() {
-                if let Some(beside) = self.beside[i] {
-                    column[i] = (1.0 - self.across * self.across).sqrt() * column[i] + self.across * column[beside];
-                }
-            }
+        for (i, beside) in self.beside.iter().enumerate() {
+            column[i] = beside.sd * column[i] + beside.said(column);
         }
         let mut goes_on = 0.0;
         for (value, of) in column.iter_mut().zip(&self.foretold) {
@@ -203,11 +210,30 @@ fn foretold(problem: &Problem<'_>, record: usize, values: &[Value]) -> Vec<Foret
     (0..values.len()).map(of).collect()
 }
 
-/// Of each value, where the one of the angle above at the same row stands.
-fn beside(record: &Record, values: &[Value]) -> Vec<Option<usize>> {
+/// Of each value, what those of the angles above at the same row say.
+fn beside(record: &Record, across: &Across, values: &[Value]) -> Vec<Beside> {
+    if across.is_none() {
+        return Vec::new();
+    }
     let mut place = vec![vec![None; record.len()]; record.links()];
     values.iter().enumerate().for_each(|(i, value)| place[value.link][value.row] = Some(i));
-    values.iter().map(|value| place[value.link.checked_sub(1)?][value.row]).collect()
+    // most rows of an angle lack none of the others
+    let (mut known, mut link): (Vec<(SmallVec<[usize; 4]>, Given)>, usize) = (Vec::new(), 0);
+    let of = |value: &Value| {
+        if value.link != link {
+            (known, link) = (Vec::new(), value.link);
+        }
+        let above: SmallVec<[usize; 4]> = (0..link).filter(|link| place[*link][value.row].is_some()).collect();
+        let places = above.iter().filter_map(|link| place[*link][value.row]).collect::<SmallVec<[usize; 2]>>();
+        let at = known.iter().position(|own| own.0 == above).unwrap_or_else(|| {
+            let given = across.given(link, &above);
+            known.push((above, given));
+            known.len() - 1
+        });
+        let given = &known[at].1;
+        Beside { of: places.into_iter().zip(given.beta.iter().copied()).collect(), sd: given.sd }
+    };
+    values.iter().map(of).collect()
 }
 
 /// Errors in step with the swing that each angle may have (rad), `[link][row]`.
@@ -232,7 +258,7 @@ pub fn in_step_shapes(record: &Record, noise: &RecordNoise) -> Vec<Vec<[f64; IN_
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::experiment::Experiment;
+    use crate::experiment::{Experiment, Specimen};
 
     /// A recording of two angles that swing at two frequencies.
     fn record() -> Record {
@@ -249,14 +275,14 @@ mod tests {
         let records = [record()];
         let mut problem = Problem::new(&records, &Experiment::default(), &[]).unwrap();
         let colour = vec![Colour { rho: 0.3, share: 1.0 }, Colour::default()];
-        let noise = RecordNoise { sd_rad: vec![1e-3, 2e-3], colour, across: -0.6, in_step: 0.25 };
+        let noise = RecordNoise { sd_rad: vec![1e-3, 2e-3], colour, across: Across::of(2, |_, _| -0.6), in_step: 0.25 };
         problem.noise = vec![noise.clone()];
         let values: Vec<Value> = (0..2)
             .flat_map(|link| (0..200).map(move |row| Value { link, row, predicted_rad: 0.0, rate_rad_s: 0.0 }))
             .collect();
         // the covariance as it is stated: coloured noise and errors in step
         let shapes = in_step_shapes(&records[0], &noise);
-        let stationary = (1.0 - 0.3f64.powi(2)).sqrt() * noise.across;
+        let stationary = (1.0 - 0.3f64.powi(2)).sqrt() * -0.6;
         let covariance = DMatrix::from_fn(400, 400, |i, j| {
             let (a, b) =
                 if values[i].link <= values[j].link { (&values[i], &values[j]) } else { (&values[j], &values[i]) };
@@ -269,7 +295,7 @@ mod tests {
                 return sizes * noise.colour[a.link].rho.powi(steps) + in_step;
             }
             // the first angle remembers what both had at an earlier row, the second one forgets
-            let at_once = if b.row == 0 { noise.across } else { stationary };
+            let at_once = if b.row == 0 { -0.6 } else { stationary };
             if a.row >= b.row { sizes * at_once * 0.3f64.powi(steps) } else { 0.0 }
         });
         let whitening = Whitening::of(&problem, 0, &values);
@@ -287,14 +313,52 @@ mod tests {
     }
 
     #[test]
+    fn the_noise_of_three_angles_that_goes_together_is_whitened_where_some_are_missing() {
+        let two = record();
+        let mut theta_rad = two.theta_rad.clone();
+        theta_rad.push(theta_rad[0].clone());
+        theta_rad[0][20..40].fill(None);
+        theta_rad[1][30..50].fill(None);
+        let records = [Record::uniform("made", two.t_s, theta_rad)];
+        let specimen = Specimen { link_lengths_m: vec![0.1; 3], ..Experiment::default().specimen };
+        let experiment = Experiment { specimen, ..Experiment::default() };
+        let mut problem = Problem::new(&records, &experiment, &[]).unwrap();
+        let between = |i: usize, j: usize| [[0.0, 0.8, 0.6], [0.0, 0.0, -0.1]][i][j];
+        let sd_rad = [1e-3, 2e-3, 3e-3];
+        problem.noise = vec![RecordNoise { across: Across::of(3, between), ..RecordNoise::white(sd_rad.to_vec()) }];
+        let seen = |link: usize, row: usize| records[0].theta_rad[link][row].is_some();
+        let values: Vec<Value> = (0..3)
+            .flat_map(|link| (0..200).map(move |row| Value { link, row, predicted_rad: 0.0, rate_rad_s: 0.0 }))
+            .filter(|v| seen(v.link, v.row))
+            .collect();
+        let correlations = &problem.noise[0].across;
+        let covariance = DMatrix::from_fn(values.len(), values.len(), |i, j| {
+            let (a, b) = (&values[i], &values[j]);
+            let correlation = if a.link == b.link { 1.0 } else { correlations.between(a.link, b.link) };
+            if a.row == b.row { correlation * sd_rad[a.link] * sd_rad[b.link] } else { 0.0 }
+        });
+        let whitening = Whitening::of(&problem, 0, &values);
+        let mut once = covariance;
+        whitening.apply(&mut once);
+        let mut twice = once.transpose();
+        whitening.apply(&mut twice);
+        let off = (&twice - DMatrix::identity(values.len(), values.len())).amax();
+        assert!(off < 1e-9, "{off}");
+        let given: Vec<f64> = (0..values.len()).map(|i| (i * i % 37) as f64).collect();
+        let mut back = given.clone();
+        whitening.colour(&mut back);
+        whitening.whiten(&mut back);
+        assert!(given.iter().zip(&back).all(|(a, b)| (a - b).abs() < 1e-9));
+    }
+
+    #[test]
     fn white_noise_beside_coloured_noise_is_whitened_across_a_gap() {
         let mut record = record();
         record.theta_rad[0][70..95].fill(None);
         let records = [record];
         let mut problem = Problem::new(&records, &Experiment::default(), &[]).unwrap();
         let colour = vec![Colour { rho: 0.9, share: 0.6 }, Colour { rho: 0.97, share: 0.3 }];
-        problem.noise =
-            vec![RecordNoise { sd_rad: vec![1e-3, 2e-3], colour: colour.clone(), across: 0.0, in_step: 0.0 }];
+        problem.noise = vec![RecordNoise { colour: colour.clone(), ..RecordNoise::white(vec![1e-3, 2e-3]) }];
         let seen = |link: usize, row: usize| link == 1 || !(70..95).contains(&row);
         let values: Vec<Value> = (0..2)
             .flat_map(|link| (0..200).map(move |row| Value { link, row, predicted_rad: 0.0, rate_rad_s: 0.0 }))

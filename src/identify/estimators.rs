@@ -73,6 +73,8 @@ pub(super) struct Whole<'a> {
     pub modulated: Option<&'a Modulated>,
     pub noise_rad: &'a [f64],
     pub measured: Measured,
+    /// Amplitude of what swings three times as fast as the slowest mode.
+    pub third_rad: f64,
 }
 
 /// What every method says about one mode.
@@ -239,19 +241,43 @@ const FARTHEST_LAW: f64 = 0.5;
 /// Nearness to three times the slowest frequency at which a mode and the harmonic of a large swing mix.
 const HARMONIC_BAND: f64 = 0.06;
 
+/// Whether a mode lies at three times the slowest frequency.
+pub(super) fn is_on_third_harmonic(fit: &SinusoidFit, mode: usize) -> bool {
+    let times = fit.poles[mode].omega_rad_s / fit.poles[0].omega_rad_s;
+    mode > 0 && (times / 3.0 - 1.0).abs() <= HARMONIC_BAND
+}
+
 /// How much a mode at three times the slowest frequency may be that one's third harmonic, 0 to 1.
 ///
 /// sin θ and the turning of the links give a swing of amplitude A a harmonic of up to about A³/20 in a chain, more where the mode resonates with it;
 /// within windows of a few cycles it cannot be told from the mode, whose frequency and damping are then neither's.
 pub(super) fn harmonic_share(fit: &SinusoidFit, mode: usize) -> f64 {
-    let times = fit.poles[mode].omega_rad_s / fit.poles[0].omega_rad_s;
-    if mode == 0 || (times / 3.0 - 1.0).abs() > HARMONIC_BAND {
+    if !is_on_third_harmonic(fit, mode) {
         return 0.0;
     }
     (fit.amplitude_rad(0).powi(3) / 20.0 / fit.amplitude_rad(mode).max(f64::MIN_POSITIVE)).min(1.0)
 }
 
 impl Choice {
+    /// The slowest mode's, with intervals that allow for one that swings three times as fast, which gives energy to it and takes it back: its torque on the slowest goes with
+    /// A₀²A₁, and what it holds is A₁²(3ω)² of A₀²ω². Of both only the order is known.
+    pub fn beside_resonance(self, whole: &Whole, mode: usize) -> Self {
+        let (slowest_rad, third_rad) = (whole.fit.amplitude_rad(0), whole.third_rad);
+        // of one link alone the harmonic is gravity's
+        if mode > 0 || third_rad == 0.0 || whole.signal.links.len() < 2 || whole.measured == Measured::Displacement {
+            return self;
+        }
+        let turned_rad = whole.fit.poles[0].omega_rad_s * whole.signal.duration_s();
+        // no more is taken than it has
+        let exchanged = (3.0 * third_rad / slowest_rad).powi(2).min(1.0) / (2.0 * turned_rad);
+        Self {
+            frequency_hz: relatively_blurred(self.frequency_hz, Bounds::OTHER.kappa[1] * slowest_rad * third_rad),
+            damping_ratio: self.damping_ratio.blurred(exchanged),
+            basis: format!("{}; widened: what swings three times as fast exchanges energy with it", self.basis),
+            ..self
+        }
+    }
+
     /// With intervals that allow for the third harmonic of the slowest mode.
     pub fn beside_harmonic(self, fit: &SinusoidFit, mode: usize) -> Self {
         let share = harmonic_share(fit, mode);

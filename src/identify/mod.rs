@@ -32,6 +32,7 @@ mod mode;
 pub mod modes;
 pub mod modulated;
 pub mod pencil;
+mod pendulum;
 pub mod pole;
 mod numerics;
 mod outliers;
@@ -291,7 +292,7 @@ impl Identification {
     }
 
     fn add_modes(&mut self, recorded: &Signal, chosen: Chosen, body: Option<&Body>) {
-        let Chosen { fit, count } = chosen;
+        let Chosen { fit, count, third_rad } = chosen;
         self.drift_rad = fit.drift_ranges_rad(recorded);
         let signal = &fit.without_drift(recorded);
         let windows = Windows::of(signal, &fit);
@@ -310,6 +311,7 @@ impl Identification {
             modulated: modulated.as_ref(),
             noise_rad,
             measured: self.record.measured,
+            third_rad,
         };
         let gravity_m_s2 = body.map_or(Rig::default().gravity_m_s2, |b| b.experiment.rig.gravity_m_s2);
         let same_links = body.map(|b| &b.chain).filter(|chain| chain.count() == signal.links.len());

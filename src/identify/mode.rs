@@ -101,7 +101,8 @@ impl Mode {
         };
         let choice = estimators
             .choose(whole, envelope.as_ref(), damping_trend, &amplitudes_rad, mode)
-            .beside_harmonic(whole.fit, mode);
+            .beside_harmonic(whole.fit, mode)
+            .beside_resonance(whole, mode);
         let raw = estimators.raw;
         Self {
             number: mode + 1,

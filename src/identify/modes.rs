@@ -4,6 +4,7 @@ use serde::Serialize;
 
 use super::close_pair::close_pair;
 use super::estimate::{f_tail, probability};
+use super::estimators::is_on_third_harmonic;
 use super::excess::Excess;
 use super::modulated::Modulated;
 use super::pencil::matrix_pencil;
@@ -36,6 +37,8 @@ pub struct Chosen {
     pub fit: SinusoidFit,
     /// One mode or two.
     pub count: ModeCount,
+    /// Amplitude of what swings three times as fast as the slowest mode, whether it is one or that mode's harmonic; 0 where nothing does.
+    pub third_rad: f64,
 }
 
 /// Terms of drift, half a cycle each, at most: what makes fewer than three cycles in a record is not told from a drift.
@@ -79,7 +82,7 @@ pub fn choose_modes(signal: &Signal, spectrum: &Spectrum, measured: Measured) ->
         Some(two) => decide(signal, spectrum, measured, one, two),
         None => {
             let statement = "one mode; no second one is seen".to_owned();
-            Chosen { fit: one, count: ModeCount { modes: 1, bic_gain: None, p_value: None, statement } }
+            Chosen { fit: one, count: ModeCount { modes: 1, bic_gain: None, p_value: None, statement }, third_rad: 0.0 }
         }
     };
     Ok(chosen.separated(signal, measured))
@@ -98,6 +101,7 @@ impl Chosen {
         Self {
             fit: sorted(pair, signal),
             count: ModeCount { modes: 2, bic_gain: Some(bic_gain), p_value: None, statement },
+            third_rad: 0.0,
         }
     }
 }
@@ -233,7 +237,13 @@ fn decide(signal: &Signal, spectrum: &Spectrum, measured: Measured, one: Sinusoi
         )
     };
     let count = ModeCount { modes, bic_gain: Some(bic_gain), p_value: Some(p_value), statement };
-    Chosen { fit: if modes == 2 { sorted(two, signal) } else { one }, count }
+    let is_seen = modes == 2 || harmonic && p_value < LEAST_P && bic_gain > 10.0;
+    if !is_seen {
+        return Chosen { fit: one, count, third_rad: 0.0 };
+    }
+    let two = sorted(two, signal);
+    let third_rad = if is_on_third_harmonic(&two, 1) { two.amplitude_rad(1) } else { 0.0 };
+    Chosen { fit: if modes == 2 { two } else { one }, count, third_rad }
 }
 
 /// Lowest frequency first.

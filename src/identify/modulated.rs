@@ -12,6 +12,7 @@ use super::damping::{Trend, is_above};
 use super::envelope::{Bounds, FrequencyLaw, PENDULUM, THEORY_TOLERANCE};
 use super::estimate::{Estimate, f_tail};
 use super::excess::Excess;
+use super::pendulum;
 use super::signal::Signal;
 use super::sinusoids::SinusoidFit;
 use super::slow_flow::{Coefficients, SETS, SlowFlow};
@@ -103,6 +104,8 @@ fn prior_of_k(recorded: &Signal, amplitude_rad: f64, measured: Measured) -> [f64
 struct Told<'f, 'a> {
     flow: &'f SlowFlow<'a>,
     own: Coefficients,
+    /// k before gravity alone is assumed, with its standard deviation.
+    seen_k: [f64; 2],
     /// A₀.
     amplitude_rad: f64,
     /// In the end, over A₀.
@@ -115,15 +118,25 @@ struct Told<'f, 'a> {
 
 impl<'f, 'a> Told<'f, 'a> {
     fn of(flow: &'f SlowFlow<'a>) -> Option<Self> {
-        let own = flow.coefficients();
-        let beside = Excess::of(&flow.residual()?, own.omega_rad_s);
+        let seen = flow.coefficients();
+        let beside = Excess::of(&flow.residual()?, seen.omega_rad_s);
         // a fit that failed is no evidence
         let is_noise = beside.over_scatter <= MOST_BESIDE && !flow.is_beyond_hung_bodies(ANY_K);
         (beside.power <= 1.0 || is_noise).then_some(())?;
         let (amplitude_rad, last) = (flow.amplitude_rad()?, flow.last()?);
         // what errors of the recording that go with the swing do to the oscillation, least squares sees with the power that they have there
-        let covariance = flow.covariance()? * beside.power;
-        Some(Self { flow, own, amplitude_rad, last, covariance, p_value: beside.p_value })
+        let mut covariance = flow.covariance()?;
+        let seen_k = [seen.k, (covariance[(1, 1)] * beside.power).sqrt()];
+        let mut values = seen.values();
+        let is_link = flow.measured == Measured::Angles && flow.signal.links.len() == 1;
+        if is_link && !flow.is_beyond_hung_bodies(ANY_K) {
+            let priors = [flow.prior, pendulum::by_gravity(amplitude_rad)];
+            pendulum::under_both(&mut values, &mut covariance, beside.power, priors);
+        } else {
+            covariance *= beside.power;
+        }
+        let own = Coefficients::of(values);
+        Some(Self { flow, own, seen_k, amplitude_rad, last, covariance, p_value: beside.p_value })
     }
 
     /// Of a linear function of ω₀, k, β₀, β₁, β₂.
@@ -205,7 +218,10 @@ impl<'f, 'a> Told<'f, 'a> {
             Measured::Displacement => k > -2.0 * self.k_sd(),
         };
         let fourth = Bounds::of(true, self.flow.measured).fourth[0];
-        let next = if is_pendulum { fourth * (self.last * self.amplitude_rad2()).powi(2) } else { (k * last).powi(2) };
+        // where a spring cancels what gravity does to the first power, it does not cancel the next
+        let larger = k.abs().max(PENDULUM * self.amplitude_rad2());
+        let next =
+            if is_pendulum { fourth * (self.last * self.amplitude_rad2()).powi(2) } else { (larger * last).powi(2) };
         // the second order in δ/A is a part of the phase
         let of_friction = (self.own.shift() / last).powi(2) / (omega * self.flow.signal.duration_s());
         // of what drag makes of the frequency the equivalent linear damper tells only the order
@@ -217,13 +233,14 @@ impl<'f, 'a> Told<'f, 'a> {
         let turn = std::f64::consts::TAU;
         let f0_hz = self.estimate(self.own.omega_rad_s / turn, [1.0 / turn, 0.0, 0.0, 0.0, 0.0]);
         let k = self.estimate(self.own.k, [0.0, 1.0, 0.0, 0.0, 0.0]);
+        let [seen_k, seen_sd] = self.seen_k;
         let trend = self.trend();
         let (large, small) = (self.damping_ratio(1.0), self.damping_ratio(self.last));
         let modulated = Modulated {
             frequency: FrequencyLaw {
                 f0_hz: f0_hz.blurred(self.left_out() * f0_hz.value),
                 kappa_per_rad2: k.times(self.amplitude_rad.powi(-2)),
-                p_constant: f_tail((k.value / k.sd).powi(2), 1.0, self.flow.degrees_of_freedom()),
+                p_constant: f_tail((seen_k / seen_sd).powi(2), 1.0, self.flow.degrees_of_freedom()),
                 p_value: self.p_value,
             },
             damping_ratio: match trend {

@@ -60,7 +60,7 @@ pub struct SlowFlow<'a> {
     /// What was recorded.
     pub signal: &'a Signal,
     /// Mean and standard deviation of k.
-    prior: [f64; 2],
+    pub prior: [f64; 2],
     /// Angles, or a displacement.
     pub measured: Measured,
     /// Of each link.
@@ -104,8 +104,15 @@ pub struct Coefficients {
 }
 
 impl Coefficients {
-    fn of([omega_rad_s, k, dry, viscous, drag]: [f64; 5]) -> Self {
+    /// Of these, in order.
+    pub fn of([omega_rad_s, k, dry, viscous, drag]: [f64; 5]) -> Self {
         Self { omega_rad_s, k, losses_per_s: [dry, viscous, drag] }
+    }
+
+    /// All of them, in order.
+    pub fn values(&self) -> [f64; 5] {
+        let [dry, viscous, drag] = self.losses_per_s;
+        [self.omega_rad_s, self.k, dry, viscous, drag]
     }
 
     /// δ of dry friction over A₀.

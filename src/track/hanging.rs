@@ -110,9 +110,13 @@ fn of_look(
     let crowd = movers.len();
     // every mover may be the one that the others are like; the largest set that hangs from something counts
     let sets = movers.iter().filter_map(|first| {
-        let mut marks = without_shadows(things, without_covered(things, rigid_set(things, &movers, *first)));
-        order(things, &mut marks);
-        hangs(things, &marks).filter(|_| !is_part(&marks)).map(|arc| (marks, arc))
+        let marks = without_shadows(things, without_covered(things, rigid_set(things, &movers, *first)));
+        let [likely, by_picture] = orders(things, marks);
+        let hung = match hangs(things, &likely) {
+            Some(arc) => Some((likely, arc)),
+            None => hangs_against(things, &by_picture).map(|arc| (by_picture, Some(arc))),
+        };
+        hung.filter(|(marks, _)| !is_part(marks))
     });
     // of two like ones that which swings farther
     let farthest_px = |marks: &[usize]| marks.iter().map(|i| things[*i].travel_px).fold(0.0, f64::max);
@@ -162,6 +166,13 @@ fn hangs(things: &[Thing], marks: &[usize]) -> Option<Option<Arc>> {
     }
 }
 
+/// The same of marks in the picture's order, of which an upper one swings farther: two links that swing in opposite phase, and so at one frequency.
+fn hangs_against(things: &[Thing], marks: &[usize]) -> Option<Arc> {
+    let first = &things[*marks.first()?];
+    let together = |i: &usize| things[*i].correlation(first).abs() > MOVES_WITH;
+    hangs(things, marks)?.filter(|arc| shows_centre(arc, first) && marks.iter().all(together))
+}
+
 /// A still thing that something covers from time to time seems to move as well: by less than a quarter of its radius; or by less than its radius, about no clear
 /// centre or about a point within itself, and mostly in the middle of its way, where what swings seldom is until it has decayed.
 fn is_covered(thing: &Thing) -> bool {
@@ -169,11 +180,13 @@ fn is_covered(thing: &Thing) -> bool {
         return true;
     }
     let path = thing.places_px();
-    let shows_centre = || {
-        Arc::of(&path, thing.radius_px())
-            .is_some_and(|arc| arc.sd_px[0].max(arc.sd_px[1]) < arc.radius_px && arc.radius_px > thing.radius_px())
-    };
-    is_slight(thing) && kurtosis(&path) > KURTOSIS_OF_NOISE && !shows_centre()
+    let shows = || Arc::of(&path, thing.radius_px()).is_some_and(|arc| shows_centre(&arc, thing));
+    is_slight(thing) && kurtosis(&path) > KURTOSIS_OF_NOISE && !shows()
+}
+
+/// A thing's path shows where it hangs, and not within itself.
+fn shows_centre(arc: &Arc, thing: &Thing) -> bool {
+    arc.sd_px[0].max(arc.sd_px[1]) < arc.radius_px && arc.radius_px > thing.radius_px()
 }
 
 /// The things without those that may only be covered now and then: all, where the one that moves farthest may be; otherwise those that do not move as that one does.
@@ -276,14 +289,16 @@ fn without_shadows(things: &[Thing], mut marks: Vec<usize>) -> Vec<usize> {
     kept
 }
 
-/// From the hinge down: what swings farther is lower, and what is lower in the picture where both swing alike.
-fn order(things: &[Thing], marks: &mut [usize]) {
+/// From the hinge down, the likelier order first: what swings farther is lower, and what is lower in the picture where both swing alike; or by the picture alone, as links
+/// that swing against each other may let the upper mark swing farther.
+fn orders(things: &[Thing], mut marks: Vec<usize>) -> [Vec<usize>; 2] {
     let lowest = |i: usize| {
         let mut y: Vec<f64> = things[i].path.iter().flatten().map(|p| p[1]).collect();
         y.sort_unstable_by(f64::total_cmp);
         y.get(y.len() * 19 / 20).copied().unwrap_or(0.0)
     };
     marks.sort_by(|a, b| lowest(*a).total_cmp(&lowest(*b)));
+    let by_picture = marks.clone();
     // insertion, so that pairs that swing alike keep their order in the picture
     for i in 1..marks.len() {
         for k in (1..=i).rev() {
@@ -292,6 +307,7 @@ fn order(things: &[Thing], marks: &mut [usize]) {
             }
         }
     }
+    [marks, by_picture]
 }
 
 /// The still thing at the centre of the first mark's arc.
@@ -406,6 +422,18 @@ mod tests {
         };
         let things = [thing(0, lower, true), thing(0, upper, true)];
         assert!(is_covered(&things[1]), "by itself it might be a thing that is covered");
+        assert_eq!(longest(&things, &["#c83424".to_owned()]).unwrap().marks, [1, 0]);
+    }
+
+    #[test]
+    fn an_upper_mark_may_swing_farther_than_the_one_below_it() {
+        // links that swing against each other
+        let lower = |t: f64| {
+            let theta: f64 = -0.56 * (3.0 * t).sin();
+            [joint(t)[0] + 220.0 * theta.sin(), joint(t)[1] + 220.0 * theta.cos()]
+        };
+        let things = [thing(0, lower, true), thing(0, joint, true)];
+        assert!(things[1].travel_px > CLEARLY_FARTHER * things[0].travel_px);
         assert_eq!(longest(&things, &["#c83424".to_owned()]).unwrap().marks, [1, 0]);
     }
 

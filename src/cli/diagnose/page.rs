@@ -25,7 +25,7 @@ pub(super) fn page(diagnosis: &Diagnosis) -> String {
     }
     if let Some(Pieces { count, length_s }) = diagnosis.pieces {
         let pieces = format!(
-            "Fitted were {count} pieces of {length_s:.1} s, each with a start of its own: every model errs by more than the noise, and over a whole recording small errors add up."
+            "Fitted were {count} pieces of {length_s:.1} s, each with a start of its own: over a whole recording the small errors of a model add up."
         );
         text.push_str(&paragraph("", &pieces));
     }

@@ -185,7 +185,7 @@ fn at(place: &str) -> String {
     match place {
         "hinge" => "at the hinge".to_owned(),
         "joint" => "in the joint".to_owned(),
-        "air" => "along the strip, as air does".to_owned(),
+        "air" => "along the specimen, as air does".to_owned(),
         "camera" => "in the camera".to_owned(),
         other => other.to_owned(),
     }
