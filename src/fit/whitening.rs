@@ -218,10 +218,12 @@ fn beside(record: &Record, across: &Across, values: &[Value]) -> Vec<Beside> {
     let mut place = vec![vec![None; record.len()]; record.links()];
     values.iter().enumerate().for_each(|(i, value)| place[value.link][value.row] = Some(i));
     // most rows of an angle lack none of the others
-    let (mut known, mut link): (Vec<(SmallVec<[usize; 4]>, Given)>, usize) = (Vec::new(), 0);
+    let mut known: Vec<(SmallVec<[usize; 4]>, Given)> = Vec::new();
+    let mut link = 0;
     let of = |value: &Value| {
         if value.link != link {
-            (known, link) = (Vec::new(), value.link);
+            link = value.link;
+            known.clear();
         }
         let above: SmallVec<[usize; 4]> = (0..link).filter(|link| place[*link][value.row].is_some()).collect();
         let places = above.iter().filter_map(|link| place[*link][value.row]).collect::<SmallVec<[usize; 2]>>();
