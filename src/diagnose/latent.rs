@@ -24,6 +24,7 @@ use nalgebra::{DMatrix, DVector};
 use super::effect::Place;
 use super::linearisation::{Input, Linearisation};
 use super::refit::Refit;
+use crate::fit::across::Memo;
 use crate::fit::whitening::{Colour, IN_STEP_SHAPES, RecordNoise, in_step_shapes};
 use crate::statistics::median_step_s;
 
@@ -290,6 +291,7 @@ impl<'a> Filter<'a> {
         let mut moved = DMatrix::zeros(total, total);
         let (mut slopes, mut gain) = (DVector::zeros(total), DVector::zeros(total));
         let goes_together = !self.noise.across.is_none();
+        let mut memo = Memo::new(&self.noise.across);
         for k in 0..self.around.rows.len() {
             if k > 0 {
                 let transition = &self.transitions[k - 1];
@@ -320,7 +322,7 @@ impl<'a> Filter<'a> {
                 if goes_together {
                     let own = (mark, left, slopes.clone(), white_rad);
                     let marks: Vec<usize> = above.iter().map(|other| other.0).collect();
-                    let given = self.noise.across.given(mark, &marks);
+                    let given = memo.given(mark, &marks);
                     for ((_, other, of_other, other_rad), part) in above.iter().zip(&given.beta) {
                         let shared = part * white_rad / other_rad;
                         left -= shared * other;

@@ -79,6 +79,29 @@ impl Across {
     }
 }
 
+/// What was found of angles before, of which most rows ask the same.
+pub struct Memo<'a> {
+    across: &'a Across,
+    known: Vec<(usize, SmallVec<[usize; 4]>, Given)>,
+}
+
+impl<'a> Memo<'a> {
+    /// Of nothing yet.
+    pub fn new(across: &'a Across) -> Self {
+        Self { across, known: Vec::new() }
+    }
+
+    /// What those `before` say of an angle.
+    pub fn given(&mut self, angle: usize, before: &[usize]) -> &Given {
+        let place = self.known.iter().position(|own| own.0 == angle && own.1[..] == *before);
+        let place = place.unwrap_or_else(|| {
+            self.known.push((angle, SmallVec::from_slice(before), self.across.given(angle, before)));
+            self.known.len() - 1
+        });
+        &self.known[place].2
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

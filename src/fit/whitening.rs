@@ -20,7 +20,7 @@ use nalgebra::{DMatrix, DVector};
 use smallvec::SmallVec;
 
 use super::Problem;
-use super::across::{Across, Given};
+use super::across::{Across, Memo};
 use super::predict::Value;
 use super::record::Record;
 use crate::statistics::median_step_s;
@@ -217,23 +217,12 @@ fn beside(record: &Record, across: &Across, values: &[Value]) -> Vec<Beside> {
     }
     let mut place = vec![vec![None; record.len()]; record.links()];
     values.iter().enumerate().for_each(|(i, value)| place[value.link][value.row] = Some(i));
-    // most rows of an angle lack none of the others
-    let mut known: Vec<(SmallVec<[usize; 4]>, Given)> = Vec::new();
-    let mut link = 0;
+    let mut memo = Memo::new(across);
     let of = |value: &Value| {
-        if value.link != link {
-            link = value.link;
-            known.clear();
-        }
-        let above: SmallVec<[usize; 4]> = (0..link).filter(|link| place[*link][value.row].is_some()).collect();
-        let places = above.iter().filter_map(|link| place[*link][value.row]).collect::<SmallVec<[usize; 2]>>();
-        let at = known.iter().position(|own| own.0 == above).unwrap_or_else(|| {
-            let given = across.given(link, &above);
-            known.push((above, given));
-            known.len() - 1
-        });
-        let given = &known[at].1;
-        Beside { of: places.into_iter().zip(given.beta.iter().copied()).collect(), sd: given.sd }
+        let above: SmallVec<[usize; 4]> = (0..value.link).filter(|link| place[*link][value.row].is_some()).collect();
+        let places = above.iter().filter_map(|link| place[*link][value.row]);
+        let given = memo.given(value.link, &above);
+        Beside { of: places.zip(given.beta.iter().copied()).collect(), sd: given.sd }
     };
     values.iter().map(of).collect()
 }
@@ -272,6 +261,30 @@ mod tests {
         Record { in_step: 0.25, ..Record::uniform("made", t_s, theta_rad) }
     }
 
+    /// The 200 rows of so many angles that are seen.
+    fn values(links: usize, seen: impl Fn(usize, usize) -> bool) -> Vec<Value> {
+        (0..links)
+            .flat_map(|link| (0..200).map(move |row| Value { link, row, predicted_rad: 0.0, rate_rad_s: 0.0 }))
+            .filter(|v| seen(v.link, v.row))
+            .collect()
+    }
+
+    /// Noise of this covariance is white afterwards, and as it was when it is coloured again.
+    fn assert_whitens(whitening: &Whitening, covariance: DMatrix<f64>) {
+        let count = covariance.nrows();
+        let mut once = covariance;
+        whitening.apply(&mut once);
+        let mut twice = once.transpose();
+        whitening.apply(&mut twice);
+        let off = (&twice - DMatrix::identity(count, count)).amax();
+        assert!(off < 1e-9, "{off}");
+        let given: Vec<f64> = (0..count).map(|i| (i * i % 37) as f64).collect();
+        let mut back = given.clone();
+        whitening.colour(&mut back);
+        whitening.whiten(&mut back);
+        assert!(given.iter().zip(&back).all(|(a, b)| (a - b).abs() < 1e-9));
+    }
+
     #[test]
     fn whitened_errors_have_unit_variance_in_every_direction() {
         let records = [record()];
@@ -279,9 +292,7 @@ mod tests {
         let colour = vec![Colour { rho: 0.3, share: 1.0 }, Colour::default()];
         let noise = RecordNoise { sd_rad: vec![1e-3, 2e-3], colour, across: Across::of(2, |_, _| -0.6), in_step: 0.25 };
         problem.noise = vec![noise.clone()];
-        let values: Vec<Value> = (0..2)
-            .flat_map(|link| (0..200).map(move |row| Value { link, row, predicted_rad: 0.0, rate_rad_s: 0.0 }))
-            .collect();
+        let values = values(2, |_, _| true);
         // the covariance as it is stated: coloured noise and errors in step
         let shapes = in_step_shapes(&records[0], &noise);
         let stationary = (1.0 - 0.3f64.powi(2)).sqrt() * -0.6;
@@ -301,17 +312,7 @@ mod tests {
             if a.row >= b.row { sizes * at_once * 0.3f64.powi(steps) } else { 0.0 }
         });
         let whitening = Whitening::of(&problem, 0, &values);
-        let mut once = covariance;
-        whitening.apply(&mut once);
-        let mut twice = once.transpose();
-        whitening.apply(&mut twice);
-        let off = (&twice - DMatrix::identity(400, 400)).amax();
-        assert!(off < 1e-9, "{off}");
-        let given: Vec<f64> = (0..400).map(|i| f64::from(i * i % 37)).collect();
-        let mut back = given.clone();
-        whitening.colour(&mut back);
-        whitening.whiten(&mut back);
-        assert!(given.iter().zip(&back).all(|(a, b)| (a - b).abs() < 1e-9));
+        assert_whitens(&whitening, covariance);
     }
 
     #[test]
@@ -329,10 +330,7 @@ mod tests {
         let sd_rad = [1e-3, 2e-3, 3e-3];
         problem.noise = vec![RecordNoise { across: Across::of(3, between), ..RecordNoise::white(sd_rad.to_vec()) }];
         let seen = |link: usize, row: usize| records[0].theta_rad[link][row].is_some();
-        let values: Vec<Value> = (0..3)
-            .flat_map(|link| (0..200).map(move |row| Value { link, row, predicted_rad: 0.0, rate_rad_s: 0.0 }))
-            .filter(|v| seen(v.link, v.row))
-            .collect();
+        let values = values(3, seen);
         let correlations = &problem.noise[0].across;
         let covariance = DMatrix::from_fn(values.len(), values.len(), |i, j| {
             let (a, b) = (&values[i], &values[j]);
@@ -340,17 +338,7 @@ mod tests {
             if a.row == b.row { correlation * sd_rad[a.link] * sd_rad[b.link] } else { 0.0 }
         });
         let whitening = Whitening::of(&problem, 0, &values);
-        let mut once = covariance;
-        whitening.apply(&mut once);
-        let mut twice = once.transpose();
-        whitening.apply(&mut twice);
-        let off = (&twice - DMatrix::identity(values.len(), values.len())).amax();
-        assert!(off < 1e-9, "{off}");
-        let given: Vec<f64> = (0..values.len()).map(|i| (i * i % 37) as f64).collect();
-        let mut back = given.clone();
-        whitening.colour(&mut back);
-        whitening.whiten(&mut back);
-        assert!(given.iter().zip(&back).all(|(a, b)| (a - b).abs() < 1e-9));
+        assert_whitens(&whitening, covariance);
     }
 
     #[test]
@@ -362,10 +350,7 @@ mod tests {
         let colour = vec![Colour { rho: 0.9, share: 0.6 }, Colour { rho: 0.97, share: 0.3 }];
         problem.noise = vec![RecordNoise { colour: colour.clone(), ..RecordNoise::white(vec![1e-3, 2e-3]) }];
         let seen = |link: usize, row: usize| link == 1 || !(70..95).contains(&row);
-        let values: Vec<Value> = (0..2)
-            .flat_map(|link| (0..200).map(move |row| Value { link, row, predicted_rad: 0.0, rate_rad_s: 0.0 }))
-            .filter(|v| seen(v.link, v.row))
-            .collect();
+        let values = values(2, seen);
         let covariance = DMatrix::from_fn(values.len(), values.len(), |i, j| {
             let (a, b) = (&values[i], &values[j]);
             if a.link != b.link {
@@ -377,11 +362,6 @@ mod tests {
             sd_rad.powi(2) * (share * rho.powi(a.row.abs_diff(b.row) as i32) + white)
         });
         let whitening = Whitening::of(&problem, 0, &values);
-        let mut once = covariance;
-        whitening.apply(&mut once);
-        let mut twice = once.transpose();
-        whitening.apply(&mut twice);
-        let off = (&twice - DMatrix::identity(values.len(), values.len())).amax();
-        assert!(off < 1e-9, "{off}");
+        assert_whitens(&whitening, covariance);
     }
 }

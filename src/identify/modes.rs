@@ -220,7 +220,8 @@ fn decide(signal: &Signal, spectrum: &Spectrum, measured: Measured, one: Sinusoi
     let is_small = small < noise_rad.max(of_swing);
     let is_multiple = (times - times.round()).abs() < 0.03 && times.round() >= 2.0;
     let harmonic = is_multiple && (is_small || one_has_it(signal, &one, &two, measured));
-    let modes = if p_value < LEAST_P && bic_gain > 10.0 && !harmonic { 2 } else { 1 };
+    let is_seen = p_value < LEAST_P && bic_gain > 10.0;
+    let modes = if is_seen && !harmonic { 2 } else { 1 };
     let statement = if harmonic {
         format!(
             "one mode; the line at {:.4} Hz is its harmonic number {times:.0}, {:.1e} of its amplitude",
@@ -237,7 +238,6 @@ fn decide(signal: &Signal, spectrum: &Spectrum, measured: Measured, one: Sinusoi
         )
     };
     let count = ModeCount { modes, bic_gain: Some(bic_gain), p_value: Some(p_value), statement };
-    let is_seen = modes == 2 || harmonic && p_value < LEAST_P && bic_gain > 10.0;
     if !is_seen {
         return Chosen { fit: one, count, third_rad: 0.0 };
     }

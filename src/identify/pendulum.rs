@@ -62,17 +62,17 @@ mod tests {
     const SPRING: [f64; 2] = [0.5, 2.0 / 3.0];
     const GRAVITY: [f64; 2] = [1.0, 0.04];
 
-    /// As a record alone of this mean and variance gives it.
-    fn known(mean: f64, variance: f64) -> [f64; 2] {
+    /// As a record alone of this mean and variance gives it, in noise of so much more power.
+    fn known(mean: f64, variance: f64, power: f64) -> [f64; 2] {
         let own = 1.0 / (1.0 / variance + SPRING[1].powi(-2));
-        mixture(own * (mean / variance + SPRING[0] / SPRING[1].powi(2)), own, 1.0, [SPRING, GRAVITY])
+        mixture(own * (mean / variance + SPRING[0] / SPRING[1].powi(2)), own, power, [SPRING, GRAVITY])
     }
 
     #[test]
     fn a_record_near_a_pendulum_s_k_is_drawn_to_it_and_one_far_off_is_not() {
-        let [near, variance] = known(0.9, 0.1 * 0.1);
+        let [near, variance] = known(0.9, 0.1 * 0.1, 1.0);
         assert!(near > 0.95 && near < 1.0 && variance.sqrt() < 0.07, "{near} {variance}");
-        let [far, variance] = known(0.3, 0.1 * 0.1);
+        let [far, variance] = known(0.3, 0.1 * 0.1, 1.0);
         assert!((far - 0.3).abs() < 0.02 && (variance.sqrt() - 0.1).abs() < 0.01, "{far} {variance}");
     }
 
@@ -87,20 +87,11 @@ mod tests {
     #[test]
     fn noise_of_more_power_says_less_of_k_and_leaves_the_priors_as_they_are() {
         // four times the power is twice the standard deviation of the record, whatever the priors
-        let own = |variance: f64| 1.0 / (1.0 / variance + SPRING[1].powi(-2));
-        let of = |variance: f64, power: f64| {
-            let k = own(variance) * (0.9 / variance + SPRING[0] / SPRING[1].powi(2));
-            mixture(k, own(variance), power, [SPRING, GRAVITY])
-        };
-        let (weak, same) = (of(0.01, 4.0), of(0.04, 1.0));
+        let (weak, same) = (known(0.9, 0.01, 4.0), known(0.9, 0.04, 1.0));
         assert!((weak[0] - same[0]).abs() < 1e-9 && (weak[1] - same[1]).abs() < 1e-9, "{weak:?} {same:?}");
         // a record far from both is believed
-        let [far, variance] = of_far();
+        let [far, variance] = known(30.0, 1e-4, 1.0);
         assert!((far - 30.0).abs() < 0.1 && variance > 0.0, "{far} {variance}");
-    }
-
-    fn of_far() -> [f64; 2] {
-        known(30.0, 1e-4)
     }
 
     #[test]
