@@ -117,7 +117,7 @@ mod tests {
         let problem =
             |experiment: &Experiment| Problem::new(std::slice::from_ref(&record), experiment, &[]).unwrap().shapes();
         let usual = problem(&experiment);
-        // two angles and a further shape, then their rates
+        // two angles and three further shapes, then their rates
         let prepared = Prepared {
             records: vec![record.clone()],
             part: 1.0,
@@ -125,11 +125,11 @@ mod tests {
             step_error_rad: 1e-6,
             experiment: experiment.clone(),
             base: Vec::new(),
-            begun: vec![0.1, 0.2, 0.3, 1.0, 2.0, 3.0],
+            begun: vec![0.1, 0.2, 0.3, 0.4, 0.5, 1.0, 2.0, 3.0, 4.0, 5.0],
             ended: Vec::new(),
             work: Work::default(),
         };
-        assert_eq!(usual, 3);
+        assert_eq!(usual, 5);
         assert_eq!(beginning(&prepared, &prepared.begun, &experiment, &[]).unwrap(), prepared.begun);
         experiment.model.pieces = 1;
         assert_eq!(problem(&experiment), 2);

@@ -6,6 +6,7 @@ use super::context::FitContext;
 use super::effect::bending_n_m2;
 use super::hypothesis::Hypothesis;
 use super::refit::Refit;
+use crate::error::Result;
 use crate::experiment::Experiment;
 use crate::fit::descent::Descent;
 use crate::fit::shooting::{STATE_NEAR, multiple_shooting, shooting_along};
@@ -75,7 +76,7 @@ impl<'a> FitContext<'a> {
 
     /// The problem of a hypothesis, and its variables from another fit and some given values.
     pub fn start(&self, hypothesis: &Hypothesis, near: &Refit<'_>, start: &Start) -> Option<(Problem<'a>, Vec<f64>)> {
-        let problem = self.problem(hypothesis, &self.noise_of(near)).ok()?;
+        let problem = self.problem_near(hypothesis, near).ok()?;
         let mut x = problem.start_values().ok()?;
         for (value, parameter) in x.iter_mut().zip(&problem.free) {
             let given = start.iter().find(|(p, _)| p == parameter).map(|(_, v)| *v);
@@ -91,7 +92,16 @@ impl<'a> FitContext<'a> {
         let lower = problem.lower();
         x.iter_mut().zip(&lower).for_each(|(x, low)| *x = x.max(*low));
         x.extend(problem.starts_from(&near.problem, &near.x));
-        Some((problem, x))
+        let held = if problem.is_held_as(&x) { problem } else { problem.held_as(&x) };
+        Some((held, x))
+    }
+
+    /// The problem of a hypothesis near another fit: judged by the same noise, and a strip in the same shapes.
+    ///
+    /// # Errors
+    /// As [`Problem::new`].
+    pub fn problem_near(&self, hypothesis: &Hypothesis, near: &Refit<'_>) -> Result<Problem<'a>> {
+        Ok(self.problem(hypothesis, &self.noise_of(near))?.held_like(&near.problem))
     }
 
     /// The noise by which a fit was judged, of these recordings.
@@ -108,8 +118,8 @@ impl<'a> FitContext<'a> {
     /// Fits a hypothesis from the start values of the experiment, by multiple shooting first: for a base model whose motion is out of step.
     /// It ends after its first steps unless they lead below a multiple of what is left without, by `beside`.
     pub fn refit_anew(&self, hypothesis: &Hypothesis, start: &Start, beside: &Refit<'_>) -> Option<Refit<'a>> {
-        let noise = self.noise_of(beside);
-        let mut problem = self.problem(hypothesis, &noise).ok()?;
+        let mut problem = self.problem_near(hypothesis, beside).ok()?;
+        let noise = problem.noise.clone();
         for (parameter, value) in start {
             set(&mut problem.experiment, *parameter, *value);
         }
@@ -209,8 +219,8 @@ impl<'a> FitContext<'a> {
         problem: Problem<'a>,
         x: Vec<f64>,
     ) -> Option<Refit<'a>> {
-        let outcome = straight::descend(&problem, &descent, x).filter(|outcome| outcome.cost.is_finite())?;
-        Some(Refit::of(hypothesis.clone(), problem, outcome))
+        let (problem, outcome) = straight::descend_as_held(problem, &descent, x)?;
+        Some(outcome).filter(|outcome| outcome.cost.is_finite()).map(|end| Refit::of(hypothesis.clone(), problem, end))
     }
 
     /// A fit whose motions start as short stretches show them to, whatever it makes of them.

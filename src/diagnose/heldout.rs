@@ -200,7 +200,7 @@ fn along(context: &FitContext<'_>, fit: &Refit<'_>, rows: usize) -> Option<Predi
     let grown = leaves_more_than_noise(&refitted, &context.settings.noise);
     let grown = grown.then(|| continued_alone(&part, &refitted)).flatten();
     let refitted = grown.into_iter().chain([refitted]).min_by(|a, b| a.chi2.total_cmp(&b.chi2))?;
-    let whole = context.problem(&fit.hypothesis, &fit.problem.noise).ok()?;
+    let whole = context.problem_near(&fit.hypothesis, &refitted).ok()?;
     let rmse_rad = errors(&whole.predict(0, &refitted.x, false).ok()?.values, record, rows)?;
     let left = residuals_of(&whole, &refitted.x, 0).ok();
     Some(Prediction { rmse_rad, left, ..Prediction::from(&refitted, &context.laws) })
@@ -219,7 +219,7 @@ fn beyond(context: &FitContext<'_>, fit: &Refit<'_>, pieces: usize) -> Option<Pr
     let onwards = context.on(&rest);
     let in_last = within(pieces).filter(|dropped| dropped.0 == last).map(|(_, at_s)| (0, at_s));
     let hypothesis = Hypothesis { dropped: in_last, ..fit.hypothesis.clone() };
-    let problem = onwards.problem(&hypothesis, &onwards.noise_of(fit)).ok()?;
+    let problem = onwards.problem_near(&hypothesis, &fitted).ok()?;
     let x = [&fitted.x[..free], &fitted.x[free + last * starts..]].concat();
     let rmse_rad = errors(&problem.predict(0, &x, false).ok()?.values, &rest[0], context.records[last].len())?;
     let before = (0..last).map(|piece| fitted.residuals(piece));

@@ -101,7 +101,7 @@ impl<'g, 'a> Screen<'g, 'a> {
         }
         let mut hypothesis = self.fit.hypothesis.clone();
         hypothesis.effects.extend(effects);
-        let mut problem = self.context.problem(&hypothesis, &self.fit.problem.noise).ok()?;
+        let mut problem = self.context.problem_near(&hypothesis, self.fit).ok()?;
         if let (Some(law), Some(yield_rad)) = (&mut problem.experiment.model.effects.joint_hysteretic, yield_rad) {
             law.yield_rad = yield_rad;
         }

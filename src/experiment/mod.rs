@@ -120,7 +120,9 @@ impl Experiment {
         let missing = experiment.missing.take();
         let effects = &mut experiment.model.effects;
         effects.distributed_flexibility = effects.distributed_flexibility.or(experiment.bending_stiffness_n_m2);
-        experiment.unless(missing, path)
+        let mut experiment = experiment.unless(missing, path)?;
+        experiment.complete_hinge();
+        Ok(experiment)
     }
 
     /// The same for a strip that needs no marks.
@@ -144,6 +146,26 @@ impl Experiment {
         }
         if links == 1 && model.states_damping && model.effects.hinge_viscous.is_none() {
             model.effects.hinge_viscous = Some(model.c_eq_n_m_s_per_rad);
+        }
+    }
+
+    /// How `[rig]` says that the strip is held, as the hinge's own spring and damper, where `[model.effects]` states none. A clamp bends half of the first rod:
+    /// 2 EI/ℓ and, of the damper, as much more than the joint's.
+    fn complete_hinge(&mut self) {
+        let (model, lengths_m) = (&mut self.model, self.specimen.lengths_m());
+        let (effects, mark_length_m) = (&mut model.effects, lengths_m.iter().sum::<f64>() / lengths_m.len() as f64);
+        match self.rig.support {
+            Support::Clamped => {
+                let bends = effects.distributed_flexibility.map(|bending| bending / mark_length_m);
+                let pieces = if bends.is_some() { model.pieces } else { 1 };
+                let ratio = 2.0 * mark_length_m / (lengths_m[0] / pieces as f64);
+                effects.hinge_stiffness.get_or_insert(ratio * bends.unwrap_or(model.k_eq_n_m_per_rad));
+                effects.hinge_viscous.get_or_insert(ratio * model.c_eq_n_m_s_per_rad);
+            }
+            Support::Hinged if self.rig.support_stiffness_n_m_per_rad > 0.0 => {
+                effects.hinge_stiffness.get_or_insert(self.rig.support_stiffness_n_m_per_rad);
+            }
+            Support::Hinged => {}
         }
     }
 
@@ -304,6 +326,23 @@ mod tests {
         let text = "[rig]\ngravity_m_s2 = 9.81\nmirored = true\n";
         let error = Experiment::parse(text, Path::new("e.toml")).unwrap_err().to_string();
         assert_eq!(error, "e.toml:3: unknown key `mirored`; the nearest known one is `mirrored`");
+    }
+
+    #[test]
+    fn a_clamped_strip_has_a_spring_and_a_damper_at_its_hinge_as_stiff_as_half_a_rod_bent() {
+        let of = |held: &str| {
+            let text = format!(
+                "[specimen]\nlink_lengths_m = [0.1, 0.1]\nmass_kg = 7e-4\nlength_m = 0.2\n[rig]\n{held}\n[model]\npieces = 5\n\
+                 c_eq_n_m_s_per_rad = 2e-8\n[model.effects]\ndistributed_flexibility = 1.5e-6\n"
+            );
+            Experiment::parse_with_specimen(&text, Path::new("e.toml")).unwrap().model.effects
+        };
+        let clamped = of("support = \"clamped\"");
+        // 2 EI/ℓ with ℓ = 0.02 m; C is that of 0.1 m
+        assert!((clamped.hinge_stiffness.unwrap() / 1.5e-4 - 1.0).abs() < 1e-12);
+        assert!((clamped.hinge_viscous.unwrap() / 2e-7 - 1.0).abs() < 1e-12);
+        assert_eq!(of("support_stiffness_n_m_per_rad = 3e-5").hinge_stiffness, Some(3e-5));
+        assert_eq!(of("").hinge_stiffness, None);
     }
 
     #[test]

@@ -15,6 +15,8 @@ use crate::statistics::median;
 /// Standard deviations of a strip's further shapes where a motion starts, as angles between marks: the sixth part of a large swing, at some hertz.
 const FURTHER_RAD: f64 = 0.05;
 const FURTHER_RAD_S: f64 = 2.0;
+/// Springs of the hinge that differ by less, as a part of them and of K, hold a strip alike.
+const HELD_ALIKE: f64 = 0.1;
 
 /// Steps of the integration for each second of a recording before a motion is given up.
 const STEPS_EACH_SECOND: f64 = 300.0;
@@ -81,7 +83,7 @@ impl<'a> Problem<'a> {
             accuracy: Accuracy::default(),
             dropped_at_s: vec![f64::INFINITY; records.len()],
             beliefs: Vec::new(),
-            further_shapes: usize::from(model.shapes().is_some()),
+            further_shapes: model.start().ncols() - model.chain().groups().len(),
             work: Work::default(),
         })
     }
@@ -158,6 +160,43 @@ impl<'a> Problem<'a> {
             camera.set(*parameter, *value);
         }
         Ok((model, camera))
+    }
+
+    /// The same with the shapes of a strip whose hinge has the spring that the variables give it. A strip starts in its lowest modes, and those of one
+    /// that is clamped are no sum of those of one that hangs free.
+    #[must_use]
+    pub fn held_as(mut self, x: &[f64]) -> Self {
+        if let Some(spring) = self.hinge_spring(x) {
+            self.experiment.model.effects.hinge_stiffness = Some(spring);
+        }
+        self
+    }
+
+    /// The same with the shapes of another problem's strip, where both have a spring at the hinge.
+    #[must_use]
+    pub fn held_like(mut self, other: &Problem<'_>) -> Self {
+        let both = self.free.contains(&Parameter::HingeStiffness) && other.free.contains(&Parameter::HingeStiffness);
+        if both {
+            self.experiment.model.effects.hinge_stiffness = other.experiment.model.effects.hinge_stiffness;
+        }
+        self
+    }
+
+    /// Whether the shapes are those of a strip held as the variables say, to a tenth of the spring at its hinge and of its own K, with which its modes change
+    /// less than their amplitudes are told.
+    pub fn is_held_as(&self, x: &[f64]) -> bool {
+        let effects = &self.experiment.model.effects;
+        let (Some(spring), Some(bending)) = (self.hinge_spring(x), effects.distributed_flexibility) else {
+            return true;
+        };
+        let length_m = self.experiment.specimen.lengths_m()[0];
+        (spring - effects.hinge_stiffness.unwrap_or(0.0)).abs() <= HELD_ALIKE * (spring.abs() + bending / length_m)
+    }
+
+    /// The spring at the hinge of a strip, where it is free.
+    fn hinge_spring(&self, x: &[f64]) -> Option<f64> {
+        let place = self.free.iter().position(|p| *p == Parameter::HingeStiffness)?;
+        self.experiment.model.effects.distributed_flexibility.map(|_| x[place])
     }
 
     /// Predicts all rows of one recording, with or without derivatives.
@@ -347,5 +386,29 @@ pub fn switch_on(experiment: &mut Experiment, parameter: Parameter) {
             effects.camera_oblique.get_or_insert_default();
         }
         Parameter::DifferentialLag => on(&mut effects.differential_lag),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_strip_is_held_as_its_variables_say() {
+        let record = Record::uniform("made", (0..30).map(f64::from).collect(), vec![vec![Some(0.1); 30]; 2]);
+        let mut experiment = Experiment::default();
+        experiment.model.effects.distributed_flexibility = Some(1e-5);
+        let records = std::slice::from_ref(&record);
+        let free = [Parameter::HingeStiffness, Parameter::JointDamping];
+        let problem = Problem::new(records, &experiment, &free).unwrap();
+        let (loose, clamped) = ([0.0, 1e-7], [1e-2, 1e-7]);
+        assert!(problem.is_held_as(&loose) && !problem.is_held_as(&clamped));
+        let shapes = |problem: &Problem<'_>| problem.model(0, &clamped).unwrap().0.start();
+        let held = problem.clone().held_as(&clamped);
+        assert!(held.is_held_as(&clamped) && (shapes(&held) - shapes(&problem)).amax() > 0.1);
+        assert_eq!(shapes(&problem.held_like(&held)), shapes(&held));
+        // rods have no shapes that depend on it
+        experiment.model.effects.distributed_flexibility = None;
+        assert!(Problem::new(records, &experiment, &free).unwrap().is_held_as(&clamped));
     }
 }

@@ -144,7 +144,10 @@ impl<'a> Search<'a, '_> {
         let from_stated = if again { descend(&problem, &robust, stated) } else { None };
         let ends = [from_stretches, from_stated].into_iter().flatten();
         let best = ends.min_by(|a, b| a.cost.total_cmp(&b.cost));
-        Ok(best.map(|outcome| End { problem, outcome, shot, begun: experiment.clone() }))
+        Ok(best.map(|outcome| {
+            let (problem, outcome) = straight::as_held(problem, &robust, outcome);
+            End { problem, outcome, shot, begun: experiment.clone() }
+        }))
     }
 
     /// Whether another beginning may lead further: more is left than noise.

@@ -7,6 +7,9 @@ use super::Problem;
 use super::descent::{Block, Descent, Outcome};
 use crate::model::Parameter;
 
+/// Descents after the first, each with the shapes of the strip as the one before found it held.
+const MOST_HOLDS: usize = 3;
+
 /// Where T_h and Δ_y stand among a problem's variables.
 #[derive(Debug, Clone, Copy)]
 pub struct Straightened {
@@ -77,6 +80,29 @@ pub fn descend(problem: &Problem<'_>, descent: &Descent, x: Vec<f64>) -> Option<
         Some(blocks)
     });
     straight.map(|outcome| valley.bend(outcome))
+}
+
+/// Descends, and on with the shapes of the strip as it was found to be held ([`as_held`]).
+pub fn descend_as_held<'a>(problem: Problem<'a>, descent: &Descent, x: Vec<f64>) -> Option<(Problem<'a>, Outcome)> {
+    let outcome = descend(&problem, descent, x)?;
+    Some(as_held(problem, descent, outcome))
+}
+
+/// Goes on from the end of a descent with the shapes of the strip as it was found to be held, as often as these are others.
+pub fn as_held<'a>(mut problem: Problem<'a>, descent: &Descent, mut outcome: Outcome) -> (Problem<'a>, Outcome) {
+    for _ in 0..MOST_HOLDS {
+        if problem.is_held_as(&outcome.x) {
+            break;
+        }
+        let held = problem.clone().held_as(&outcome.x);
+        let on = Descent { damping: outcome.damping, worst_start: f64::INFINITY, judged: None, ..*descent };
+        let again = descend(&held, &on, outcome.x.clone()).filter(|again| again.cost < outcome.cost);
+        let Some((again, blocks)) = again.and_then(|again| held.blocks(&again.x).map(|blocks| (again, blocks))) else {
+            break;
+        };
+        (problem, outcome) = (held, Outcome { blocks, ..again });
+    }
+    (problem, outcome)
 }
 
 #[cfg(test)]

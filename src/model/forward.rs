@@ -41,7 +41,8 @@ impl ForwardModel {
         let (chain, shapes) = match model.effects.distributed_flexibility {
             Some(bending) => {
                 let chain = Chain::continuous(specimen, model.pieces)?;
-                let shapes = Shapes::of(&chain, gravity_m_s2, bending / mark_length_m);
+                let of_hinge = model.effects.hinge_stiffness.unwrap_or(0.0).max(0.0);
+                let shapes = Shapes::of(&chain, gravity_m_s2, bending / mark_length_m, of_hinge);
                 (chain, shapes)
             }
             None => (Chain::of(specimen)?, None),
@@ -86,7 +87,7 @@ impl ForwardModel {
         self.shapes.as_ref()
     }
 
-    /// Angles of the links where a motion starts: a column for each angle between marks and, of a strip, one for its next mode.
+    /// Angles of the links where a motion starts: a column for each angle between marks and, of a strip, one for each of its next modes.
     pub fn start(&self) -> DMatrix<f64> {
         self.shapes.as_ref().map_or_else(|| links_from_chords(&self.chain), |shapes| shapes.start().clone())
     }

@@ -17,7 +17,9 @@ use super::observe::chord_slopes;
 use super::{Chain, Partials};
 
 /// Modes beyond one for each length between marks.
-const FURTHER_MODES: usize = 2;
+const FURTHER_MODES: usize = 4;
+/// Those of them in which a strip may start: fingers that let go leave it in all its modes, of which a camera sees these for about a second.
+const FURTHER_AT_START: usize = 3;
 /// Shapes summed side by side.
 const LANES: usize = 4;
 
@@ -31,23 +33,25 @@ pub struct Shapes {
     inertia_kg_m2: Vec<f64>,
     /// Largest angle between marks of each shape.
     seen: Vec<f64>,
-    /// Links × (angles between marks, then how much of the next mode).
+    /// Links × (angles between marks, then how much of each of the next modes).
     start: DMatrix<f64>,
     /// From angles to coordinates, (ΦᵀMΦ)⁻¹ΦᵀM: shapes × links.
     projection: DMatrix<f64>,
 }
 
 impl Shapes {
-    /// Of a chain whose joints have the stiffness K of a length between marks; `None` where the chain has hardly more links than shapes.
-    pub fn of(chain: &Chain, gravity_m_s2: f64, stiffness_n_m_per_rad: f64) -> Option<Self> {
+    /// Of a chain whose joints have the stiffness K of a length between marks, and whose hinge has a spring (N·m/rad); `None` where the chain has fewer
+    /// links than shapes.
+    pub fn of(chain: &Chain, gravity_m_s2: f64, stiffness_n_m_per_rad: f64, of_hinge_n_m_per_rad: f64) -> Option<Self> {
         let (n, marks) = (chain.count(), chain.groups().len());
         let modes = marks + FURTHER_MODES;
         let count = modes + 2;
-        if n <= count {
+        if n < count {
             return None;
         }
         let inertia = chain.inertia_kg_m2();
-        let stiffness = hanging_stiffness(chain, gravity_m_s2, stiffness_n_m_per_rad);
+        let mut stiffness = hanging_stiffness(chain, gravity_m_s2, stiffness_n_m_per_rad);
+        stiffness[(0, 0)] += of_hinge_n_m_per_rad;
         // M = LLᵀ, and L⁻¹KL⁻ᵀ has the modes' squares as eigenvalues
         let lower = inertia.clone().cholesky()?.l();
         let half = lower.solve_lower_triangular(&stiffness)?;
@@ -59,7 +63,7 @@ impl Shapes {
         for (k, mode) in order.iter().take(modes).enumerate() {
             whole.set_column(k, &lower.tr_solve_lower_triangular(&eigen.eigenvectors.column(*mode))?);
         }
-        let start = Self::start_of(chain, &whole.columns(0, marks + 1).into_owned())?;
+        let start = Self::start_of(chain, &whole.columns(0, marks + FURTHER_AT_START).into_owned())?;
         // in step with the first mode, so that there is an answer without gravity, too
         let still = (stiffness + inertia * eigen.eigenvalues[order[0]].abs()).cholesky()?;
         for (k, turned) in (modes..count).zip([0, n - 1]) {
@@ -101,21 +105,23 @@ impl Shapes {
         }
     }
 
-    /// The lowest modes combined so that each has the angle one between two marks and none between the others; then the next mode, less what it
+    /// The lowest modes combined so that each has the angle one between two marks and none between the others; then the next modes, each less what it
     /// has of such angles, its own largest being one.
     fn start_of(chain: &Chain, modes: &DMatrix<f64>) -> Option<DMatrix<f64>> {
         let marks = chain.groups().len();
         let chords = chord_slopes(chain, &vec![0.0; chain.count()]) * modes;
         let mut start = modes.clone();
         let seen = modes.columns(0, marks) * chords.columns(0, marks).into_owned().try_inverse()?;
-        let next = (modes.column(marks) - &seen * chords.column(marks)) / chords.column(marks).amax();
+        for k in marks..modes.ncols() {
+            let next = (modes.column(k) - &seen * chords.column(k)) / chords.column(k).amax();
+            start.set_column(k, &next);
+        }
         start.columns_mut(0, marks).copy_from(&seen);
-        start.set_column(marks, &next);
         Some(start)
     }
 
-    /// Angles of the links where a motion starts: a column for each angle between marks, all others being zero, and one for how much there is of the next
-    /// mode, the highest that a camera sees anything of.
+    /// Angles of the links where a motion starts: a column for each angle between marks, all others being zero, and one for how much there is of each of
+    /// the next modes, the highest that a camera sees anything of.
     pub fn start(&self) -> &DMatrix<f64> {
         &self.start
     }
@@ -256,7 +262,7 @@ mod tests {
     }
 
     fn shapes(stiffness_n_m_per_rad: f64) -> Shapes {
-        Shapes::of(&strip(), 9.81, stiffness_n_m_per_rad).unwrap()
+        Shapes::of(&strip(), 9.81, stiffness_n_m_per_rad, 0.0).unwrap()
     }
 
     /// Squares of the circular frequencies, lowest first.
@@ -301,11 +307,37 @@ mod tests {
     }
 
     #[test]
+    fn a_clamped_strip_can_start_in_its_own_first_modes() {
+        let (chain, gravity) = (strip(), 9.81);
+        let own = 0.01 * gravity * chain.static_moment_kg_m(0);
+        let clamp = 100.0 * own;
+        let mut whole = hanging_stiffness(&chain, gravity, own);
+        whole[(0, 0)] += clamp;
+        let lower = chain.inertia_kg_m2().clone().cholesky().unwrap().l();
+        let half = lower.solve_lower_triangular(&whole).unwrap();
+        let eigen = lower.solve_lower_triangular(&half.transpose()).unwrap().symmetric_eigen();
+        // what is left of a mode, in units of energy, after the start shapes have taken what they can
+        let left = |of_hinge: f64, lowest: usize| {
+            let mut order: Vec<usize> = (0..eigen.eigenvalues.len()).collect();
+            order.sort_by(|a, b| eigen.eigenvalues[*a].total_cmp(&eigen.eigenvalues[*b]));
+            let mode = eigen.eigenvectors.column(order[lowest]).into_owned();
+            let shapes = Shapes::of(&chain, gravity, own, of_hinge).unwrap();
+            let start = lower.transpose() * shapes.start();
+            let taken = start.clone().svd(true, true).solve(&mode, 1e-12).unwrap();
+            (&mode - start * taken).norm()
+        };
+        for mode in 0..5 {
+            assert!(left(clamp, mode) < 1e-9, "mode {mode}: {}", left(clamp, mode));
+        }
+        assert!(left(0.0, 0) > 1e-3, "{}", left(0.0, 0));
+    }
+
+    #[test]
     fn frequencies_are_the_whole_chains_even_where_the_strip_differs_from_the_one_the_shapes_are_of() {
         let (chain, gravity) = (strip(), 9.81);
         // K is as large as the strip's weight times a hundredth of its length
         let own = 0.01 * gravity * chain.static_moment_kg_m(0);
-        let basis = basis(&Shapes::of(&chain, gravity, own).unwrap());
+        let basis = basis(&Shapes::of(&chain, gravity, own, 0.0).unwrap());
         for (stiffness, of_hinge) in
             [(own, 0.0), (2.0 * own, 0.0), (0.5 * own, 0.0), (own, own), (0.5 * own, 4.0 * own)]
         {

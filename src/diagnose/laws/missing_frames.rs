@@ -96,7 +96,7 @@ fn likeliest(context: &FitContext<'_>, fit: &Refit<'_>) -> Option<Jump> {
     let mut jumps = Vec::new();
     for record in 0..context.records.len() {
         let hypothesis = fit.hypothesis.and(Effect::DroppedFrames, Some((record, 0.0)));
-        let problem = context.problem(&hypothesis, &context.noise_of(fit)).ok()?;
+        let problem = context.problem_near(&hypothesis, fit).ok()?;
         let step_s = median_step_s(&context.records[record].t_s)?;
         let before = squares(&fit.problem, record, &fit.x)?;
         for frames in 1..=MOST_FRAMES {

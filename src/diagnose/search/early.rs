@@ -30,7 +30,7 @@ impl<'a> Search<'a, '_> {
         let mut early = Search { is_loose: self.is_loose, until: self.until, rival: self.rival, part, ..begun };
         early.usual();
         if early.is_cut_short {
-            (self.is_cut_short, self.bending_n_m2) = (true, early.bending_n_m2);
+            (self.is_cut_short, self.bending_n_m2, self.count) = (true, early.bending_n_m2, early.count);
             self.rounds.extend(early.rounds);
             return;
         }

@@ -84,8 +84,10 @@ pub struct Search<'a, 'p> {
     bending_n_m2: Option<f64>,
     /// What another base model's best fit leaves of the swing: where the single effects leave more, this search is not worth its cost.
     rival: Option<f64>,
-    /// It ended there, or where a strip was found to bend.
+    /// It ended there, or where a strip was found to bend, or to be made of another number of rods.
     is_cut_short: bool,
+    /// That number.
+    count: Option<usize>,
     /// What searches that it goes on from have held against every other effect, and the hypotheses of which each effect was exchanged.
     compared: Compared,
     /// The work that had been done when it began, the base model's fit with it.
@@ -140,6 +142,7 @@ impl<'a, 'p> Search<'a, 'p> {
             bending_n_m2: None,
             rival: None,
             is_cut_short: false,
+            count: None,
             compared: Compared::default(),
             begun_at,
             until: begun_at,
@@ -149,7 +152,8 @@ impl<'a, 'p> Search<'a, 'p> {
     }
 
     /// Searches for what the base model lacks, the file taken at its word. Whole recordings of a rig that are dear and far from the model are left to their pieces:
-    /// of bearings and castings no model is right to the noise. It is cut short where a strip is found to bend everywhere: see [`Self::of_bending_strip`].
+    /// of bearings and castings no model is right to the noise. It is cut short where a strip is found to bend everywhere, see [`Self::of_bending_strip`], or to
+    /// be made of another number of rods, see [`Self::recounted`].
     pub fn run(&mut self) {
         let is_rig = !self.context.experiment.specimen.links.is_empty();
         if is_rig && self.prepared.part < 1.0 && self.leaves_more_than_noise() && self.pieces().is_some() {
@@ -196,7 +200,8 @@ impl<'a, 'p> Search<'a, 'p> {
 
     /// The base model's fit with another number of rods, if the recordings ask for it.
     fn with_the_preferred_count(&self, counted: &'a OnceLock<Experiment>) -> Result<Option<Self>> {
-        let Some(count) = rods::preferred(&self.context, &self.fits) else { return Ok(None) };
+        let count = self.count.or_else(|| rods::preferred(&self.context, &self.fits, rods::Among::Simple));
+        let Some(count) = count else { return Ok(None) };
         let counted = counted.get_or_init(|| rods::with(self.context.experiment, count));
         let settings = self.context.settings;
         Self::of_base_model(self.prepared, counted, Taken::AtItsWord, settings, self.progress).map(Some)
@@ -207,10 +212,11 @@ impl<'a, 'p> Search<'a, 'p> {
     /// # Errors
     /// As [`Self::of_base_model`].
     pub fn recounted(self, counted: &'a OnceLock<Experiment>) -> Result<Self> {
-        let again = if self.is_adequate() { None } else { self.with_the_preferred_count(counted)? };
+        let is_asked = self.count.is_some() || !self.is_adequate();
+        let again = if is_asked { self.with_the_preferred_count(counted)? } else { None };
         let Some(mut again) = again else { return Ok(self) };
         again.run();
-        let is_kept = rods::is_kept(&self.context, &self.fits, &again.fits);
+        let is_kept = self.count.is_some() || rods::is_kept(&self.context, &self.fits, &again.fits);
         Ok(if is_kept { again.after(self) } else { self.after(again) })
     }
 
@@ -321,17 +327,23 @@ impl<'a, 'p> Search<'a, 'p> {
         least(&self.fits).is_some_and(|best| leaves_more_than_noise(best, &self.context.settings.noise))
     }
 
-    /// Singles and pairs, until a strip is found to bend everywhere.
+    /// Singles and pairs, until a strip is found to bend everywhere, or to be made of another number of rods: pairs would make up for a wrong one.
     fn usual(&mut self) {
         self.allow(self.context.settings.search.shares.usual);
         for round in Round::USUAL {
             self.round(round, &mut Tried::default());
-            if round == Round::DearSingles && (self.bends() || self.is_behind()) {
+            if round == Round::DearSingles && (self.bends() || self.is_behind() || self.is_miscounted()) {
                 self.is_cut_short = true;
                 return;
             }
         }
         self.seek_bending();
+    }
+
+    /// Whether the single effects ask for another number of rods.
+    fn is_miscounted(&mut self) -> bool {
+        self.count = rods::preferred(&self.context, &self.fits, rods::Among::Leaders);
+        self.count.is_some()
     }
 
     /// Restarts where the best fit leaves more than noise. A strip's fits are too dear for it.

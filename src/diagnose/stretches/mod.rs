@@ -144,7 +144,7 @@ fn sets(
     let of_camera = OF_CAMERA.iter().filter(|own| effects.contains(&own.0));
     let all = of_camera.clone().map(|own| own.0).chain(laws.iter().copied()).collect();
     let hypothesis = Hypothesis { effects: all, dropped: None };
-    let problem = short.problem(&hypothesis, &short.noise_of(base)).ok()?;
+    let problem = short.problem_near(&hypothesis, base).ok()?;
     let allowed = known.iter().copied().chain(of_camera.map(|own| own.1));
     let columns: Vec<Parameter> = allowed.chain(amplitudes.iter().copied()).collect();
     let reach_s = STATE_NEAR / model.pace_rad_s();
