@@ -356,6 +356,22 @@ fn what_a_bending_strip_lacks_is_told_beside_its_bending() {
     assert!(left("named_rmse_rad") < 0.5 * left("baseline_rmse_rad"), "{report:#}");
 }
 
+/// The base model bends its stiffness to the pace: what changes the pace is sought from where a clock takes it.
+#[test]
+fn what_changes_the_pace_of_a_strip_is_told_from_a_clock() {
+    let strip = BASE.replace("[model]", "[model]\npieces = 6") + "[model.effects]\ndistributed_flexibility = 1.2e-5\n";
+    let folder = Folder::new();
+    let options = ["--duration", "10", "--noise-rad", "5e-4", "--seed", "2"];
+    let angles = folder.simulated(&strip, "added_mass = 2e-4\n", &options);
+    let report = folder.diagnosis(&angles, &strip, &[]);
+    let verdict = &report["verdict"];
+    assert_eq!(names(&verdict["effects"]), ["added_mass"], "{verdict:#}");
+    assert_eq!(verdict["status"], "identified", "{verdict:#}");
+    let added = &report["candidates"][0]["parameters"]["added_mass"];
+    let [value, sd] = ["value", "sd"].map(|part| added[part].as_f64().unwrap());
+    assert!((value - 2e-4).abs() < 4.0 * sd && sd < 1e-7, "{added}");
+}
+
 /// An encoder's steps are its noise, also where the swing has stopped.
 #[test]
 fn an_encoder_that_rests_half_the_time_has_no_exact_angles() {

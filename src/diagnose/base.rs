@@ -86,12 +86,13 @@ pub fn fitted<'a>(context: &FitContext<'a>, prepared: &Prepared) -> Result<Refit
     }
 }
 
-/// The base model anew from weaker dampers, where it leaves much: what it lacks can have driven its own damper so high that a mode is gone, and no
-/// descent leads back.
+/// The base model anew from weaker dampers, where it leaves much and damps more than short stretches say: what it lacks can have driven its own damper so high that a
+/// mode is gone, and no descent leads back.
 fn from_weaker_dampers<'a>(context: &FitContext<'a>, fit: Refit<'a>) -> Refit<'a> {
     let damper = Parameter::JointDamping;
     let leaves_much = fit.left_share() > context.settings.misfit.much;
-    let Some(strong) = fit.value(damper).filter(|_| leaves_much) else { return fit };
+    let of_stretches = context.base.iter().position(|p| *p == damper).map_or(0.0, |place| context.begun[place]);
+    let Some(strong) = fit.value(damper).filter(|value| leaves_much && *value > of_stretches) else { return fit };
     let weaker = WEAKER
         .par_iter()
         .with_max_len(1)

@@ -132,11 +132,11 @@ impl<'a> FitContext<'a> {
     }
 
     /// A restart along another fit's motion, which follows the recordings, whatever hypothesis it is of: stretches begin where that motion is, with its
-    /// parameters, and are drawn together.
-    pub fn refit_along(&self, hypothesis: &Hypothesis, leader: &Refit<'_>, start: &Start) -> Option<Refit<'a>> {
+    /// parameters, and are drawn together. It ends after its first steps unless they lead below `bound`.
+    pub fn refit_along(&self, hypothesis: &Hypothesis, leader: &Refit<'_>, bound: f64) -> Option<Refit<'a>> {
         let motions: Vec<Vec<Vec<f64>>> =
             (0..self.records.len()).map(|record| states_along(leader, record)).collect::<Option<_>>()?;
-        self.drawn_along(hypothesis, leader, start, |record, row| motions[record][row].clone())
+        self.drawn_along(bound, hypothesis, (leader, &[]), |record, row| motions[record][row].clone())
     }
 
     /// A fit from given coefficients and the starts that the recordings show; where that motion falls out of step, along the recorded motion.
@@ -148,15 +148,15 @@ impl<'a> FitContext<'a> {
         x.extend((0..self.records.len()).flat_map(|record| seen(record, 0)));
         let straight = self.descend(hypothesis, problem, x, self.settings.descent.few_steps);
         let in_step = straight.filter(|fit| fit.left_share() < self.settings.misfit.out_of_step);
-        in_step.or_else(|| self.drawn_along(hypothesis, near, start, seen))
+        in_step.or_else(|| self.drawn_along(f64::INFINITY, hypothesis, (near, start), seen))
     }
 
     /// Stretches that begin in the states at given rows of the recordings, drawn together into one motion.
     fn drawn_along(
         &self,
+        bound: f64,
         hypothesis: &Hypothesis,
-        near: &Refit<'_>,
-        start: &Start,
+        (near, start): (&Refit<'_>, &Start),
         state: impl Fn(usize, usize) -> Vec<f64>,
     ) -> Option<Refit<'a>> {
         let (mut problem, x) = self.start(hypothesis, near, start)?;
@@ -164,7 +164,8 @@ impl<'a> FitContext<'a> {
         let parameters = &x[..problem.free.len()];
         let x = shooting_along(&mut problem, parameters, state).ok()?.x;
         (problem.noise, problem.accuracy) = (noise, accuracy);
-        self.descend_by(self.descent(self.settings.descent.most_steps), hypothesis, problem, x)
+        let most_steps = self.settings.descent.most_steps;
+        self.descend_by(Descent { most_steps, ..self.descent_below(bound) }, hypothesis, problem, x)
     }
 
     /// The best of some fits of one hypothesis, with the number of those that agree with it.
@@ -265,6 +266,7 @@ fn set(experiment: &mut Experiment, parameter: Parameter, value: f64) {
     match parameter {
         Parameter::JointStiffness => model.k_eq_n_m_per_rad = value,
         Parameter::JointDamping => model.c_eq_n_m_s_per_rad = value,
+        Parameter::TimeBase => model.effects.time_base = Some(value),
         Parameter::HysteresisYield => {
             if let Some(law) = &mut model.effects.joint_hysteretic {
                 law.yield_rad = value;

@@ -12,6 +12,9 @@ use crate::model::observe::chord_angles_rad;
 /// compared must then be judged by it.
 pub fn learnt_noise(context: &FitContext<'_>, by: &Refit<'_>) -> Option<Vec<RecordNoise>> {
     let settings = &context.settings.noise;
+    // what has names must not be judged by a noise that they made, and what has lost step leaves something at every frequency
+    let has_lost_step = by.left_share() > context.settings.misfit.out_of_step;
+    let is_suspect = !by.hypothesis.effects.is_empty() || has_lost_step;
     let mut all = context.noise_of(by);
     let mut changed = false;
     for (record, known) in all.iter_mut().enumerate() {
@@ -38,8 +41,7 @@ pub fn learnt_noise(context: &FitContext<'_>, by: &Refit<'_>) -> Option<Vec<Reco
             let (known_rad, known_colour) = (&mut known.sd_rad[link], &mut known.colour[link]);
             let whole = noise::of_all(left);
             let noise = match noise::off_the_lines(left, motion, settings) {
-                // a fit that has lost step leaves something at every frequency
-                Some(noise) if !by.hypothesis.effects.is_empty() && noise.sd > settings.grows * *known_rad => continue,
+                Some(noise) if is_suspect && noise.sd > settings.grows * *known_rad => continue,
                 Some(noise) => noise,
                 // a motion with power everywhere, as one with a jump has: what is left at most
                 None if whole.sd < *known_rad => whole,

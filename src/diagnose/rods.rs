@@ -9,6 +9,7 @@ use super::context::FitContext;
 use super::refit::{Refit, least_chi2};
 use super::settings::Settings;
 use crate::experiment::{Experiment, Model};
+use crate::model::Parameter;
 
 /// Counts between two marks that are tried beside the usual one: near to it, as from a chain that swings a little slower to one that swings a little faster a
 /// fit stays in step. Then so many to which a parabola leads, and the bounds of these.
@@ -17,10 +18,12 @@ const GUIDED: usize = 2;
 const FEWEST: usize = 4;
 const MOST: usize = 20;
 /// Fits that leave least, of which those with fewer effects are compared.
-const LEADERS: usize = 5;
+pub const LEADERS: usize = 5;
 /// χ² that a wrong count leaves of what is otherwise right, over what the right one does: up to four times was seen, with two thirds of the rods and a noise of
 /// 0.33 mrad. Where the best single effect leaves more, something else is missing, and a count could only make up for it.
 const MISCOUNTED: f64 = 10.0;
+/// A spring at the hinge has at least this part of the compliance of half a rod (judgement: a clamp has all of it).
+const LEAST: f64 = 0.1;
 /// Links that are rigid between the marks: no parabola leads there.
 const RIGID: usize = 1;
 
@@ -60,11 +63,12 @@ impl<'c> Counted<'c> {
         }
         let begun = match &self.nearest(epsilon(pieces))[..] {
             [] => return None,
-            [(_, only)] => only.clone(),
+            [(_, only)] => begun_with(only, pieces),
             [(count, first), (next, second), ..] => {
                 let share = (epsilon(pieces) - epsilon(*count)) / (epsilon(*next) - epsilon(*count));
-                let x = first.x.iter().zip(&second.x).map(|(first, second)| first + share * (second - first));
-                Refit { x: x.collect(), ..first.clone() }
+                let (own, other) = (bare(first, *count), bare(second, *next));
+                let x: Vec<f64> = own.iter().zip(&other).map(|(own, other)| own + share * (other - own)).collect();
+                Refit { x: clamped(first, &x, pieces), ..first.clone() }
             }
         };
         let found = self.contexts[pieces].refit(&begun.hypothesis, &begun, &[])?;
@@ -94,6 +98,47 @@ impl<'c> Counted<'c> {
     fn weighed(&self, weights: &Weights<'_>) -> impl Iterator<Item = (usize, f64)> {
         self.fits.iter().map(|(count, fit)| (*count, weights.weight(fit)))
     }
+}
+
+/// A fit of a strip of some number of rods, its variables as they are to begin with for another one.
+pub fn begun_with<'a>(fit: &Refit<'a>, pieces: usize) -> Refit<'a> {
+    let own = fit.problem.experiment.model.pieces;
+    Refit { x: clamped(fit, &bare(fit, own), pieces), ..fit.clone() }
+}
+
+/// The variables of a fit, the spring at its hinge as its compliance.
+fn bare(fit: &Refit<'_>, pieces: usize) -> Vec<f64> {
+    with_hinge(fit, &fit.x, compliance, pieces)
+}
+
+/// The same variables with the spring at the hinge of so many rods.
+fn clamped(fit: &Refit<'_>, bare: &[f64], pieces: usize) -> Vec<f64> {
+    with_hinge(fit, bare, spring, pieces)
+}
+
+/// The compliance of what holds a strip, which does not depend on the number of its rods: that of the spring at the hinge of a chain, without the half of a rod that
+/// bends above the first joint, 1/K − ℓ/(2EI).
+fn compliance(spring: f64, half_rod: f64) -> f64 {
+    1.0 / spring - half_rod
+}
+
+/// The spring at the hinge of a chain.
+fn spring(compliance: f64, half_rod: f64) -> f64 {
+    1.0 / (compliance + half_rod).max(LEAST * half_rod)
+}
+
+/// Variables with the one of the spring at the hinge changed, where it is free and not zero; `of` has the compliance of half a rod, ℓ/(2EI).
+fn with_hinge(fit: &Refit<'_>, x: &[f64], of: impl Fn(f64, f64) -> f64, pieces: usize) -> Vec<f64> {
+    let place = |parameter| fit.problem.free.iter().position(|free| *free == parameter);
+    let mut x = x.to_vec();
+    let (spring, bending) = (place(Parameter::HingeStiffness), place(Parameter::BendingStiffness));
+    if let (Some(spring), Some(bending)) = (spring, bending) {
+        if fit.x[spring] > 0.0 && x[bending] > 0.0 {
+            let rod_m = fit.problem.experiment.specimen.lengths_m()[0] / pieces as f64;
+            x[spring] = of(x[spring], 0.5 * rod_m / x[bending]);
+        }
+    }
+    x
 }
 
 /// Which fits are compared.
@@ -211,6 +256,18 @@ mod tests {
         assert!((x - 0.3).abs() < 1e-12 && (y - 3.0).abs() < 1e-12);
         let (x, y) = lowest_point(&points, 0.4..=1.0).unwrap();
         assert!((x - 0.4).abs() < 1e-12 && (y - parabola(0.4)).abs() < 1e-12);
+    }
+
+    #[test]
+    fn what_holds_a_strip_is_the_same_with_any_number_of_rods() {
+        let (of_eight, of_five) = (0.0125 / 2.0 / 3.7e-5, 0.02 / 2.0 / 3.7e-5);
+        let with_five = |stiffness: f64| spring(compliance(stiffness, of_eight), of_five);
+        // a clamp is as stiff as half a rod
+        assert!((with_five(1.0 / of_eight) * of_five - 1.0).abs() < 1e-12);
+        // a soft spring hardly differs
+        assert!((with_five(1e-6) / 1e-6 - 1.0).abs() < 2e-4);
+        // none is negative
+        assert!(with_five(1e3) > 0.0);
     }
 
     #[test]

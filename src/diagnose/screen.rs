@@ -51,13 +51,16 @@ impl Projection {
     /// Of a fit. Variables held by their bound do not count.
     pub fn of(fit: &Refit<'_>) -> Option<Self> {
         let (residual, slopes) = fit.linearised()?;
-        Some(Self::new(residual, slopes, fit))
+        Some(Self::off(residual, slopes.select_columns(&loose(fit))))
     }
 
-    fn new(residual: DVector<f64>, slopes: DMatrix<f64>, fit: &Refit<'_>) -> Self {
-        let lower = fit.problem.lower();
-        let loose: Vec<usize> = (0..fit.x.len()).filter(|i| fit.x[*i] > lower[*i]).collect();
-        Self::off(residual, slopes.select_columns(&loose))
+    /// Of a fit as if one of its effects were not there, in linear approximation.
+    pub fn without(fit: &Refit<'_>, effect: Effect) -> Option<Self> {
+        let (mut residual, slopes) = fit.linearised()?;
+        let is_own = |i: &usize| fit.problem.free.get(*i).is_some_and(|own| effect.parameters().contains(own));
+        let (own, others): (Vec<usize>, Vec<usize>) = loose(fit).into_iter().partition(is_own);
+        own.into_iter().for_each(|i| residual.axpy(-fit.x[i], &slopes.column(i), 1.0));
+        Some(Self::off(residual, slopes.select_columns(&others)))
     }
 
     /// Of residuals, with what some derivatives can change taken out.
@@ -78,6 +81,12 @@ impl Projection {
     }
 }
 
+/// The variables of a fit that no bound holds.
+fn loose(fit: &Refit<'_>) -> Vec<usize> {
+    let lower = fit.problem.lower();
+    (0..fit.x.len()).filter(|i| fit.x[*i] > lower[*i]).collect()
+}
+
 /// Scores effects at a fit.
 pub struct Screen<'g, 'a> {
     /// What all fits share.
@@ -92,6 +101,11 @@ impl<'g, 'a> Screen<'g, 'a> {
     /// At a fit.
     pub fn at(context: &'g FitContext<'a>, fit: &'g Refit<'a>) -> Option<Self> {
         Some(Self { context, fit, projection: Projection::of(fit)? })
+    }
+
+    /// At a fit, for what may stand in the place of one of its effects.
+    pub fn in_place_of(context: &'g FitContext<'a>, fit: &'g Refit<'a>, effect: Effect) -> Option<Self> {
+        Some(Self { context, fit, projection: Projection::without(fit, effect)? })
     }
 
     /// All effects that are proportional to a coefficient, from one motion with all their derivatives.

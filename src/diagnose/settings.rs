@@ -151,6 +151,8 @@ pub struct SearchSettings {
     pub leader_leaves: f64,
     /// … elsewhere, where a parameter of the base model differs by more than this part (training bank).
     pub elsewhere: f64,
+    /// A clock takes the pace of a base model if it leaves less than this part of the swing that that one leaves (judgement: a tenth).
+    pub takes_the_pace: f64,
     /// A fit whose χ² is this many times the best one's, and this much more, is not made any better (cost).
     pub hopeless: f64,
     /// A χ² that was this many times as large was not yet a minimum's: the noise is learnt again (training bank).
@@ -370,6 +372,7 @@ impl Default for SearchSettings {
             promising: 3.0,
             leader_leaves: 0.5,
             elsewhere: 0.3,
+            takes_the_pace: 0.1,
             hopeless: 10.0,
             far_down: 3.0,
             restart_seeds: 2,

@@ -98,7 +98,7 @@ fn begun_fit<'a>(
     let promised = context.settings.search.keeps_up * (best.chi2 - candidate.gain).max(best.values() as f64);
     let is_as_promised = begun.as_ref().is_some_and(|begun| begun.chi2 < promised);
     let is_worth = has_time && candidate.rank == 0 && !is_as_promised && *hypothesis != best.hypothesis;
-    let along = is_worth.then(|| with.refit_along(hypothesis, best, &[])).flatten();
+    let along = is_worth.then(|| with.refit_along(hypothesis, best, f64::INFINITY)).flatten();
     begun.into_iter().chain(along).min_by(|a, b| a.chi2.total_cmp(&b.chi2))
 }
 

@@ -8,15 +8,19 @@
 //! | [`rounds`] | the rounds, in order, and what each proposes |
 //! | [`proposal`] | what can be proposed, and how it is fitted |
 //! | [`beside`] | an effect beside a fit |
+//! | `count` | the number of a strip's rods |
 //! | `early` | the search of the first part, where the whole is dear |
 //! | [`horizon`] | horizon continuation: fits that follow a recording from its beginning |
 //! | `judged` | the noise by which all fits are judged |
+//! | `pace` | a base model that swings at another pace than the recordings |
 //! | `strip` | a strip that is found to bend everywhere |
 
 pub mod beside;
+mod count;
 mod early;
 pub mod horizon;
 mod judged;
+mod pace;
 pub mod proposal;
 pub mod rounds;
 mod strip;
@@ -33,13 +37,13 @@ use super::laws;
 use super::misfit::{Misfit, leaves_more_than_noise};
 use super::preparation::Prepared;
 use super::refit::{Refit, least, least_chi2, merged};
-use super::rods;
 use super::screen::{Score, Screen};
 use super::settings::Settings;
 use super::taken::{Taken, lacks_a_damper};
 use crate::error::Result;
 use crate::experiment::Experiment;
 use crate::progress::Progress;
+use pace::Paced;
 use proposal::Proposal;
 use rounds::{Learns, Round, Tried};
 
@@ -76,6 +80,8 @@ pub struct Search<'a, 'p> {
     pub undecided: Vec<&'static str>,
     /// What the effects promise at the base model.
     scores: Vec<Score>,
+    /// Where they are sought from, if a clock takes its pace.
+    paced: Option<Paced<'a>>,
     /// Single effects that a search of the first part did not tell from its best.
     tied: Vec<Effect>,
     /// Whether the file is taken loosely.
@@ -137,6 +143,7 @@ impl<'a, 'p> Search<'a, 'p> {
             rounds: Vec::new(),
             undecided: Vec::new(),
             scores,
+            paced: None,
             tied: Vec::new(),
             is_loose: false,
             bending_n_m2: None,
@@ -180,44 +187,6 @@ impl<'a, 'p> Search<'a, 'p> {
     fn up_to(&self, share: f64) -> u64 {
         let left = self.context.settings.search.budget.saturating_sub(self.begun_at);
         self.begun_at + (share * left as f64) as u64
-    }
-
-    /// The base model's fit with the number of rods that the recordings of a strip ask for, where nothing else is missing.
-    ///
-    /// # Errors
-    /// As [`Self::of_base_model`].
-    pub fn counted(self, counted: &'a OnceLock<Experiment>) -> Result<Self> {
-        let again = if self.is_adequate() { self.with_the_preferred_count(counted)? } else { None };
-        let Some(again) = again else { return Ok(self) };
-        let is_kept = rods::is_kept(&self.context, &self.fits, &again.fits);
-        Ok(if is_kept { again } else { self })
-    }
-
-    /// Whether the base model leaves no more than noise.
-    fn is_adequate(&self) -> bool {
-        !Misfit::of(&self.context, self.base(), &[]).unexplained
-    }
-
-    /// The base model's fit with another number of rods, if the recordings ask for it.
-    fn with_the_preferred_count(&self, counted: &'a OnceLock<Experiment>) -> Result<Option<Self>> {
-        let count = self.count.or_else(|| rods::preferred(&self.context, &self.fits, rods::Among::Simple));
-        let Some(count) = count else { return Ok(None) };
-        let counted = counted.get_or_init(|| rods::with(self.context.experiment, count));
-        let settings = self.context.settings;
-        Self::of_base_model(self.prepared, counted, Taken::AtItsWord, settings, self.progress).map(Some)
-    }
-
-    /// Searches again with the number of rods that the recordings of a strip ask for, where that does better; [`Self::counted`] has asked where nothing is missing.
-    ///
-    /// # Errors
-    /// As [`Self::of_base_model`].
-    pub fn recounted(self, counted: &'a OnceLock<Experiment>) -> Result<Self> {
-        let is_asked = self.count.is_some() || !self.is_adequate();
-        let again = if is_asked { self.with_the_preferred_count(counted)? } else { None };
-        let Some(mut again) = again else { return Ok(self) };
-        again.run();
-        let is_kept = self.count.is_some() || rods::is_kept(&self.context, &self.fits, &again.fits);
-        Ok(if is_kept { again.after(self) } else { self.after(again) })
     }
 
     /// The same with what another search has spent before, or in vain.
@@ -330,6 +299,7 @@ impl<'a, 'p> Search<'a, 'p> {
     /// Singles and pairs, until a strip is found to bend everywhere, or to be made of another number of rods: pairs would make up for a wrong one.
     fn usual(&mut self) {
         self.allow(self.context.settings.search.shares.usual);
+        self.seek_pace();
         for round in Round::USUAL {
             self.round(round, &mut Tried::default());
             if round == Round::DearSingles && (self.bends() || self.is_behind() || self.is_miscounted()) {
@@ -338,12 +308,6 @@ impl<'a, 'p> Search<'a, 'p> {
             }
         }
         self.seek_bending();
-    }
-
-    /// Whether the single effects ask for another number of rods.
-    fn is_miscounted(&mut self) -> bool {
-        self.count = rods::preferred(&self.context, &self.fits, rods::Among::Leaders);
-        self.count.is_some()
     }
 
     /// Restarts where the best fit leaves more than noise. A strip's fits are too dear for it.

@@ -40,8 +40,9 @@ pub enum Proposal<'f, 'a> {
     },
     /// A restart: a fit anew from where the first part of each recording leads. When a dry hinge stops, and where, no derivative tells, and early on it has not.
     Restart(&'f Refit<'a>),
-    /// A restart along the motion of another fit, which follows the recordings: the hypothesis cannot fall out of step with them.
-    Along(Hypothesis, &'f Refit<'a>),
+    /// A restart along the motion of another fit, which follows the recordings: the hypothesis cannot fall out of step with them. It ends after its first steps
+    /// unless they leave less than so much.
+    Along(Hypothesis, &'f Refit<'a>, f64),
     /// A set of laws that short stretches ask for, along the recorded motion.
     Asked(Asked, &'f Refit<'a>),
     /// A hypothesis from a fit that has fewer of its effects, the others being nothing: it cannot leave more than that one does.
@@ -79,7 +80,9 @@ impl<'a> Proposal<'_, 'a> {
                 from_leader(context, fit, hypothesis, leader).into_iter().collect()
             }
             Self::Restart(fit) => restarted(context, fit).into_iter().collect(),
-            Self::Along(hypothesis, leader) => context.refit_along(hypothesis, leader, &[]).into_iter().collect(),
+            Self::Along(hypothesis, leader, bound) => {
+                context.refit_along(hypothesis, leader, *bound).into_iter().collect()
+            }
             Self::Asked(asked, base) => {
                 context.refit_along_recording(&asked.hypothesis, base, &asked.start).into_iter().collect()
             }

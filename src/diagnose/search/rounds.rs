@@ -11,6 +11,7 @@ use super::super::screen::{Score, Screen};
 use super::super::stretches::asked_for;
 use super::Search;
 use super::beside::Beside;
+use super::pace::Paced;
 use super::proposal::{Proposal, TRADED, comes_to_rest};
 
 /// One round.
@@ -179,18 +180,22 @@ impl<'a> Search<'a, '_> {
         let mut tied: Vec<Effect> = self.tied.iter().copied().filter(is_new).collect();
         if !leader.hypothesis.effects.is_empty() {
             tied.truncate(settings.search.tried);
-            let along = |effect| Proposal::Along(Hypothesis { effects: vec![effect], dropped: None }, leader);
+            let along =
+                |effect| Proposal::Along(Hypothesis { effects: vec![effect], dropped: None }, leader, f64::INFINITY);
             return tied.into_iter().map(along).collect();
         }
         let promised = |effect: Effect| self.scores.iter().find(|s| s.effect == effect).map_or(0.0, |s| s.gain);
         tied.retain(|effect| promised(*effect) > settings.misfit.counts);
         tied.sort_by(|a, b| promised(*b).total_cmp(&promised(*a)));
         tied.truncate(settings.search.tried);
-        let misfit = Misfit::of(&self.context, self.base(), &self.scores);
-        self.beside_base(misfit, |effect| tied.contains(&effect))
+        self.beside_base(Misfit::of(&self.context, self.base(), &self.scores), |effect| tied.contains(&effect))
     }
 
     fn beside_base(&self, misfit: Misfit, is_of_kind: impl Fn(Effect) -> bool) -> Vec<Proposal<'_, 'a>> {
+        if let Some(Paced { base, scores }) = &self.paced {
+            let of_kind = scores.iter().filter(|score| is_of_kind(score.effect));
+            return of_kind.map(|score| Proposal::Scored(base, score.clone())).collect();
+        }
         let of_kind = self.effects.iter().copied().filter(|effect| is_of_kind(*effect));
         of_kind.map(|effect| Proposal::Beside(Beside::of(self.base(), misfit, effect, &self.scores))).collect()
     }
@@ -219,7 +224,11 @@ impl<'a> Search<'a, '_> {
         };
         let behind = leader.chi2 + self.context.settings.misfit.counts;
         let is_behind = |fit: &&Refit<'a>| !fit.hypothesis.is_dear() && fit.chi2 > behind;
-        self.fits.iter().filter(is_behind).map(|fit| Proposal::Along(fit.hypothesis.clone(), leader)).collect()
+        self.fits
+            .iter()
+            .filter(is_behind)
+            .map(|fit| Proposal::Along(fit.hypothesis.clone(), leader, fit.chi2))
+            .collect()
     }
 
     fn nested(&self) -> Vec<Proposal<'_, 'a>> {
@@ -252,7 +261,7 @@ impl<'a> Search<'a, '_> {
         let of = |fit: &Refit<'a>| {
             let hypothesis = &fit.hypothesis;
             let leader = order.iter().map(|place| &self.fits[*place]).find(|other| other.hypothesis != *hypothesis);
-            let along = leader.map(|leader| Proposal::Along(hypothesis.clone(), leader));
+            let along = leader.map(|leader| Proposal::Along(hypothesis.clone(), leader, f64::INFINITY));
             let anew = Proposal::Anew(hypothesis.clone(), base);
             let begun = Proposal::FromTheBeginning(hypothesis.clone(), base);
             along.into_iter().chain([anew, begun]).collect::<Vec<_>>()

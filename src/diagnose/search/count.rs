@@ -1,0 +1,78 @@
+//! The number of a strip's rods: where the recordings ask for another one, the search begins again with that.
+
+use std::sync::OnceLock;
+
+use rayon::prelude::*;
+
+use super::super::misfit::{Misfit, needs};
+use super::super::refit::{self, Refit, least};
+use super::super::rods;
+use super::super::taken::Taken;
+use super::Search;
+use crate::error::Result;
+use crate::experiment::Experiment;
+
+impl<'a> Search<'a, '_> {
+    /// The base model's fit with the number of rods that the recordings of a strip ask for, where nothing else is missing.
+    ///
+    /// # Errors
+    /// As [`Self::of_base_model`].
+    pub fn counted(self, counted: &'a OnceLock<Experiment>) -> Result<Self> {
+        let again = if self.is_adequate() { self.with_the_preferred_count(counted)? } else { None };
+        let Some(again) = again else { return Ok(self) };
+        let is_kept = rods::is_kept(&self.context, &self.fits, &again.fits);
+        Ok(if is_kept { again } else { self })
+    }
+
+    /// Whether the base model leaves no more than noise.
+    fn is_adequate(&self) -> bool {
+        !Misfit::of(&self.context, self.base(), &[]).unexplained
+    }
+
+    /// The base model's fit with another number of rods, if the recordings ask for it.
+    fn with_the_preferred_count(&self, counted: &'a OnceLock<Experiment>) -> Result<Option<Self>> {
+        let count = self.count.or_else(|| rods::preferred(&self.context, &self.fits, rods::Among::Simple));
+        let Some(count) = count else { return Ok(None) };
+        let counted = counted.get_or_init(|| rods::with(self.context.experiment, count));
+        let settings = self.context.settings;
+        Self::of_base_model(self.prepared, counted, Taken::AtItsWord, settings, self.progress).map(Some)
+    }
+
+    /// Searches again with the number of rods that the recordings of a strip ask for, where that does better; [`Self::counted`] has asked where nothing is missing.
+    ///
+    /// # Errors
+    /// As [`Self::of_base_model`].
+    pub fn recounted(self, counted: &'a OnceLock<Experiment>) -> Result<Self> {
+        let is_asked = self.count.is_some() || !self.is_adequate();
+        let again = if is_asked { self.with_the_preferred_count(counted)? } else { None };
+        let Some(mut again) = again else { return Ok(self) };
+        again.go_on_from(&self.fits);
+        again.run();
+        let is_kept = self.count.is_some() || rods::is_kept(&self.context, &self.fits, &again.fits);
+        Ok(if is_kept { again.after(self) } else { self.after(again) })
+    }
+
+    /// Fits the hypotheses that left least with another number of rods: the budget may end before they are sought again.
+    fn go_on_from(&mut self, others: &[Refit<'a>]) {
+        let Some(best) = least(others) else { return };
+        let needs = |fit: &Refit<'a>| needs(fit, best, &self.context.settings.misfit);
+        let leaders = refit::best(others, rods::LEADERS, |fit| !fit.hypothesis.effects.is_empty(), needs);
+        if leaders.is_empty() {
+            return;
+        }
+        let pieces = self.context.experiment.model.pieces;
+        let refit = |place: &usize| {
+            let begun = rods::begun_with(&others[*place], pieces);
+            self.context.refit(&begun.hypothesis, &begun, &[])
+        };
+        let found = leaders.par_iter().with_max_len(1).filter_map(refit).collect();
+        self.keep(found);
+        self.learn_noise();
+    }
+
+    /// Whether the single effects ask for another number of rods.
+    pub(super) fn is_miscounted(&mut self) -> bool {
+        self.count = rods::preferred(&self.context, &self.fits, rods::Among::Leaders);
+        self.count.is_some()
+    }
+}
