@@ -132,11 +132,12 @@ fn with_hinge(fit: &Refit<'_>, x: &[f64], of: impl Fn(f64, f64) -> f64, pieces: 
     let place = |parameter| fit.problem.free.iter().position(|free| *free == parameter);
     let mut x = x.to_vec();
     let (spring, bending) = (place(Parameter::HingeStiffness), place(Parameter::BendingStiffness));
-    if let (Some(spring), Some(bending)) = (spring, bending) {
-        if fit.x[spring] > 0.0 && x[bending] > 0.0 {
-            let rod_m = fit.problem.experiment.specimen.lengths_m()[0] / pieces as f64;
-            x[spring] = of(x[spring], 0.5 * rod_m / x[bending]);
-        }
+    if let (Some(spring), Some(bending)) = (spring, bending)
+        && fit.x[spring] > 0.0
+        && x[bending] > 0.0
+    {
+        let rod_m = fit.problem.experiment.specimen.lengths_m()[0] / pieces as f64;
+        x[spring] = of(x[spring], 0.5 * rod_m / x[bending]);
     }
     x
 }

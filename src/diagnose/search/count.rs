@@ -7,8 +7,9 @@ use rayon::prelude::*;
 use super::super::misfit::{Misfit, needs};
 use super::super::refit::{self, Refit, least};
 use super::super::rods;
+use super::super::settings::MisfitSettings;
 use super::super::taken::Taken;
-use super::Search;
+use super::{Begun, Search};
 use crate::error::Result;
 use crate::experiment::Experiment;
 
@@ -46,28 +47,41 @@ impl<'a> Search<'a, '_> {
         let is_asked = self.count.is_some() || !self.is_adequate();
         let again = if is_asked { self.with_the_preferred_count(counted)? } else { None };
         let Some(mut again) = again else { return Ok(self) };
-        again.go_on_from(&self.fits);
+        let pieces = again.context.experiment.model.pieces;
+        again.led = match self.led.is_empty() {
+            true => Self::leading(&self.fits, pieces, &self.context.settings.misfit),
+            false => self.led.clone(),
+        };
         again.run();
         let is_kept = self.count.is_some() || rods::is_kept(&self.context, &self.fits, &again.fits);
         Ok(if is_kept { again.after(self) } else { self.after(again) })
     }
 
-    /// Fits the hypotheses that left least with another number of rods: the budget may end before they are sought again.
-    fn go_on_from(&mut self, others: &[Refit<'a>]) {
-        let Some(best) = least(others) else { return };
-        let needs = |fit: &Refit<'a>| needs(fit, best, &self.context.settings.misfit);
-        let leaders = refit::best(others, rods::LEADERS, |fit| !fit.hypothesis.effects.is_empty(), needs);
-        if leaders.is_empty() {
-            return;
-        }
-        let pieces = self.context.experiment.model.pieces;
-        let refit = |place: &usize| {
-            let begun = rods::begun_with(&others[*place], pieces);
-            self.context.refit(&begun.hypothesis, &begun, &[])
+    /// The hypotheses that leave least, to be begun with another number of rods: the budget may end before they are sought again.
+    pub(super) fn leading(fits: &[Refit<'_>], pieces: usize, settings: &MisfitSettings) -> Vec<Begun> {
+        let Some(best) = least(fits) else { return Vec::new() };
+        let leaders = refit::best(
+            fits,
+            rods::LEADERS,
+            |fit| !fit.hypothesis.effects.is_empty(),
+            |fit| needs(fit, best, settings),
+        );
+        let begun = |place: usize| (fits[place].hypothesis.clone(), rods::begun_with(&fits[place], pieces).x);
+        leaders.into_iter().map(begun).collect()
+    }
+
+    /// Fits what led with another number of rods.
+    pub(super) fn take_up(&mut self) {
+        let (context, noise) = (&self.context, &self.base().problem.noise);
+        let fitted = |(hypothesis, x): &Begun| {
+            let is_alike = context.problem(hypothesis, noise).is_ok_and(|problem| problem.variables() == x.len());
+            is_alike.then(|| context.descend_from(hypothesis, noise, x.clone(), context.settings.descent.few_steps))?
         };
-        let found = leaders.par_iter().with_max_len(1).filter_map(refit).collect();
-        self.keep(found);
-        self.learn_noise();
+        let found: Vec<Refit<'a>> = self.led.par_iter().with_max_len(1).filter_map(fitted).collect();
+        if !found.is_empty() {
+            self.keep(found);
+            self.learn_noise();
+        }
     }
 
     /// Whether the single effects ask for another number of rods.

@@ -27,10 +27,13 @@ impl<'a> Search<'a, '_> {
         let context = self.context.on(&records);
         let Some(base) = horizon::on_the_beginning(&self.context, &context, self.base()) else { return };
         let begun = Search::begun(self.prepared, context, base, self.begun_at, self.progress);
-        let mut early = Search { is_loose: self.is_loose, until: self.until, rival: self.rival, part, ..begun };
+        let led = self.led.clone();
+        let mut early = Search { is_loose: self.is_loose, until: self.until, rival: self.rival, led, part, ..begun };
         early.usual();
         if early.is_cut_short {
             (self.is_cut_short, self.bending_n_m2, self.count) = (true, early.bending_n_m2, early.count);
+            let leading = |count| Self::leading(&early.fits, count, &early.context.settings.misfit);
+            self.led = early.count.map(leading).unwrap_or_default();
             self.rounds.extend(early.rounds);
             return;
         }

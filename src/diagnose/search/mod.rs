@@ -32,7 +32,7 @@ use rayon::prelude::*;
 use super::base;
 use super::context::{FitContext, without_errors_in_step};
 use super::effect::Effect;
-use super::hypothesis::Compared;
+use super::hypothesis::{Compared, Hypothesis};
 use super::laws;
 use super::misfit::{Misfit, leaves_more_than_noise};
 use super::preparation::Prepared;
@@ -49,6 +49,9 @@ use rounds::{Learns, Round, Tried};
 
 /// Proposals fitted together, between two looks at the budget.
 const TOGETHER: usize = 4;
+
+/// A hypothesis and the variables that its fit is to begin with.
+type Begun = (Hypothesis, Vec<f64>);
 
 /// What a round came to.
 #[derive(Debug, Clone, Copy, PartialEq, serde::Serialize)]
@@ -94,6 +97,8 @@ pub struct Search<'a, 'p> {
     is_cut_short: bool,
     /// That number.
     count: Option<usize>,
+    /// What led with another number.
+    led: Vec<Begun>,
     /// What searches that it goes on from have held against every other effect, and the hypotheses of which each effect was exchanged.
     compared: Compared,
     /// The work that had been done when it began, the base model's fit with it.
@@ -150,6 +155,7 @@ impl<'a, 'p> Search<'a, 'p> {
             rival: None,
             is_cut_short: false,
             count: None,
+            led: Vec::new(),
             compared: Compared::default(),
             begun_at,
             until: begun_at,
@@ -299,6 +305,7 @@ impl<'a, 'p> Search<'a, 'p> {
     /// Singles and pairs, until a strip is found to bend everywhere, or to be made of another number of rods: pairs would make up for a wrong one.
     fn usual(&mut self) {
         self.allow(self.context.settings.search.shares.usual);
+        self.take_up();
         self.seek_pace();
         for round in Round::USUAL {
             self.round(round, &mut Tried::default());

@@ -38,7 +38,8 @@ impl<'a> Search<'a, '_> {
         let of = |effect: &Effect| {
             let alone = Hypothesis::default().and(*effect, None);
             let start = if *effect == Effect::TimeBase { self.clock_of_the_swing() } else { Vec::new() };
-            let fitted = self.context.refit_anew(&alone, &start, base)?;
+            let known = self.fits.iter().find(|fit| fit.hypothesis == alone).cloned();
+            let fitted = known.or_else(|| self.context.refit_anew(&alone, &start, base))?;
             (fitted.left_share() < most).then_some((*effect, fitted))
         };
         let may_be_missing = TAKES_PACE.iter().filter(|effect| self.effects.contains(effect));
@@ -56,8 +57,10 @@ impl<'a> Search<'a, '_> {
         let misfit = Misfit::of(&self.context, base, &self.scores);
         let promises =
             |score: &Score| TAKES_PACE.contains(&score.effect) && score.gain > settings.search.most_of * base.chi2;
+        let is_led =
+            self.fits.iter().any(|fit| matches!(&fit.hypothesis.effects[..], [own] if TAKES_PACE.contains(own)));
         let leaves_much = base.left_share() > settings.misfit.much;
-        leaves_much && (misfit.out_of_step || misfit.strayed || self.scores.iter().any(promises))
+        leaves_much && (misfit.out_of_step || misfit.strayed || is_led || self.scores.iter().any(promises))
     }
 
     /// The clock by which the first recording swings as fast as the specimen, with springs as stiff or as soft as they may be.
