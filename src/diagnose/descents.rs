@@ -50,7 +50,7 @@ impl<'a> FitContext<'a> {
         let mut careful = x.clone();
         let given = hypothesis.effects.iter().flat_map(|effect| effect.parameters());
         let given = given.filter(|p| p.is_proportional() && start.iter().any(|(given, _)| given == *p));
-        for place in given.filter_map(|p| problem.free.iter().position(|free| free == p)) {
+        for place in given.filter_map(|p| problem.place(*p)) {
             careful[place] = 0.0;
         }
         if careful == x {
@@ -84,7 +84,7 @@ impl<'a> FitContext<'a> {
             *value = given.or(inherited).unwrap_or(*value);
         }
         // a strip that bends everywhere begins as stiff as the joint it replaces
-        let bending = problem.free.iter().position(|p| *p == Parameter::BendingStiffness);
+        let bending = problem.place(Parameter::BendingStiffness);
         let begins = bending.filter(|_| near.value(Parameter::BendingStiffness).is_none());
         if let (Some(k), Some(place)) = (near.value(Parameter::JointStiffness), begins) {
             x[place] = bending_n_m2(k, self.experiment);
@@ -92,8 +92,7 @@ impl<'a> FitContext<'a> {
         let lower = problem.lower();
         x.iter_mut().zip(&lower).for_each(|(x, low)| *x = x.max(*low));
         x.extend(problem.starts_from(&near.problem, &near.x));
-        let held = if problem.is_held_as(&x) { problem } else { problem.held_as(&x) };
-        Some((held, x))
+        Some((problem.held_as(&x), x))
     }
 
     /// The problem of a hypothesis near another fit: judged by the same noise, and a strip in the same shapes.

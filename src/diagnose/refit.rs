@@ -77,7 +77,7 @@ impl<'a> Refit<'a> {
 
     /// Where a free parameter stands among the variables.
     pub fn place(&self, parameter: Parameter) -> Option<usize> {
-        self.problem.free.iter().position(|p| *p == parameter)
+        self.problem.place(parameter)
     }
 
     /// The coefficients of the added effects, in the order of the effects.

@@ -6,7 +6,7 @@
 use rayon::prelude::*;
 
 use super::context::FitContext;
-use super::refit::{Refit, least_chi2};
+use super::refit::{self, Refit, least_chi2};
 use super::settings::Settings;
 use crate::experiment::{Experiment, Model};
 use crate::model::Parameter;
@@ -66,7 +66,7 @@ impl<'c> Counted<'c> {
             [(_, only)] => begun_with(only, pieces),
             [(count, first), (next, second), ..] => {
                 let share = (epsilon(pieces) - epsilon(*count)) / (epsilon(*next) - epsilon(*count));
-                let (own, other) = (bare(first, *count), bare(second, *next));
+                let (own, other) = (bare(first), bare(second));
                 let x: Vec<f64> = own.iter().zip(&other).map(|(own, other)| own + share * (other - own)).collect();
                 Refit { x: clamped(first, &x, pieces), ..first.clone() }
             }
@@ -86,7 +86,8 @@ impl<'c> Counted<'c> {
 
     /// The count that leaves least, and how much.
     fn best(&self, weights: &Weights<'_>) -> Option<(usize, f64)> {
-        self.weighed(weights).min_by(|a, b| a.1.total_cmp(&b.1))
+        let weighed = self.fits.iter().map(|(count, fit)| (*count, weights.weight(fit)));
+        weighed.min_by(|a, b| a.1.total_cmp(&b.1))
     }
 
     /// What the best count and the two nearest to it leave.
@@ -94,21 +95,16 @@ impl<'c> Counted<'c> {
         let Some((best, _)) = self.best(weights) else { return Vec::new() };
         self.nearest(epsilon(best)).into_iter().take(3).map(|(count, fit)| (*count, weights.weight(fit))).collect()
     }
-
-    fn weighed(&self, weights: &Weights<'_>) -> impl Iterator<Item = (usize, f64)> {
-        self.fits.iter().map(|(count, fit)| (*count, weights.weight(fit)))
-    }
 }
 
 /// A fit of a strip of some number of rods, its variables as they are to begin with for another one.
 pub fn begun_with<'a>(fit: &Refit<'a>, pieces: usize) -> Refit<'a> {
-    let own = fit.problem.experiment.model.pieces;
-    Refit { x: clamped(fit, &bare(fit, own), pieces), ..fit.clone() }
+    Refit { x: clamped(fit, &bare(fit), pieces), ..fit.clone() }
 }
 
 /// The variables of a fit, the spring at its hinge as its compliance.
-fn bare(fit: &Refit<'_>, pieces: usize) -> Vec<f64> {
-    with_hinge(fit, &fit.x, compliance, pieces)
+fn bare(fit: &Refit<'_>) -> Vec<f64> {
+    with_hinge(fit, &fit.x, compliance, fit.problem.experiment.model.pieces)
 }
 
 /// The same variables with the spring at the hinge of so many rods.
@@ -129,9 +125,8 @@ fn spring(compliance: f64, half_rod: f64) -> f64 {
 
 /// Variables with the one of the spring at the hinge changed, where it is free and not zero; `of` has the compliance of half a rod, ℓ/(2EI).
 fn with_hinge(fit: &Refit<'_>, x: &[f64], of: impl Fn(f64, f64) -> f64, pieces: usize) -> Vec<f64> {
-    let place = |parameter| fit.problem.free.iter().position(|free| *free == parameter);
     let mut x = x.to_vec();
-    let (spring, bending) = (place(Parameter::HingeStiffness), place(Parameter::BendingStiffness));
+    let [spring, bending] = [Parameter::HingeStiffness, Parameter::BendingStiffness].map(|own| fit.place(own));
     if let (Some(spring), Some(bending)) = (spring, bending)
         && fit.x[spring] > 0.0
         && x[bending] > 0.0
@@ -163,12 +158,10 @@ pub fn preferred(context: &FitContext<'_>, fits: &[Refit<'_>], among: Among) -> 
         return None;
     }
     // one effect of a leader may only make up for the count, and be told from the others where that is right
-    let mut leaders: Vec<&Refit<'_>> = fits.iter().collect();
-    leaders.sort_by(|a, b| weights.weight(a).total_cmp(&weights.weight(b)));
-    leaders.truncate(LEADERS);
+    let leaders = refit::best(fits, LEADERS, |_| true, |fit| weights.weight(fit));
     // what leaves many times as much is not led to the best by another count
     let may_win = |fit: &&Refit<'_>| fit.chi2 < MISCOUNTED * best.chi2;
-    let within = |fit: &Refit<'_>| leaders.iter().any(|leader| fit.hypothesis.is_within(&leader.hypothesis));
+    let within = |fit: &Refit<'_>| leaders.iter().any(|leader| fit.hypothesis.is_within(&fits[*leader].hypothesis));
     let simple = |fit: &Refit<'_>| fit.hypothesis.effects.len() < 2 && !fit.hypothesis.is_dear();
     let unexplained = weights.scatter > weights.settings.search.count_unexplained;
     let compared: Vec<&Refit<'_>> = fits

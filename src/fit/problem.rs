@@ -137,6 +137,11 @@ impl<'a> Problem<'a> {
         Ok(self.free.iter().map(value).collect())
     }
 
+    /// Where a free parameter stands among the variables.
+    pub fn place(&self, parameter: Parameter) -> Option<usize> {
+        self.free.iter().position(|free| *free == parameter)
+    }
+
     /// Lower bounds of all variables.
     pub fn lower(&self) -> Vec<f64> {
         let mut lower = vec![f64::NEG_INFINITY; self.variables()];
@@ -162,11 +167,11 @@ impl<'a> Problem<'a> {
         Ok((model, camera))
     }
 
-    /// The same with the shapes of a strip whose hinge has the spring that the variables give it. A strip starts in its lowest modes, and those of one
-    /// that is clamped are no sum of those of one that hangs free.
+    /// The same with the shapes of a strip whose hinge has the spring that the variables give it, unless they are alike. A strip starts in its lowest modes, and
+    /// those of one that is clamped are no sum of those of one that hangs free.
     #[must_use]
     pub fn held_as(mut self, x: &[f64]) -> Self {
-        if let Some(spring) = self.hinge_spring(x) {
+        if let Some(spring) = self.hinge_spring(x).filter(|_| !self.is_held_as(x)) {
             self.experiment.model.effects.hinge_stiffness = Some(spring);
         }
         self
@@ -175,8 +180,7 @@ impl<'a> Problem<'a> {
     /// The same with the shapes of another problem's strip, where both have a spring at the hinge.
     #[must_use]
     pub fn held_like(mut self, other: &Problem<'_>) -> Self {
-        let both = self.free.contains(&Parameter::HingeStiffness) && other.free.contains(&Parameter::HingeStiffness);
-        if both {
+        if [&self, other].iter().all(|problem| problem.free.contains(&Parameter::HingeStiffness)) {
             self.experiment.model.effects.hinge_stiffness = other.experiment.model.effects.hinge_stiffness;
         }
         self
@@ -195,7 +199,7 @@ impl<'a> Problem<'a> {
 
     /// The spring at the hinge of a strip, where it is free.
     fn hinge_spring(&self, x: &[f64]) -> Option<f64> {
-        let place = self.free.iter().position(|p| *p == Parameter::HingeStiffness)?;
+        let place = self.place(Parameter::HingeStiffness)?;
         self.experiment.model.effects.distributed_flexibility.map(|_| x[place])
     }
 
@@ -242,8 +246,8 @@ impl<'a> Problem<'a> {
 
     /// How far the parameters are from what is known of them, over its standard deviation.
     pub fn belief_block(&self, x: &[f64]) -> Option<Block> {
-        let place = |belief: &Belief| self.free.iter().position(|p| *p == belief.parameter);
-        let known: Vec<_> = self.beliefs.iter().filter_map(|b| Some((place(b)?, b.value, b.sd))).collect();
+        let known: Vec<_> =
+            self.beliefs.iter().filter_map(|b| Some((self.place(b.parameter)?, b.value, b.sd))).collect();
         known_block(&known, x)
     }
 

@@ -20,8 +20,8 @@ pub struct Straightened {
 impl Straightened {
     /// Of a problem with a hysteresis.
     pub fn of(problem: &Problem<'_>) -> Option<Self> {
-        let place = |parameter| problem.free.iter().position(|p| *p == parameter);
-        Some(Self { torque: place(Parameter::HysteresisTorque)?, yields: place(Parameter::HysteresisYield)? })
+        let [torque, yields] = [Parameter::HysteresisTorque, Parameter::HysteresisYield].map(|p| problem.place(p));
+        Some(Self { torque: torque?, yields: yields? })
     }
 
     /// T_h → T_h/Δ_y.

@@ -102,7 +102,7 @@ fn likeliest(context: &FitContext<'_>, fit: &Refit<'_>) -> Option<Jump> {
         for frames in 1..=MOST_FRAMES {
             for missing_s in [frames as f64 * step_s, -(frames as f64) * step_s] {
                 let mut x = fit.x.clone();
-                x.insert(problem.free.iter().position(|p| *p == Parameter::DroppedFrames)?, missing_s);
+                x.insert(problem.place(Parameter::DroppedFrames)?, missing_s);
                 jumps.extend(best_instant(&problem, record, &x, &before));
             }
         }
@@ -148,7 +148,7 @@ fn best_instant(problem: &Problem<'_>, record: usize, x: &[f64], before: &[f64])
             best = (left, row);
         }
     }
-    let place = problem.free.iter().position(|p| *p == Parameter::DroppedFrames)?;
+    let place = problem.place(Parameter::DroppedFrames)?;
     Some(Jump { record, at_s: between(best.1), missing_s: x[place], left: best.0 })
 }
 

@@ -33,13 +33,11 @@ impl Law for Ordinary {
             }
             tries.push(near);
         }
-        if score.is_none() && misfit.strayed && entry.acts == Acts::Pace {
-            // a spring of the base model that has grown in its place asks for less than nothing of it
-            tries.push(context.refit_anew(&base.hypothesis.and(effect, None), &[], base));
-        }
+        // a spring of the base model that has grown in its place asks for less than nothing of it
+        let hidden = score.is_none() && misfit.strayed && entry.acts == Acts::Pace;
+        // what bends a joint at rest: a base model that has given its second mode up is no place to start from
         let unsolved = misfit.unexplained && tries.iter().flatten().all(|fit| fit.chi2 > misfit.too_much);
-        if entry.needs == Needs::Spring && unsolved {
-            // what bends a joint at rest: a base model that has given its second mode up is no place to start from
+        if hidden || entry.needs == Needs::Spring && unsolved {
             tries.push(context.refit_anew(&base.hypothesis.and(effect, None), &[], base));
         }
         context.best_of(tries)

@@ -430,6 +430,12 @@ impl<'a, 'p> Search<'a, 'p> {
         found.iter().filter(|fit| known(fit).is_none_or(|known| fit.chi2 < known.chi2 - 1.0)).count()
     }
 
+    /// How much the base model lacks.
+    fn lacking(&self) -> Misfit {
+        Misfit::of(&self.context, self.base(), &self.scores)
+    }
+
+    /// How much the best fit lacks.
     fn misfit(&self) -> Option<Misfit> {
         least(&self.fits).map(|best| Misfit::of(&self.context, best, &[]))
     }

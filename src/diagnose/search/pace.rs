@@ -9,7 +9,6 @@ use super::super::context::FitContext;
 use super::super::effect::Effect;
 use super::super::hypothesis::Hypothesis;
 use super::super::laws;
-use super::super::misfit::Misfit;
 use super::super::refit::Refit;
 use super::super::screen::{Score, Screen};
 use super::Search;
@@ -37,16 +36,20 @@ impl<'a> Search<'a, '_> {
         let most = search.takes_the_pace * base.left_share();
         let of = |effect: &Effect| {
             let alone = Hypothesis::default().and(*effect, None);
+            let takes = |fit: &Refit<'a>| fit.left_share() < most;
+            if let Some(known) = self.fits.iter().find(|fit| fit.hypothesis == alone) {
+                return takes(known).then_some((*effect, alone, None));
+            }
             let start = if *effect == Effect::TimeBase { self.clock_of_the_swing() } else { Vec::new() };
-            let known = self.fits.iter().find(|fit| fit.hypothesis == alone).cloned();
-            let fitted = known.or_else(|| self.context.refit_anew(&alone, &start, base))?;
-            (fitted.left_share() < most).then_some((*effect, fitted))
+            let new = self.context.refit_anew(&alone, &start, base).filter(takes)?;
+            Some((*effect, alone, Some(new)))
         };
         let may_be_missing = TAKES_PACE.iter().filter(|effect| self.effects.contains(effect));
-        let Some((effect, fitted)) = may_be_missing.into_iter().find_map(of) else { return };
-        let alone = fitted.hypothesis.clone();
-        self.keep(vec![fitted]);
-        self.learn_noise();
+        let Some((effect, alone, new)) = may_be_missing.into_iter().find_map(of) else { return };
+        if let Some(new) = new {
+            self.keep(vec![new]);
+            self.learn_noise();
+        }
         let fitted = self.fits.iter().find(|fit| fit.hypothesis == alone);
         self.paced = fitted.and_then(|fit| in_the_place_of(effect, &self.context, fit, &self.effects));
     }
@@ -54,7 +57,7 @@ impl<'a> Search<'a, '_> {
     /// Whether the base model leaves much of the swing, and has lost step, or bent a spring to the pace, or something that takes a pace promises much of what it leaves.
     fn may_have_another_pace(&self) -> bool {
         let (base, settings) = (self.base(), self.context.settings);
-        let misfit = Misfit::of(&self.context, base, &self.scores);
+        let misfit = self.lacking();
         let promises =
             |score: &Score| TAKES_PACE.contains(&score.effect) && score.gain > settings.search.most_of * base.chi2;
         let is_led =

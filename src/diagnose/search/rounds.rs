@@ -158,14 +158,12 @@ impl<'a> Search<'a, '_> {
 
     /// Every effect of ordinary cost beside the base model.
     fn singles(&self) -> Vec<Proposal<'_, 'a>> {
-        self.beside_base(Misfit::of(&self.context, self.base(), &self.scores), |effect| {
-            effect.entry().cost == Cost::Ordinary
-        })
+        self.beside_base(self.lacking(), |effect| effect.entry().cost == Cost::Ordinary)
     }
 
     /// The others: the corners of a strip, or all but them.
     fn dear_singles(&self, corners: bool) -> Vec<Proposal<'_, 'a>> {
-        let misfit = Misfit::of(&self.context, self.base(), &self.scores).beside(&self.fits[1..]);
+        let misfit = self.lacking().beside(&self.fits[1..]);
         let is_meant = |effect| laws::has_corners_in_every_joint(&self.context, effect) == corners;
         self.beside_base(misfit, |effect| effect.entry().cost != Cost::Ordinary && is_meant(effect))
     }
@@ -188,7 +186,7 @@ impl<'a> Search<'a, '_> {
         tied.retain(|effect| promised(*effect) > settings.misfit.counts);
         tied.sort_by(|a, b| promised(*b).total_cmp(&promised(*a)));
         tied.truncate(settings.search.tried);
-        self.beside_base(Misfit::of(&self.context, self.base(), &self.scores), |effect| tied.contains(&effect))
+        self.beside_base(self.lacking(), |effect| tied.contains(&effect))
     }
 
     fn beside_base(&self, misfit: Misfit, is_of_kind: impl Fn(Effect) -> bool) -> Vec<Proposal<'_, 'a>> {
@@ -218,7 +216,7 @@ impl<'a> Search<'a, '_> {
 
     /// Where the base model leaves more than noise: a rival in a false minimum would count as evidence for the best.
     fn along_the_leader(&self) -> Vec<Proposal<'_, 'a>> {
-        let misfit = Misfit::of(&self.context, self.base(), &self.scores);
+        let misfit = self.lacking();
         let Some(leader) = least(&self.fits).filter(|_| misfit.unexplained) else {
             return Vec::new();
         };

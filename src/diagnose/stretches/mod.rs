@@ -192,8 +192,7 @@ fn linearised(
     if follows {
         follow(problem, &mut x)?;
     }
-    let places: Vec<usize> =
-        columns.iter().map(|own| problem.free.iter().position(|free| free == own)).collect::<Option<_>>()?;
+    let places: Vec<usize> = columns.iter().map(|own| problem.place(*own)).collect::<Option<_>>()?;
     let free = problem.free.len();
     let mut rows = Vec::new();
     for block in problem.blocks(&x)?.into_iter().filter(|block| block.robust) {
