@@ -55,7 +55,7 @@ struct Settings {
     mask: Option<String>,
     from_s: Option<f64>,
     until_s: Option<f64>,
-    /// Frames a second at which the camera ran; the stamps in the table are the file's times `time_scale`.
+    /// Frames per second at which the camera ran; the stamps in the table are the file's times `time_scale`.
     true_rate_hz: Option<f64>,
     time_scale: f64,
     reference_marks: Vec<[f64; 2]>,

@@ -137,7 +137,7 @@ impl Folder {
         out
     }
 
-    /// The same table from an encoder of so many steps a turn.
+    /// The same table from an encoder of so many steps per turn.
     fn in_steps(&self, angles: &Path, steps: f64) -> PathBuf {
         let table = fs::read_to_string(angles).unwrap();
         let column = table.lines().next().unwrap().split(',').position(|name| name == "theta1_rad").unwrap();
@@ -462,7 +462,7 @@ fn a_recording_at_another_pace_is_refused_as_a_fit_refuses_it() {
 #[test]
 fn a_swing_that_goes_far_from_frame_to_frame_is_named_all_the_same() {
     let folder = Folder::new();
-    // 2.4 Hz and 7.5 Hz at 30 frames a second: linearised from row to row in one piece, the motion would grow of its own
+    // 2.4 Hz and 7.5 Hz at 30 frames per second: linearised from row to row in one piece, the motion would grow of its own
     let base = "
 [[specimen.links]]
 length_m = 0.0256

@@ -183,7 +183,7 @@ fn wrong_clocks(cases: &mut Vec<Case>) {
             ("frame numbers", RATE_HZ, &["times slower than"]),
             ("slow motion by 4", 4.0, &["slow motion, played 4 times slower"]),
             ("half the rate", 0.5, BY_FACTOR),
-            ("25 for 30 frames a second", 1.2, BY_FACTOR),
+            ("25 for 30 frames per second", 1.2, BY_FACTOR),
             ("3 % off", 1.03, BY_FACTOR),
         ] {
             let rows = rows.iter().map(|row| [&[row[0] * factor], &row[1..]].concat()).collect();

@@ -31,7 +31,7 @@ impl Truth {
     }
 }
 
-/// A synthetic recording at 30 frames a second.
+/// A synthetic recording at 30 frames per second.
 struct Case {
     modes: Vec<Truth>,
     series: AngleSeries,

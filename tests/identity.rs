@@ -17,7 +17,7 @@ struct Swing {
     marks_px: Vec<Vec<[f64; 2]>>,
 }
 
-/// The forward model's swing, from a large release, as a camera with 30 frames a second sees it.
+/// The forward model's swing, from a large release, as a camera with 30 frames per second sees it.
 fn swing(release_rad: [f64; 2], duration_s: f64) -> Swing {
     let text = format!(
         "[model]\nrelease_rad = [{}, {}]\nk_eq_n_m_per_rad = 2.0e-4\n[render]\nduration_s = {duration_s}\n",

@@ -317,7 +317,7 @@ fn times() -> Vec<Case> {
             &["--true-rate", "3"],
             Warns(&["true_rate_hz = 3", "slower", "30"]),
         ),
-        swing("stills a second for a video", &["--rate", "50"], Refuses(&["--rate", "stills", "--true-rate"])),
+        swing("stills per second for a video", &["--rate", "50"], Refuses(&["--rate", "stills", "--true-rate"])),
         swing("a table of times for a video", &["--times", "no_marks.toml"], Refuses(&["--times", "stills"])),
         swing("no thread", &["--threads", "0"], Refuses(&["--threads", "at least 1"])),
     ]

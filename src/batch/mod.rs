@@ -8,7 +8,7 @@
 //! | [`lock`] | one batch at a time in an output folder |
 //! | [`crew`] | the runs: each a process of its own, as many at once as there are cores |
 //! | [`together`] | the recordings of one specimen |
-//! | [`summary`] | a row a recording, as CSV and Parquet |
+//! | [`summary`] | one row per recording, as CSV and Parquet |
 //! | [`index`] | the same as a page |
 //!
 //! Every run is a process of its own: a recording that brings a decoder down, or takes all memory, is a row with its reason and not the end of the others, and

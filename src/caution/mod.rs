@@ -118,7 +118,7 @@ fn time(m: &Measurement, options: &Options) -> Vec<String> {
     }
     if let Some(true_hz) = options.rig.true_rate_hz.filter(|_| m.time_scale > 1.0) {
         said.push(format!(
-            "true_rate_hz = {true_hz} is slower than the file's {:.3} frames a second, so every second counts {:.2} times; slow motion has the faster rate: leave it out unless this is a time lapse",
+            "true_rate_hz = {true_hz} is slower than the file's {:.3} frames per second, so every second counts {:.2} times; slow motion has the faster rate: leave it out unless this is a time lapse",
             true_hz * m.time_scale,
             m.time_scale
         ));
@@ -252,7 +252,7 @@ fn paths(m: &Measurement) -> impl Iterator<Item = (Vec<f64>, Vec<f64>)> {
 fn held(m: &Measurement) -> Option<String> {
     released_of(paths(m)).map(|held_s| {
         format!(
-            "what swings is held still until t = {held_s:.2} s, as by a hand, which covers marks and belongs to no swing: leave that out with --from {held_s:.2}"
+            "the specimen is held still until t = {held_s:.2} s, probably by a hand, which covers marks and is no free motion: leave that out with --from {held_s:.2}"
         )
     })
 }
@@ -261,7 +261,7 @@ fn held(m: &Measurement) -> Option<String> {
 fn caught(m: &Measurement) -> Option<String> {
     caught_of(paths(m)).map(|caught_s| {
         format!(
-            "what swings is held still from t = {caught_s:.2} s on, as by a hand: leave that out with --until {caught_s:.2}"
+            "the specimen is held still from t = {caught_s:.2} s on, probably by a hand: leave that out with --until {caught_s:.2}"
         )
     })
 }
@@ -283,7 +283,7 @@ fn pivot(m: &Measurement, options: &Options) -> Option<String> {
     let sd_rad = usual_sd_rad(angles)?;
     (shift_rad.max(factor * half_range_rad(angles)) > SHARED_DEVIATIONS * sd_rad).then(|| {
         format!(
-            "the pivot is known to ± {sx:.1}, {sy:.1} px if the camera faces the swing (one turned aside by 10° puts it 3 % of the link's length too near): all angles of link 1 may be too large or too small by {:.1} % and shifted by {:.2}°, beyond the standard deviations in the table (frequency and damping stay as they are); a mark on the hinge, or a wider swing, tells it better",
+            "the pivot is known to ± {sx:.1} px (x) and ± {sy:.1} px (y), if the camera faces the swing. All angles of link 1 may be too large or too small by {:.1} % and shifted by {:.2}°, in addition to the standard deviations in the table; frequency and damping are not affected. A mark on the hinge, or a wider swing, reduces this. A camera turned aside by 10° puts the pivot 3 % of the link's length too near",
             100.0 * factor,
             shift_rad.to_degrees()
         )
@@ -410,7 +410,7 @@ pub fn slow_motion(m: &Measurement, experiment: &Experiment) -> Option<String> {
         .filter(|(_, played)| (played / file_hz - 1.0).abs() < 0.02)
         .find(|(taken, played)| (factor / (taken / played) - 1.0).abs() < 0.3)?;
     Some(format!(
-        "it swings at {seen_hz:.3} Hz, where {length_m:.3} m of pendulum swing at {least_hz:.2} Hz or faster: this looks like {true_hz:.0} frames a second played at {played_hz:.0}; write true_rate_hz = {true_hz:.0} in [rig]"
+        "it swings at {seen_hz:.3} Hz, where {length_m:.3} m of pendulum swing at {least_hz:.2} Hz or faster: this looks like {true_hz:.0} frames per second played at {played_hz:.0}; write true_rate_hz = {true_hz:.0} in [rig]"
     ))
 }
 

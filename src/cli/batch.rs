@@ -31,7 +31,7 @@ Examples:
   freeswing batch experiments --out results --shard 3/8
 
 Each recording leaves in results/ what `freeswing run` leaves, in a folder with its path below the input folder. summary.csv and
-summary.parquet have a row a recording, index.html shows them. An experiment.toml holds for its folder and all below it; one that is
+summary.parquet have one row per recording, index.html shows them. An experiment.toml holds for its folder and all below it; one that is
 nearer, or NAME.toml beside NAME.mp4, overrides it key by key. Stopped at any instant and started again it goes on: a recording is done
 again only if it, its experiment file, the options or the version have changed. A part of several (--shard) writes no summary: when
 all are done, the same command without --shard does, and runs what is left.

@@ -38,7 +38,7 @@ pub struct FitArgs {
     /// Write measured and simulated angles, and what is left, row by row, as CSV; `-` for standard output.
     #[arg(long, value_name = "FILE")]
     curves: Option<Target>,
-    /// Let a parameter or effect free that the file does not name, as hinge_coulomb, or links.1.com_m where a length or a mass is not known to a thousandth; may be
+    /// Fit this parameter or effect, too, which the file does not name, as hinge_coulomb, or links.1.com_m where a length or a mass is not known to 0.1 %; may be
     /// repeated.
     #[arg(long, value_name = "ID")]
     free: Vec<String>,
@@ -197,19 +197,25 @@ impl Report<'_> {
         for estimate in &self.fitted.fit.estimates {
             if !estimate.is_determined() {
                 let (id, high) = (estimate.parameter.id(), number(estimate.high, 3));
-                let line = format!("{id} is not told from zero: at most {high} {}", estimate.parameter.unit());
+                let line = format!(
+                    "{id} is not significantly different from zero: at most {high} {}",
+                    estimate.parameter.unit()
+                );
                 text.push_str(&paragraph("  ", &line));
             }
         }
         for combination in self.fitted.fit.undetermined.iter().filter(|c| c.len() > 1) {
             let names: Vec<&str> = combination.iter().map(|(p, _)| p.id()).collect();
-            text.push_str(&paragraph("  ", &format!("Only together, not one by one: {}", names.join(", "))));
+            text.push_str(&paragraph(
+                "  ",
+                &format!("Only a combination of these can be determined: {}", names.join(", ")),
+            ));
         }
         for (pair, correlation) in self.strong_correlations() {
             text.push_str(&paragraph("  ", &format!("{} and {} are correlated by {correlation:.3}", pair[0], pair[1])));
         }
         if self.fitted.fit.ending != fit::Ending::Converged {
-            let line = "The fit has not converged within its budget: the values mean little. Let more parameters free, or use a \
+            let line = "The fit has not converged within its budget: the values mean little. Free more parameters (--free), or use a \
                         shorter stretch (--from, --until).";
             text.push_str(&paragraph("  ", line));
         }
@@ -217,12 +223,14 @@ impl Report<'_> {
             text.push_str(&paragraph("  ", "The residuals are correlated in time; the intervals are widened for it."));
         }
         let line = match self.fitted.verdicts.iter().all(Verdict::is_reproduced) {
-            true => "The intervals hold if nothing else acts: what is fitted takes up a force that is left out.",
+            true => {
+                "The intervals are valid only if nothing else acts: the fitted parameters would take up a missing force."
+            }
             false => {
-                "The intervals do not hold: the recording is not reproduced, and what is fitted takes up what the model lacks."
+                "The intervals are not valid: the recording is not reproduced, and the fitted parameters take up what the model lacks."
             }
         };
-        let line = &format!("{line} `freeswing diagnose` looks for it.");
+        let line = &format!("{line} `freeswing diagnose` searches for missing effects.");
         text.push_str(&paragraph("  ", line));
     }
 
@@ -285,8 +293,12 @@ impl Report<'_> {
             if peaks.is_empty() {
                 continue;
             }
-            let mut table =
-                Table::new([&format!("θ{} turns at s", link + 1), "measured mrad", "simulated", "turns later by ms"]);
+            let mut table = Table::new([
+                &format!("θ{} turns at s", link + 1),
+                "measured mrad",
+                "simulated",
+                "recording later by ms",
+            ]);
             let shown = 6.min(peaks.len());
             for k in 0..shown {
                 let peak = peaks[k * (peaks.len() - 1) / (shown - 1).max(1)];

@@ -19,9 +19,9 @@ Examples:
   freeswing identify angles.csv --from 35
   track swing.mp4 --out - | freeswing identify -
 
-The first line is the answer: frequency and damping ratio of each mode, the strongest first, or why there is none. What
-drifts or turns over is no mode. The table needs t_s and theta1_rad, theta2_rad, …, or displacement_px, which `track`
-writes of one mark of which nobody knows where it hangs: then amplitudes are in pixels. Other columns are ignored, an
+The first line is the answer: frequency and damping ratio of each mode, the strongest first, or why there is none. Drift
+and full rotations are not counted as modes. The table needs t_s and theta1_rad, theta2_rad, …, or displacement_px, which
+`track` writes of a single mark without a known pivot: then amplitudes are in pixels. Other columns are ignored, an
 empty field is a missing value. With --config come the frequency floor of the specimen and K_eq, C_eq. All intervals are 95 %.
 Exit code 0: done, also when something is not identifiable, which a warning says; 2: bad input, nothing written.")]
 pub struct IdentifyArgs {
@@ -36,7 +36,7 @@ pub struct IdentifyArgs {
     /// Leave out what comes before this time.
     #[arg(long, value_name = "S")]
     from: Option<f64>,
-    /// Leave out what comes from this time on.
+    /// Leave out this time and what comes after it.
     #[arg(long, value_name = "S")]
     until: Option<f64>,
     /// Print nothing.

@@ -170,7 +170,7 @@ fn recordings(
         }
         if let Some((released_s, rest)) = kept.let_go() {
             let held = format!(
-                "{}: what swings is held still until t = {released_s:.2} s, as by a hand, which no model knows of",
+                "{}: the specimen is held still until t = {released_s:.2} s, probably by a hand; that is no free motion",
                 series.path.display()
             );
             // a beginning that was asked for stays
@@ -184,14 +184,14 @@ fn recordings(
         // an end that was asked for stays
         if let Some((caught_s, swing)) = kept.caught().filter(|_| until_s.is_infinite()) {
             console.warning(format!(
-                "{}: what swings is held still from t = {caught_s:.2} s on, as by a hand, which no model knows of: left out, as with --until {caught_s:.2}",
+                "{}: the specimen is held still from t = {caught_s:.2} s on, probably by a hand; that is no free motion: left out, as with --until {caught_s:.2}",
                 series.path.display()
             ));
             kept = swing;
         }
         if let Some((rest_s, swing)) = kept.before_standstill().filter(|_| until_s.is_infinite()) {
             console.warning(format!(
-                "{}: no angle changes from t = {rest_s:.2} s on: equal readings of a rest are one reading; left out, as with --until {:.2}",
+                "{}: no angle changes from t = {rest_s:.2} s on: constant readings at rest carry no information; left out, as with --until {:.2}",
                 series.path.display(),
                 swing.t_s[swing.len() - 1]
             ));
@@ -205,7 +205,7 @@ fn recordings(
             _ => (format!("before t = {first_s:.2} s"), format!("--from {first_s:.2}")),
         };
         let lost = format!(
-            "{}: {when} no model can follow this motion: the noise of a few values grows into another motion, as it does where a chain tumbles",
+            "{}: {when} no model can follow this motion: it is chaotic (tumbling), and the noise of a few values grows into another motion",
             series.path.display()
         );
         // what was asked for stays

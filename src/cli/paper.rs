@@ -11,8 +11,8 @@ use crate::paper::{Quantity, Reproduction, Row, Section, Verdict};
 /// Recompute the paper's Tables 1 to 4 and Fig. 3, and say what reproduces.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "\
-Each number of the paper stands beside the recomputed one with a verdict: it reproduces, it reproduces under a condition, or it
-cannot be, with the reason. (A1) to (A12) number the paper's slips.
+Each number of the paper stands beside the recomputed one with a verdict: reproduced, reproduced under a condition, or impossible, with
+the reason. (A1) to (A12) number errors in the paper.
 
 Example:
   freeswing paper --distance-m 0.8 --json paper.json")]

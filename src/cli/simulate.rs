@@ -32,7 +32,7 @@ pub struct SimulateArgs {
     /// Length in seconds, instead of render.duration_s.
     #[arg(long, value_name = "S")]
     duration: Option<f64>,
-    /// Rows a second, instead of render.fps.
+    /// Rows per second, instead of render.fps.
     #[arg(long, value_name = "HZ")]
     rate: Option<f64>,
     /// Standard deviation of normal noise on every angle.

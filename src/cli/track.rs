@@ -49,10 +49,10 @@ pub struct TrackArgs {
     /// How many frames are shown in it, evenly spread.
     #[arg(long, value_name = "N", default_value_t = 8, requires = "debug_frames")]
     debug_count: usize,
-    /// Colour of the marks, a name or #rrggbb; once for all, or once a mark, top to bottom.
+    /// Colour of the marks, a name or #rrggbb; once for all marks, or once for each mark from top to bottom.
     #[arg(long, value_name = "COLOUR")]
     color: Vec<MarkColour>,
-    /// Number of marks; without it the file's, with one --color as many as hang together, else 3, or 2 below a --pivot.
+    /// Number of marks [default: that of the file; with one --color all marks of it that swing together; else 3, or 2 with --pivot].
     #[arg(long, value_name = "N")]
     markers: Option<usize>,
     /// A fixed, unmarked pivot above the first mark, in displayed pixels.
@@ -73,7 +73,7 @@ pub struct TrackArgs {
     /// Leave out what comes after, seconds of the file.
     #[arg(long, value_name = "S")]
     until: Option<f64>,
-    /// Frames a second at which the camera ran, where the file plays slower (slow motion).
+    /// Frames per second at which the camera ran, where the file plays slower (slow motion).
     #[arg(long, value_name = "HZ")]
     true_rate: Option<f64>,
     /// A fixed point with clear edges, displayed pixels, against which the camera's own motion is taken out; may be
@@ -95,7 +95,7 @@ pub struct TrackArgs {
     /// When the stills of a folder were taken: a number of seconds a line, or rows `file,t_s`; else times.csv among them.
     #[arg(long, value_name = "FILE", conflicts_with = "rate")]
     times: Option<PathBuf>,
-    /// Stills a second, where nothing says when each was taken.
+    /// Stills per second, where nothing says when each was taken.
     #[arg(long, value_name = "HZ")]
     rate: Option<f64>,
     /// Cores to use; all by default.

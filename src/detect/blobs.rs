@@ -41,7 +41,7 @@ pub(super) struct Target {
     pub threshold: i16,
     /// Marks are so small that lines cannot be told from them.
     pub thin: bool,
-    /// 2^level chroma samples a sample.
+    /// 2^level chroma samples per sample.
     pub level: u32,
     /// Only round spots count.
     pub round: bool,

@@ -29,7 +29,7 @@ const HALF_HAT: i32 = 10;
 pub struct Plane {
     pub width: usize,
     pub height: usize,
-    /// 2^level chroma samples a sample.
+    /// 2^level chroma samples per sample.
     pub level: u32,
     /// 64ths of an 8-bit code.
     pub values: Vec<i16>,

@@ -73,26 +73,50 @@ pub fn fitted<'a>(context: &FitContext<'a>, prepared: &Prepared) -> Result<Refit
     let refused = || Error::Simulation {
         detail: "no motion near the start values follows the recording; check [specimen] and [model]".into(),
     };
-    let (nothing, most_steps) = (Hypothesis::default(), context.settings.descent.most_steps);
+    let (nothing, steps) = (Hypothesis::default(), &context.settings.descent);
     // from where short stretches led, and from where `fit` ended from there
     let ended = beginning(prepared, &prepared.ended, context.experiment, &context.base)?;
-    let from = |x: Vec<f64>| context.descend_from(&nothing, &prepared.noise, x, most_steps);
+    let from = |x: Vec<f64>| {
+        let fit = context.descend_from(&nothing, &prepared.noise, x, steps.few_steps)?;
+        let is_at_its_end = fit.converged || lacks_something(context, &fit);
+        if is_at_its_end { Some(fit) } else { context.go_on(&fit, steps.most_steps - steps.few_steps) }
+    };
     let (first, other) = rayon::join(|| from(context.begun.clone()), || from(ended));
     let first = context.best_of([first, other]).ok_or_else(refused)?;
-    let fit = from_weaker_dampers(context, first);
+    with_its_noise(context, from_weaker_dampers(context, first)).ok_or_else(refused)
+}
+
+/// The same near another fit of it, with another number of rods.
+///
+/// # Errors
+/// As [`fitted`].
+pub fn fitted_near<'a>(context: &FitContext<'a>, near: &Refit<'_>, prepared: &Prepared) -> Result<Refit<'a>> {
+    let found = context.begin(&Hypothesis::default(), near, &[]).and_then(|fit| with_its_noise(context, fit));
+    found.map_or_else(|| fitted(context, prepared), Ok)
+}
+
+/// A fit judged by the noise that it leaves.
+fn with_its_noise<'a>(context: &FitContext<'a>, fit: Refit<'a>) -> Option<Refit<'a>> {
+    let descent = &context.settings.descent;
+    let steps = if lacks_something(context, &fit) { descent.first_steps } else { descent.most_steps };
     match learnt_noise(context, &fit) {
-        Some(noise) => context.judged_by(&noise, &fit, most_steps).ok_or_else(refused),
-        None => Ok(fit),
+        Some(noise) => context.judged_by(&noise, &fit, steps),
+        None => Some(fit),
     }
+}
+
+/// Whether a fit leaves so much of the swing that its model lacks something: more steps only bend it further to what that is.
+fn lacks_something(context: &FitContext<'_>, fit: &Refit<'_>) -> bool {
+    fit.left_share() > context.settings.misfit.much
 }
 
 /// The base model anew from weaker dampers, where it leaves much and damps more than short stretches say: what it lacks can have driven its own damper so high that a
 /// mode is gone, and no descent leads back.
 fn from_weaker_dampers<'a>(context: &FitContext<'a>, fit: Refit<'a>) -> Refit<'a> {
     let damper = Parameter::JointDamping;
-    let leaves_much = fit.left_share() > context.settings.misfit.much;
     let of_stretches = context.base.iter().position(|p| *p == damper).map_or(0.0, |place| context.begun[place]);
-    let Some(strong) = fit.value(damper).filter(|value| leaves_much && *value > of_stretches) else { return fit };
+    let damps_more = |value: &f64| *value > of_stretches && lacks_something(context, &fit);
+    let Some(strong) = fit.value(damper).filter(damps_more) else { return fit };
     let weaker = WEAKER
         .par_iter()
         .with_max_len(1)

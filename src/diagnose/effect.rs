@@ -279,27 +279,17 @@ static TABLE: [Entry; 18] = {
     use Parameter as P;
     use Place::{Air, Camera, Hinge, Joint};
     [
-        of_camera(velocity(entry(&[P::TimeBase], Camera, Pace, "a camera clock that runs wrong"))),
+        of_camera(velocity(entry(&[P::TimeBase], Camera, Pace, "a wrong time base"))),
         Entry {
             cost: Cost::EveryInstant,
-            ..velocity(entry(&[P::DroppedFrames], Camera, Otherwise, "frames missing at one instant"))
+            ..velocity(entry(&[P::DroppedFrames], Camera, Otherwise, "frames or samples missing at one time"))
         },
-        entry(&[P::CameraTilt], Camera, Otherwise, "a tilted camera"),
-        of_camera(position(entry(
-            &[P::AngleGain],
-            Camera,
-            Otherwise,
-            "a common gain of the angles (a sensor's scale; of small swings, a view askew)",
-        ))),
+        entry(&[P::CameraTilt], Camera, Otherwise, "a tilted camera, or a sensor with a wrong zero"),
+        of_camera(position(entry(&[P::AngleGain], Camera, Otherwise, "a scale error common to all angles"))),
         Entry {
             id: "camera_oblique",
             set_up: |problem| problem.looks_askew(),
-            ..of_camera(position(entry(
-                &[P::ViewStretch, P::ViewShear],
-                Camera,
-                Otherwise,
-                "a camera that looks askew (oblique view, pixels that are not square)",
-            )))
+            ..of_camera(position(entry(&[P::ViewStretch, P::ViewShear], Camera, Otherwise, "an oblique camera view")))
         },
         Entry {
             needs: Needs::Joint,
@@ -307,7 +297,7 @@ static TABLE: [Entry; 18] = {
                 &[P::DifferentialLag],
                 Camera,
                 Otherwise,
-                "a lag of θ2 behind θ1 (rolling shutter, filter)",
+                "a time offset between θ1 and the other angles",
             )))
         },
         Entry {
@@ -347,12 +337,12 @@ static TABLE: [Entry; 18] = {
             shapes: &["square with its sign", "cube"],
             ..velocity(entry(&[P::AirQuadratic], Air, Loss, "air drag in proportion to speed squared"))
         },
-        position(entry(&[P::AddedMass], Air, Pace, "air that swings along")),
+        position(entry(&[P::AddedMass], Air, Pace, "added mass of the air")),
         entry(&[P::SideForce], Air, Otherwise, "a steady side force (light, a draught)"),
         Entry {
             id: "support_motion",
             cost: Cost::EveryFrequency,
-            ..entry(&[P::SupportSine, P::SupportCosine, P::SupportFrequency], Hinge, Motion, "a support that moves")
+            ..entry(&[P::SupportSine, P::SupportCosine, P::SupportFrequency], Hinge, Motion, "a moving support")
         },
         Entry {
             cost: Cost::ManyRods,

@@ -21,7 +21,7 @@ use crate::model::{ForwardModel, State, Trajectory, Work};
 pub struct Plan {
     /// Its length.
     pub duration_s: f64,
-    /// Rows a second.
+    /// Rows per second.
     pub rate_hz: f64,
     /// Standard deviation of the noise of every angle.
     pub noise_rad: f64,

@@ -19,8 +19,7 @@ const FEWEST: usize = 4;
 const MOST: usize = 20;
 /// Fits that leave least, of which those with fewer effects are compared.
 pub const LEADERS: usize = 5;
-/// χ² that a wrong count leaves of what is otherwise right, over what the right one does: up to four times was seen, with two thirds of the rods and a noise of
-/// 0.33 mrad. Where the best single effect leaves more, something else is missing, and a count could only make up for it.
+/// A fit that leaves so many times the χ² of the best one is not led below that by another count.
 const MISCOUNTED: f64 = 10.0;
 /// A spring at the hinge has at least this part of the compliance of half a rod (judgement: a clamp has all of it).
 const LEAST: f64 = 0.1;
@@ -39,7 +38,12 @@ impl<'s> Weights<'s> {
     }
 
     fn weight(&self, fit: &Refit<'_>) -> f64 {
-        fit.chi2 / self.scatter + self.settings.misfit.counts * fit.coefficients() as f64
+        self.with_chi2(fit, fit.chi2)
+    }
+
+    /// The weight of a fit if it left another χ².
+    fn with_chi2(&self, fit: &Refit<'_>, chi2: f64) -> f64 {
+        chi2 / self.scatter + self.settings.misfit.counts * fit.coefficients() as f64
     }
 
     fn best<'f, 'a>(&self, fits: &'f [Refit<'a>]) -> Option<&'f Refit<'a>> {
@@ -88,6 +92,13 @@ impl<'c> Counted<'c> {
     fn best(&self, weights: &Weights<'_>) -> Option<(usize, f64)> {
         let weighed = self.fits.iter().map(|(count, fit)| (*count, weights.weight(fit)));
         weighed.min_by(|a, b| a.1.total_cmp(&b.1))
+    }
+
+    /// Whether some count may leave no more than this: χ² is convex in ε, and so above the straight line through two counts beyond them.
+    fn may_reach(&self, target: f64, weights: &Weights<'_>) -> bool {
+        let points: Vec<(f64, f64)> =
+            self.fits.iter().map(|(count, fit)| (epsilon(*count), weights.weight(fit))).collect();
+        (FEWEST..=MOST).any(|count| convex_bound(&points, epsilon(count)) <= target)
     }
 
     /// What the best count and the two nearest to it leave.
@@ -154,9 +165,6 @@ pub fn preferred(context: &FitContext<'_>, fits: &[Refit<'_>], among: Among) -> 
     }
     let weights = Weights::of(context, fits);
     let best = weights.best(fits)?;
-    if among == Among::Leaders && weights.scatter > MISCOUNTED {
-        return None;
-    }
     // one effect of a leader may only make up for the count, and be told from the others where that is right
     let leaders = refit::best(fits, LEADERS, |_| true, |fit| weights.weight(fit));
     // what leaves many times as much is not led to the best by another count
@@ -169,6 +177,14 @@ pub fn preferred(context: &FitContext<'_>, fits: &[Refit<'_>], among: Among) -> 
         .filter(|fit| within(fit) || among == Among::Simple && unexplained && simple(fit))
         .filter(may_win)
         .collect();
+    let better = weights.weight(best) - weights.settings.search.worth_a_count;
+    // a single effect may only lead the way where nothing else is left: beside a wrong effect a wrong count makes up for what that one gets wrong
+    let wanted = |fit: &Refit<'_>| match among {
+        Among::Leaders => {
+            better.min(weights.with_chi2(fit, weights.settings.search.count_unexplained * context.values() as f64))
+        }
+        Among::Simple => better,
+    };
     let experiments: Vec<Experiment> = (0..=MOST).map(|pieces| with(context.experiment, pieces)).collect();
     let contexts: Vec<FitContext<'_>> =
         experiments.iter().map(|experiment| FitContext { experiment, ..context.clone() }).collect();
@@ -179,21 +195,17 @@ pub fn preferred(context: &FitContext<'_>, fits: &[Refit<'_>], among: Among) -> 
         }
         // the parabola is only a guide
         for _ in 0..GUIDED {
-            let (pieces, _) = likeliest_count(&counted.nearest_three(&weights), FEWEST)?;
-            counted.try_count(pieces);
+            if counted.may_reach(wanted(fit), &weights) {
+                let (pieces, _) = likeliest_count(&counted.nearest_three(&weights), FEWEST)?;
+                counted.try_count(pieces);
+            }
         }
         if among == Among::Simple && unexplained {
             counted.try_count(RIGID);
         }
-        counted.best(&weights)
+        counted.best(&weights).filter(|(_, weight)| *weight < wanted(fit))
     });
-    let (pieces, value) = promised.min_by(|a, b| a.1.total_cmp(&b.1))?;
-    // a single effect may only lead the way where nothing else is left: beside a wrong effect a wrong count makes up for what that one gets wrong
-    let left = value * weights.scatter / context.values() as f64;
-    if among == Among::Leaders && left > weights.settings.search.count_unexplained {
-        return None;
-    }
-    (pieces != usual && value < weights.weight(best) - weights.settings.search.worth_a_count).then_some(pieces)
+    promised.min_by(|a, b| a.1.total_cmp(&b.1)).map(|(pieces, _)| pieces)
 }
 
 /// Whether fits with another count do better, as was promised. Each round has learnt a noise of its own; the first one's is the yardstick.
@@ -219,6 +231,14 @@ fn likeliest_count(left: &[(usize, f64)], fewest: usize) -> Option<(usize, f64)>
     let points: Vec<(f64, f64)> = left.iter().map(|(pieces, left)| (epsilon(*pieces), *left)).collect();
     let (lowest, left) = lowest_point(&points, epsilon(MOST)..=epsilon(fewest))?;
     Some(((1.0 / lowest.sqrt()).round() as usize, left))
+}
+
+/// The least that a convex function can be at some place, by the lines through every two points beyond which it lies; none where all lie around it.
+fn convex_bound(points: &[(f64, f64)], at: f64) -> f64 {
+    let pairs = points.iter().enumerate().flat_map(|(i, a)| points[..i].iter().map(move |b| (a, b)));
+    let is_beyond = |(a, b): &(&(f64, f64), &(f64, f64))| (a.0 - at) * (b.0 - at) >= 0.0 && a.0 != b.0;
+    let line = |(a, b): (&(f64, f64), &(f64, f64))| a.1 + (b.1 - a.1) * (at - a.0) / (b.0 - a.0);
+    pairs.filter(is_beyond).map(line).fold(f64::NEG_INFINITY, f64::max)
 }
 
 fn epsilon(pieces: usize) -> f64 {
@@ -268,5 +288,18 @@ mod tests {
     fn a_line_is_lowest_at_its_end() {
         let (x, y) = lowest_point(&[(0.2, 5.0), (0.3, 4.0), (0.1, 6.0)], 0.05..=0.4).unwrap();
         assert!((x - 0.4).abs() < 1e-12 && (y - 3.0).abs() < 1e-9, "{x} {y}");
+    }
+
+    #[test]
+    fn a_convex_function_is_bounded_beyond_two_points_and_not_between_them() {
+        let points = [0.1, 0.2, 0.4].map(|x: f64| (x, (x - 0.5).powi(2)));
+        // the chord of the last two, at its end
+        assert!((convex_bound(&points, 0.5) - -0.03).abs() < 1e-12);
+        // between the first two only the line of the other two tells
+        assert!(convex_bound(&points, 0.15) <= 0.35f64.powi(2));
+        assert_eq!(convex_bound(&points[..2], 0.15), f64::NEG_INFINITY);
+        for x in [0.05, 0.15, 0.3, 0.45] {
+            assert!(convex_bound(&points, x) <= (x - 0.5).powi(2) + 1e-12, "{x}");
+        }
     }
 }

@@ -10,6 +10,8 @@ use super::{energy, noise};
 
 /// A torque that works less than this part of what it could, with the angle or with its rate, has no phase.
 const NO_PHASE: f64 = 0.3;
+/// Rows in each cycle of a torque whose frequency is told (judgement).
+const ROWS_A_CYCLE: usize = 4;
 
 /// The torque that a model lacks, through one recording.
 #[derive(Debug, Clone)]
@@ -56,6 +58,8 @@ impl MissingTorque {
         let span_s = around.t_s.last()? - around.t_s.first()?;
         let power = noise::spectrum(&torque);
         let strongest = (1..power.len()).max_by(|a, b| power[*a].total_cmp(&power[*b]));
+        // with fewer rows per cycle it is noise
+        let strongest = strongest.filter(|k| ROWS_A_CYCLE * k <= torque.len());
         let mut missing = Self {
             place: input.place(),
             record,

@@ -211,19 +211,21 @@ fn to_decide(effects: &[Effect], class: &[Effect], marks: usize) -> Option<Strin
     let has = |of: &[Effect]| of.iter().filter(|c| class.contains(c)).count() > 1;
     let mut advice: Vec<&str> = Vec::new();
     if has(&[Effect::CameraTilt, Effect::SideForce, Effect::RestCurl]) {
-        advice.push("film a plumb line beside the specimen, and the specimen turned about its length by half a turn");
+        advice.push(
+            "film a plumb line beside the specimen, and film the specimen again turned by 180° about its long axis",
+        );
     }
     let of_pace = has(&[Effect::TimeBase, Effect::HingeStiffness, Effect::AddedMass, Effect::DistributedFlexibility]);
     if of_pace {
         advice.push(
-            "film a clock beside the specimen, and release the specimen at a much larger angle: only a spring's share in the frequency falls with amplitude",
+            "film a clock beside the specimen, and release the specimen at a much larger angle: gravity's restoring torque falls behind the angle there, so that a spring's share in the frequency grows with amplitude; a wrong clock and added mass change the frequency by the same factor at every amplitude",
         );
     }
     if has(&[Effect::HingeViscous, Effect::AirLinear, Effect::JointHysteretic]) {
         advice.push(if marks > 1 {
-            "release it in the other shape (θ2 against θ1), and again with a card on the tip: only the air's loss grows with its area"
+            "release it in the second mode (θ2 opposite to θ1), and again with a card on the tip: only the loss to the air grows with the area"
         } else {
-            "repeat it with a card on the tip: only the air's loss grows with its area"
+            "repeat it with a card on the tip: only the loss to the air grows with the area"
         });
     }
     if has(&[
@@ -233,7 +235,7 @@ fn to_decide(effects: &[Effect], class: &[Effect], marks: usize) -> Option<Strin
         Effect::AirLinear,
         Effect::JointHysteretic,
     ]) {
-        advice.push("release it at twice the angle and record until it is at rest: the losses differ in how they fall with amplitude");
+        advice.push("release it at twice the angle and record until it is at rest: the dampers depend on amplitude in different ways");
     }
     if has(&[
         Effect::AngleGain,
@@ -243,7 +245,7 @@ fn to_decide(effects: &[Effect], class: &[Effect], marks: usize) -> Option<Strin
         Effect::AddedMass,
     ]) {
         advice.push(
-            "film a grid in the plane of the swing, which fixes the gain of the angles and from where the camera looks",
+            "film a grid in the plane of the swing: it gives the scale of the angles and the direction of the camera",
         );
     }
     // one clock is enough

@@ -23,18 +23,18 @@ impl Findings<'_> {
     /// What is missing, and how sure that is.
     pub fn verdict_statement(&self) -> String {
         let verdict = &self.verdict;
-        let percent = 1e2 * verdict.probability;
+        let sure = self.how_sure();
         let reservation = self.reservation();
         let statement = match verdict.status {
-            Status::Adequate => format!(
-                "Nothing is missing that this recording could show: the base model leaves only noise ({percent:.0} %)."
-            ),
+            Status::Adequate => {
+                format!("Nothing is missing that this recording could show: the base model leaves only noise ({sure}).")
+            }
             Status::Unknown => format!(
-                "Something is missing that is not in the table of effects ({percent:.0} %): no named law, nor several of them, leaves only noise{}.",
+                "Something is missing that is not in the table of effects ({sure}): no effect of the table, and no combination that was tried, leaves only noise{}.",
                 self.nearest()
             ),
             Status::Identified => {
-                format!("Missing: {} ({percent:.0} %).{}{}", words(&verdict.effects), self.remark(), self.more())
+                format!("Missing: {} ({sure}).{}{}", words(&verdict.effects), self.remark(), self.more())
             }
             Status::Ambiguous => {
                 let is_rival =
@@ -43,19 +43,19 @@ impl Findings<'_> {
                 let mut others = match (&rivals[..], &verdict.companions[..]) {
                     ([], []) => String::new(),
                     ([], companions) => format!(", perhaps together with others: {}", names(companions, "")),
-                    (rivals, _) => format!(", but the recording does not tell it from others: {}", names(rivals, "")),
+                    (rivals, _) => format!(", but the recording cannot distinguish it from {}", words_of_any(rivals)),
                 };
                 if others.is_empty() || verdict.unknown > self.context.settings.verdict.told_apart {
-                    let unknown = 1e2 * verdict.unknown;
-                    let _ = write!(others, ", or something outside the table that it resembles ({unknown:.0} %)");
+                    let unknown = percent(verdict.unknown);
+                    let _ = write!(others, ", or an effect outside the table that looks like this ({unknown})");
                 }
                 let (effects, remark, more) = (words(&verdict.effects), self.remark(), self.more());
-                let statement = format!("Missing: most likely {effects} ({percent:.0} %){others}.{remark}{more}");
+                let statement = format!("Missing: most likely {effects} ({sure}){others}.{remark}{more}");
                 match self.posterior.candidate(&[]).map(|base| base.probability) {
                     // the names of the class together are likelier than none of them, each set by itself is not
                     Some(alone) if alone > verdict.probability => format!(
-                        "It is not certain that anything is missing: the base model alone ({:.0} %) is likelier than with any one set of effects. {}",
-                        1e2 * alone,
+                        "It is not certain that anything is missing: the base model alone ({}) is more probable than with any one set of effects. {}",
+                        percent(alone),
                         statement.replacen("Missing: most likely", "If something is, it is most likely", 1)
                     ),
                     _ => statement,
@@ -65,7 +65,24 @@ impl Findings<'_> {
         statement + &self.law() + &reservation
     }
 
-    /// What rivals whose fits are not certified could change.
+    /// The probability of the answer; of names whatever else may be missing, and where that is much less, that they are all.
+    fn how_sure(&self) -> String {
+        let (verdict, settings) = (&self.verdict, &self.context.settings.verdict);
+        let alone = percent(verdict.probability);
+        let inclusions = self.inclusions();
+        let named = inclusions.iter().filter(|(effect, _)| verdict.effects.contains(effect));
+        let least = named.map(|(_, inclusion)| *inclusion).fold(1.0, f64::min);
+        match verdict.effects.len() {
+            _ if verdict.status == Status::Unknown || least - verdict.probability < settings.told_apart => {
+                format!("probability {alone}")
+            }
+            0 => format!("probability {alone}"),
+            1 => format!("probability {}; {alone} that nothing else is missing", percent(least)),
+            _ => format!("probability {} each; {alone} that nothing else is missing", percent(least)),
+        }
+    }
+
+    /// What further starts could change: of rivals whose fits are not certified, or of the named fit.
     fn reservation(&self) -> String {
         let [low, high] = self.probability_interval();
         let rivals: Vec<String> = self.posterior.uncertified.iter().map(|rival| names(rival, "nothing else")).collect();
@@ -73,9 +90,9 @@ impl Findings<'_> {
             return String::new();
         }
         format!(
-            " Too few starts of the search agree on {}: if that fitted as well, the probability would be {:.0} %.",
-            rivals.join("; "),
-            1e2 * low
+            " The fit with {} is not certified: if it fitted as well as the best one, the probability of the answer would be {}.",
+            rivals.join("; or with "),
+            percent(low)
         )
     }
 
@@ -84,25 +101,25 @@ impl Findings<'_> {
         let named = &self.posterior.candidates[0];
         let effects = &named.fit.hypothesis.effects;
         if effects.is_empty() {
-            return "; no law of the table comes clearly nearer than the base model".to_owned();
+            return "; none comes clearly closer to the recording than the base model".to_owned();
         }
-        let [comes, explains, them] = match effects.len() {
-            1 => ["comes", "it explains", "it"],
-            _ => ["come", "they explain", "them"],
+        let [closest, explains, them] = match effects.len() {
+            1 => ["effect of the table is", "It explains", "it"],
+            _ => ["effects of the table are", "They explain", "them"],
         };
         let settings = &self.context.settings.verdict;
         let mut others = verdict::not_told_apart(&self.posterior.candidates, |w| w.if_named, settings.told_apart);
         others.retain(|effect| !effects.contains(effect));
         let likely = match 1e2 * named.if_named {
-            percent if percent >= 1.0 => format!(" ({percent:.0} % among the named)"),
+            percent if percent >= 1.0 => format!(" ({percent:.0} % if only the table is considered)"),
             _ => String::new(),
         };
         let apart = match others.len() {
             0 => String::new(),
-            _ => format!("; the recording does not tell {them} from {}", names(&others, "")),
+            _ => format!("; the recording cannot distinguish {them} from {}", words_of_any(&others)),
         };
         format!(
-            ". Of the table {} {comes} nearest{likely}: {explains} {} of what the base model leaves beyond the noise{apart}",
+            ". The closest {closest} {}{likely}. {explains} {} of what the base model leaves beyond the noise{apart}",
             words(effects),
             percent_of_all(self.explained())
         )
@@ -148,13 +165,13 @@ impl Findings<'_> {
             self.named().hypothesis.effects.iter().copied().filter(|named| !beside.has(*named)).collect();
         let beside = match (beside.effects.is_empty(), &replaced[..]) {
             (true, _) if self.is_of_table() => " It is described best by".to_owned(),
-            (true, _) => " It is described best without a name of the table, by".to_owned(),
+            (true, _) => " It is described best without an effect of the table, by".to_owned(),
             (false, []) => " What remains is described best by".to_owned(),
             (false, replaced) => format!(" It is described best with, in the place of {},", words(replaced)),
         };
         let milli = |of: &[f64]| of.iter().map(|rad| number(1e3 * rad, 2)).collect::<Vec<_>>().join(" and ");
         format!(
-            "{beside} {}: of what was not fitted that leaves {} mrad, the names alone {} mrad.{}",
+            "{beside} {}. In the part that was not fitted {} mrad rms remain with it, {} mrad rms with the named effects alone.{}",
             terms.join(" and "),
             milli(&learnt.prediction.rmse_rad),
             milli(&proof.augmented.rmse_rad),
@@ -171,7 +188,8 @@ impl Findings<'_> {
                 (_, 0) => "the first of them",
                 _ => "the second",
             };
-            (!effects.is_empty()).then(|| format!(" Along this motion {which} is nearly {}.", words_of_any(effects)))
+            (!effects.is_empty())
+                .then(|| format!(" In this motion {which} is nearly the same as {}.", words_of_any(effects)))
         };
         learnt.stand_for.iter().enumerate().filter_map(of_term).collect()
     }
@@ -199,12 +217,16 @@ impl Findings<'_> {
         let dry_rad = DRY_SHARE * self.context.largest_bend_rad();
         let mut remark = String::new();
         if self.named().value(Parameter::HysteresisYield).is_some_and(|yield_rad| yield_rad < dry_rad) {
-            remark.push_str(" The joint yields at next to no angle: that is dry friction in it.");
+            remark.push_str(
+                " The joint yields at an angle close to zero: this hysteresis acts like dry friction in the joint.",
+            );
         }
         if let Some(off) = self.length_off() {
             let (percent, long) = (1e2 * off.abs(), if off > 0.0 { "long" } else { "short" });
-            let _ =
-                write!(remark, " Lengths that are stated {percent:.2} % too {long} do the same: measure them again.");
+            let _ = write!(
+                remark,
+                " Lengths in the file that are {percent:.2} % too {long} would do the same: measure them again."
+            );
         }
         remark
     }
@@ -221,16 +243,18 @@ impl Findings<'_> {
     pub fn place_statement(&self, energy_shares: [f64; 3]) -> String {
         let departure = &self.departure;
         let Some(place) = self.place() else { return String::new() };
+        let acts_elsewhere = self.verdict.effects.iter().any(|effect| effect.place() != place);
         let mut statement = match place {
+            Place::Hinge if acts_elsewhere => "The effect that explains most acts at the hinge",
+            Place::Joint if acts_elsewhere => "The effect that explains most acts in the joint",
+            Place::Air if acts_elsewhere => "The effect that explains most acts along the specimen, from outside",
             Place::Hinge => "It acts at the hinge",
             Place::Joint => "It acts in the joint",
-            Place::Air => "It acts from outside along the specimen",
-            Place::Camera if self.verdict.effects.iter().any(|effect| effect.place() != Place::Camera) => {
-                "What explains most is an error of the camera"
-            }
+            Place::Air => "It acts along the specimen, from outside",
+            Place::Camera if acts_elsewhere => "The effect that explains most is an error of the measurement",
             // what acts on the specimen may look the same
             Place::Camera if self.verdict.class.iter().any(|effect| effect.place() != Place::Camera) => {
-                "It is an error of the camera, or a cause that the recording does not tell from one"
+                "It is an error of the measurement, or a cause that the recording cannot distinguish from one"
             }
             Place::Camera if self.verdict.status == Status::Unknown => {
                 "It looks like an error of what measures the angles rather than of the model"
@@ -238,19 +262,21 @@ impl Findings<'_> {
             Place::Camera if self.length_off().is_some() => {
                 "It is an error of the clock, or of the lengths in the file"
             }
-            Place::Camera => "It is an error of the camera, not of the model",
+            Place::Camera => "It looks like an error of the measurement, not of the model",
         }
         .to_owned();
         let phase = self.phase().filter(|_| place != Place::Camera);
         if let Some(phase) = phase {
-            let _ = write!(statement, ", in phase with the {}", phase.id());
+            let _ = write!(statement, ", {}", in_phase(phase));
         }
         if let (Some([from_s, until_s]), Some([least, most])) = (departure.time_s, departure.amplitude_rad) {
             let _ = write!(
                 statement,
-                "; the base model departs from {:.2} s to {until_s:.2} s, at amplitudes of {least:.3} to {most:.3} rad",
+                ". From {:.2} s to {until_s:.2} s the base model differs from the recording by more than the noise, at amplitudes of {least:.3} to {most:.3} rad ({:.1}° to {:.1}°)",
                 // no stamp of next to nothing is said to be less than that
-                if from_s.abs() < 5e-3 { 0.0 } else { from_s }
+                if from_s.abs() < 5e-3 { 0.0 } else { from_s },
+                least.to_degrees(),
+                most.to_degrees()
             );
         }
         if let Some(torque) = self.missing_torque.as_ref().filter(|t| t.place != Place::Camera && t.place == place) {
@@ -262,7 +288,10 @@ impl Findings<'_> {
         if is_known && shares.iter().sum::<f64>() > 0.0 {
             let [hinge, joint, air] = shares.map(|share| format!("{:.0} %", 1e2 * share));
             let in_joint = if self.context.marks() > 1 { format!(", {joint} in the joint") } else { String::new() };
-            let _ = write!(statement, ". Of the energy lost {hinge} go at the hinge{in_joint}, {air} to the air");
+            let _ = write!(
+                statement,
+                ". Of the dissipated energy {hinge} is lost at the hinge{in_joint} and {air} to the air"
+            );
         }
         statement.push('.');
         statement
@@ -274,8 +303,8 @@ fn words_of_term(term: &Term) -> String {
     let place = match term.law.place {
         LawPlace::Hinge => "a torque at the hinge",
         LawPlace::Joint => "a torque in the joint",
-        LawPlace::Strip => "a force along the strip",
-        LawPlace::Tip => "a force at the tip",
+        LawPlace::Strip => "a force per length across the strip",
+        LawPlace::Tip => "a force across the tip",
         LawPlace::Support => "an acceleration of the support",
     };
     format!("{place} of {} {}", term.with_numbers(), term.law.place.unit())
@@ -285,6 +314,22 @@ fn words_of_term(term: &Term) -> String {
 fn percent_of_all(share: f64) -> String {
     let digits = if share > 0.999 { 2 } else { 1 };
     if share > 0.9999 { "more than 99.99 %".to_owned() } else { format!("{:.digits$} %", 1e2 * share) }
+}
+
+/// A probability; none is said to be certain.
+fn percent(probability: f64) -> String {
+    match 1e2 * probability {
+        percent if percent >= 99.5 => "more than 99 %".to_owned(),
+        percent if percent < 0.5 => "less than 1 %".to_owned(),
+        percent => format!("{percent:.0} %"),
+    }
+}
+
+fn in_phase(phase: Phase) -> &'static str {
+    match phase {
+        Phase::Position => "in phase with the angle, as a spring does",
+        Phase::Velocity => "in phase with the velocity, as a damper does",
+    }
 }
 
 fn in_place(place: Place) -> &'static str {
@@ -299,15 +344,17 @@ fn in_place(place: Place) -> &'static str {
 /// What the smoothed torque says by itself.
 fn words_of_torque(torque: &MissingTorque, phase: Option<Phase>) -> String {
     let place = in_place(torque.place);
-    let mut words = format!("A torque without a law would do {place}, of {} N m rms", number(torque.rms, 2));
+    let mut words =
+        format!("The missing torque {place}, estimated without a law, is {} N m rms", number(torque.rms, 2));
     if let Some(hz) = torque.frequency_hz {
         let _ = write!(words, ", strongest at {hz:.2} Hz");
     }
     // what goes with the position takes and gives back
     if let Some(share) = torque.energy_share.filter(|_| phase != Some(Phase::Position)) {
-        let does = if share < 0.0 { "puts in as much as" } else { "takes" };
+        let does = if share < 0.0 { "it supplies as much as" } else { "it takes" };
         // it is estimated beside the energy lost, and nothing takes more than all of it
-        let _ = write!(words, ", that {does} {:.0} % of the energy lost", 1e2 * share.abs().min(1.0));
+        let part = if share.abs() < 1.0 { format!("{:.0} %", 1e2 * share.abs()) } else { "about all".to_owned() };
+        let _ = write!(words, "; {does} {part} of the dissipated energy");
     }
     words
 }
@@ -349,7 +396,7 @@ mod tests {
             words_of_term(&term)
         };
         let drag = of(LawPlace::Strip, "-a * wind * abs(wind)");
-        assert_eq!(drag, "a force along the strip of -2.000e-2 * wind * abs(wind) N/m");
+        assert_eq!(drag, "a force per length across the strip of -2.000e-2 * wind * abs(wind) N/m");
         assert_eq!(of(LawPlace::Joint, "-a * rate"), "a torque in the joint of -2.000e-2 * rate N m");
     }
 

@@ -157,7 +157,7 @@ pub struct Rig {
     pub from_s: Option<f64>,
     /// What comes after is not measured, seconds of the file.
     pub until_s: Option<f64>,
-    /// Frames a second at which the camera ran, where the file plays slower (slow motion).
+    /// Frames per second at which the camera ran, where the file plays slower (slow motion).
     pub true_rate_hz: Option<f64>,
     /// Fixed points with clear edges, displayed pixels: they show how the camera moves.
     pub reference_marks: Vec<[f64; 2]>,

@@ -242,7 +242,7 @@ mod tests {
     #[test]
     fn a_second_mode_beyond_half_the_rate_is_sought_at_its_mirror_image() {
         let mut truth = seen(&with(1e-3, 1e-6));
-        // 14.3 Hz at 25 rows a second are seen at 10.7 Hz
+        // 14.3 Hz at 25 rows per second are seen at 10.7 Hz
         truth.nyquist_hz = 12.5;
         let fast = truth.fast.as_mut().unwrap();
         fast.frequency_hz = 25.0 - fast.frequency_hz;

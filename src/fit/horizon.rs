@@ -50,7 +50,7 @@ mod tests {
     use super::*;
     use crate::model::{ForwardModel, State, Trajectory};
 
-    /// Two rods of 0.2 m, let go at these angles, a hundred rows a second.
+    /// Two rods of 0.2 m, let go at these angles, a hundred rows per second.
     fn recorded(release_rad: [f64; 2], duration_s: f64) -> (Record, Experiment) {
         let experiment = Experiment::parse(
             "[specimen]\nlink_lengths_m = [0.2, 0.2]\nmass_kg = 0.1\n[model]\nk_eq_n_m_per_rad = 0.0\nc_eq_n_m_s_per_rad = 2e-5\n",

@@ -23,7 +23,7 @@ const LENGTH_UNITS: [(f64, &str); 4] =
     [(1000.0, "millimetres"), (100.0, "centimetres"), (39.37, "inches"), (3.281, "feet")];
 /// Stamps in these units stand in seconds this many times too large.
 const TIME_UNITS: [(f64, &str); 3] = [(1e6, "microseconds"), (1e3, "milliseconds"), (1.0 / 60.0, "minutes")];
-/// Frames a second of a slow-motion film, over those it plays at.
+/// Frames per second of a slow-motion film, over those it plays at.
 const SLOW_MOTIONS: [f64; 5] = [2.0, 4.0, 8.0, 16.0, 32.0];
 /// Angles of which one measured part in this of its own is the same as the model's.
 const SHAPE: f64 = 0.1;

@@ -46,10 +46,10 @@ impl Doubt {
     fn statement(self) -> String {
         match self {
             Self::TooShort { swings } => format!(
-                "not judged: the recording holds {swings:.1} swings; with fewer than {FEWEST_SWINGS:.0} the start alone explains it. Record longer."
+                "not judged: the recording holds {swings:.1} swings; with fewer than {FEWEST_SWINGS:.0} the initial state alone can explain it. Record longer."
             ),
             Self::TooNoisy { link, share } => format!(
-                "not judged: {:.0} % of the variance of θ{} are noise, in which any misfit hides. Use an earlier or a better stretch.",
+                "not judged: {:.0} % of the variance of θ{} is noise, so that a misfit could not be seen. Use an earlier or a better stretch.",
                 1e2 * share,
                 link + 1
             ),
@@ -211,10 +211,10 @@ impl Verdict {
         let follows = self.explained[link] >= EXPLAINED;
         let last = self.windows.iter().rev().find_map(|w| w.links.get(link)).copied().filter(|_| follows);
         let drift = last.map_or(String::new(), |l| {
-            let when = if l.lag_s < 0.0 { "early" } else { "late" };
+            let when = if l.lag_s < 0.0 { "ahead of" } else { "behind" };
             let size = if l.gain < 0.0 { "smaller" } else { "larger" };
             let (lag_ms, percent) = (1e3 * l.lag_s.abs(), 1e2 * l.gain.abs());
-            format!(" At the end the recording is {lag_ms:.1} ms {when} and {percent:.1} % {size}.")
+            format!(" At the end the recording is {lag_ms:.1} ms {when} the model and {percent:.1} % {size}.")
         });
         let little = match self.explained[link] {
             explained if explained < EXPLAINED => {

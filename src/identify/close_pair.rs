@@ -60,7 +60,7 @@ pub(super) fn of_one_link(modes: &[Mode]) -> Option<String> {
         [a.frequency_hz.value.min(b.frequency_hz.value), a.frequency_hz.value.max(b.frequency_hz.value)];
     (high_hz < FARTHEST * low_hz).then(|| {
         format!(
-            "one link has one mode in one plane, and two are seen {:.1} % apart: it swings in two planes and is seen from one side, as a string whose ellipse turns, or a neighbour swings along; look at it from below, or let it swing on two strings, before using either damping ratio",
+            "one link has one mode in one plane, and two are seen {:.1} % apart: it swings in two planes and is seen from one side, as a string whose ellipse turns, or a neighbouring part vibrates with it; look at it from below, or let it swing on two strings, before using either damping ratio",
             100.0 * (high_hz / low_hz - 1.0)
         )
     })

@@ -43,16 +43,16 @@ impl Damping {
             format!("the amplitude grows, by {percent:.1} % a cycle: driven, fed by another mode, or two beating")
         } else if whole.within(-1.0, 1.0) && whole.low > 0.0 {
             format!(
-                "the swing decays, as with ξ = {:.4} over the record, but so much depends on amplitude that ξ at small amplitude is open; use --from for a later, smaller swing",
+                "the swing decays, as with ξ = {:.4} over the record, but it depends so strongly on amplitude that ξ at small amplitude cannot be determined; use --from for a later, smaller swing",
                 whole.value
             )
         } else if bounded {
             format!(
-                "the decay over {duration_s:.3} s is within its uncertainty: ξ ≤ {:.2e} is all that can be said",
+                "the decay over {duration_s:.3} s is smaller than its uncertainty: only ξ ≤ {:.2e} is known",
                 estimate.high
             )
         } else {
-            format!("{duration_s:.3} s of so uneven a motion leave every ξ from 0 to 1 possible")
+            format!("the motion of {duration_s:.3} s is too irregular to determine ξ")
         };
         Self::NotIdentifiable { estimate: Some(estimate).filter(|_| bounded), reason }
     }
@@ -130,7 +130,7 @@ impl Trend {
             Self::GrowsWithAmplitude => "grows with amplitude, as drag does",
             Self::FallsWithAmplitude => "grows as the swing becomes small, as dry friction does",
             Self::LeastBetween => "least at a middle amplitude: dry friction below it, drag above",
-            Self::Uneven => "changing as neither friction nor drag makes it",
+            Self::Uneven => "changing in a way that neither dry friction nor drag explains",
         }
     }
 }

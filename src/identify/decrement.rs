@@ -56,7 +56,7 @@ impl Decrement {
             (link.t_s.len() as f64 - 1.0) / (link.t_s.last().unwrap_or(&1.0) - link.t_s.first().unwrap_or(&0.0));
         let samples = 0.25 * rate_hz / frequency_hz;
         if samples < 3.0 {
-            return Err(format!("{:.1} samples a cycle; a peak needs 12", 4.0 * samples));
+            return Err(format!("{:.1} samples per cycle; a peak needs 12", 4.0 * samples));
         }
         let extremes = follow(link, frequency_hz, noise_rad);
         if extremes.len() < 4 {

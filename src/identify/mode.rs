@@ -242,7 +242,7 @@ impl Mode {
         let lower = self.shape.get(1).filter(|_| self.moves_together())?;
         (lower.ratio_to_first.high < 0.95).then(|| {
             format!(
-                "where all links move together a hung one moves more than the one above it, but θ2 = {:.2} θ1: are the columns exchanged, or is θ2 measured from link 1?",
+                "where all links move together the lower one should swing farther than the upper one, but θ2 = {:.2} θ1: are the columns exchanged, or is θ2 measured from link 1?",
                 lower.ratio_to_first.value
             )
         })
@@ -269,7 +269,7 @@ impl Mode {
             return Some(format!("damping not identifiable: {reason}"));
         }
         let meaning = match self.damping_trend {
-            Some(Trend::Uneven) => "the damping ratio changes as neither friction nor drag makes it: look for a swing in a second plane, a neighbour that swings along, a draught or a hand".to_owned(),
+            Some(Trend::Uneven) => "the damping ratio changes in a way that neither dry friction nor drag explains: look for a swing in a second plane, a neighbouring part that vibrates with it, a draught or a hand".to_owned(),
             Some(trend) => format!("the damping depends on amplitude: friction or drag, not one ξ ({})", trend.words()),
             // what one oscillation describes needs no other reason
             None if self.modulated.is_some() => return None,

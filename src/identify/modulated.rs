@@ -269,7 +269,7 @@ mod tests {
 
     const F0_HZ: f64 = 0.8;
 
-    /// So many cycles of a pendulum, 60 values a second, with these losses of the angular acceleration, and no noise but that of four digits.
+    /// So many cycles of a pendulum, 60 values per second, with these losses of the angular acceleration, and no noise but that of four digits.
     fn swing(cycles: f64, amplitude_rad: f64, loss: impl Fn(f64) -> f64) -> AngleSeries {
         let omega = std::f64::consts::TAU * F0_HZ;
         let slope = |[theta, rate]: [f64; 2]| [rate, -omega * omega * theta.sin() - loss(rate)];

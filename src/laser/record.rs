@@ -83,7 +83,7 @@ impl LaserRecord {
         let Some(columns) = columns else {
             return Err(refuse(
                 None,
-                "holds no row of numbers; export the record as CSV, a row a sample: time, displacement".to_owned(),
+                "holds no row of numbers; export the record as CSV, one row per sample: time, displacement".to_owned(),
             ));
         };
         rows.finish(columns.name, laser)

@@ -189,7 +189,7 @@ fn pivot(text: &mut String, finding: &Finding) {
 
 fn rate(text: &mut String, finding: &Finding) {
     let timing = &finding.timing;
-    let stated = timing.nominal_rate_hz.map_or("no rate".to_owned(), |r| format!("{r:.3} frames a second"));
+    let stated = timing.nominal_rate_hz.map_or("no rate".to_owned(), |r| format!("{r:.3} frames per second"));
     let real = timing.real_rate_hz.map_or("unknown".to_owned(), |r| format!("{r:.3}"));
     let _ = writeln!(text, "# the file states {stated}, its time stamps say {real}; the stamps are used");
     text.push_str("# true_rate_hz = 240          # if this is slow motion: the rate at which the camera ran\n");

@@ -26,7 +26,7 @@ use crate::video::{Layout, Recording, VideoWriter};
 
 /// How far back a trail reaches.
 const TRAIL_S: f64 = 1.0;
-/// Pictures a second where the recording has a single one.
+/// Pictures per second where the recording has a single one.
 const USUAL_RATE_HZ: f64 = 30.0;
 
 /// Bits a pixel at which H.264 shows a still scene and a few marks without blocks.
@@ -43,7 +43,7 @@ pub struct Overlay<'a> {
     pub angles: &'a Angles,
     /// The fixed, unmarked pivot, displayed pixels.
     pub pivot_px: Option<[f64; 2]>,
-    /// Pictures a second, about; the stamps are the recording's own.
+    /// Pictures per second, about; the stamps are the recording's own.
     pub rate_hz: Option<f64>,
     /// Bytes that the file stays below, nearly: its pictures are made smaller where that must be.
     pub most_bytes: Option<u64>,

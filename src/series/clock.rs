@@ -2,7 +2,7 @@
 //!
 //! Rows of a constant rate whose stamps are written with few decimals lie up to half a unit of the last one from a line, t₀ + k Δt, never further. Where all do,
 //! the line's times are the better ones. The rounding of a large swing would else look like another oscillation, or like missing physics: at
-//! 100 values a second, 10 ms are a whole step. Times that are uneven by more than the unit stay as they are.
+//! 100 values per second, 10 ms are a whole step. Times that are uneven by more than the unit stay as they are.
 
 use crate::statistics::median_step_s;
 

@@ -322,7 +322,7 @@ fn motion(path: &[Option<[f64; 2]>]) -> (f64, f64) {
         .collect();
     let scatter_px = median(&mut thirds).unwrap_or(0.0) / (0.6745 * 20f64.sqrt());
     let travel_px = of_axis(0).max(of_axis(1));
-    // a swing of few frames a turn has differences of its own: they are no scatter
+    // a swing of few frames per turn has differences of its own: they are no scatter
     (travel_px, scatter_px.min(0.1 * travel_px))
 }
 

@@ -30,7 +30,7 @@ pub struct StreamInfo {
     pub orientation: Orientation,
     /// Width of a displayed pixel over its height.
     pub pixel_aspect: f64,
-    /// Frames a second that the file states, if any.
+    /// Frames per second that the file states, if any.
     pub nominal_rate_hz: Option<f64>,
     /// Seconds in one tick of the time stamps.
     pub tick_s: f64,

@@ -16,7 +16,7 @@ pub enum StillTimes {
     Beside,
     /// This file.
     File(PathBuf),
-    /// So many stills a second.
+    /// So many stills per second.
     Rate(f64),
 }
 
@@ -35,7 +35,7 @@ impl StillTimes {
                 return Ok((0..files.len()).map(|i| i as f64 / rate_hz).collect());
             }
             Self::Rate(rate_hz) => {
-                let message = format!("{rate_hz} stills a second cannot be; give a number above 0");
+                let message = format!("{rate_hz} stills per second cannot be; give a number above 0");
                 return Err(Error::Option { option: "--rate".to_owned(), message });
             }
             Self::File(path) => path.clone(),

@@ -27,7 +27,7 @@ pub struct Timing {
     pub last_s: f64,
     /// Rate that the file states.
     pub nominal_rate_hz: Option<f64>,
-    /// Frames a second between gaps, from the stamps.
+    /// Frames per second between gaps, from the stamps.
     pub real_rate_hz: Option<f64>,
     /// Median step.
     pub median_step_s: f64,
@@ -108,7 +108,7 @@ impl Timing {
             && (real / nominal - 1.0).abs() > RATE_TOLERANCE
         {
             warnings.push(format!(
-                "the file states {nominal:.3} frames a second, its time stamps say {real:.3} between gaps; the stamps are used"
+                "the file states {nominal:.3} frames per second, its time stamps say {real:.3} between gaps; the stamps are used"
             ));
         }
         if self.gap_count > 0 {

@@ -22,7 +22,7 @@ use figure::Figure;
 /// Longest planned recording.
 const MOST_ROWS: f64 = 1e6;
 
-/// Say where the model differs from recordings, name the physics left out, and prove it.
+/// Find where the model differs from recordings and which effects are missing, and check this by prediction.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "\
 Examples:
@@ -60,16 +60,16 @@ pub struct DiagnoseArgs {
     /// Predict a single recording from this stamp on, fitted before it [default: two thirds through it].
     #[arg(long, value_name = "S")]
     predict_from: Option<f64>,
-    /// Judge the base model by this many recordings made from it and fitted anew, not by their residuals to first order.
+    /// Test the base model with this many simulated recordings (parametric bootstrap), not by a linear approximation.
     #[arg(long, value_name = "N", default_value_t = 0)]
     bootstraps: usize,
-    /// Before an experiment: what a recording of the file's release would show of each effect, and what it would confuse.
+    /// Before an experiment, without a recording: the smallest amount of each effect that would be seen, and what it would be confused with.
     #[arg(long)]
     detectable: bool,
     /// Length of the planned recording.
     #[arg(long, value_name = "S", default_value_t = 60.0, requires = "detectable")]
     duration: f64,
-    /// Rows a second of the planned recording.
+    /// Rows per second of the planned recording.
     #[arg(long, value_name = "HZ", default_value_t = 30.0, requires = "detectable")]
     rate: f64,
     /// Noise of the planned recording's angles.

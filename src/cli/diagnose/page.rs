@@ -9,6 +9,8 @@ use crate::diagnose::{Detectable, Diagnosis, Status};
 
 /// Candidates listed.
 const LISTED: usize = 6;
+/// Smaller probabilities are not told from one another.
+const LEAST: f64 = 1e-3;
 
 /// The page of a diagnosis.
 pub(super) fn page(diagnosis: &Diagnosis) -> String {
@@ -21,11 +23,14 @@ pub(super) fn page(diagnosis: &Diagnosis) -> String {
     }
     if !diagnosis.undecided.is_empty() {
         let rounds = diagnosis.undecided.join(", ");
-        text.push_str(&paragraph("", &format!("The search's budget did not allow these rounds: {rounds}.")));
+        text.push_str(&paragraph(
+            "",
+            &format!("The search reached its limit of computation. Not done, or not finished: {rounds}."),
+        ));
     }
     if let Some(Pieces { count, length_s }) = diagnosis.pieces {
         let pieces = format!(
-            "Fitted were {count} pieces of {length_s:.1} s, each with a start of its own: over a whole recording the small errors of a model add up."
+            "The recording was cut into {count} pieces of {length_s:.1} s, each fitted with its own start, because the small errors of a model add up over a whole recording."
         );
         text.push_str(&paragraph("", &pieces));
     }
@@ -33,16 +38,20 @@ pub(super) fn page(diagnosis: &Diagnosis) -> String {
     // where something remains beside the names, they are weighed among themselves
     let among = verdict.among_themselves;
     let heading = if among { "among these" } else { "probability" };
-    let mut table = Table::new(["the base model and", heading, "left mrad", "coefficient", "sd", "unit"]);
+    let mut table = Table::new(["the base model and", heading, "residual mrad", "coefficient", "sd", "unit"]);
     for candidate in diagnosis.candidates.iter().take(LISTED) {
         let left = candidate.rmse_rad.iter().map(|r| number(1e3 * r, 3)).collect::<Vec<_>>().join(" ");
         let probability = if among { candidate.probability_if_named } else { candidate.probability };
+        let at = candidate.dropped_at_s.map_or(String::new(), |at_s| format!(" at {at_s:.2} s"));
         let mark = if candidate.fit.certified { "" } else { " *" };
-        let mut first = [names(&candidate.effects, "nothing else") + mark, number(probability.max(0.0), 3), left];
-        for (_, quantity) in &candidate.coefficients {
+        let mut first = [names(&candidate.effects, "nothing else") + &at + mark, of_one(probability), left];
+        for (parameter, quantity) in &candidate.coefficients {
             let [name, probability, left] = std::mem::take(&mut first);
             let value = number(quantity.value.unwrap_or(0.0), 4);
-            table.row([name, probability, left, value, number(quantity.sd, 2), quantity.unit.to_owned()]);
+            // of an effect with several coefficients each is told by its own name
+            let own = parameter.id().split_once('.').and_then(|(_, own)| own.split('_').next().map(str::to_owned));
+            let which = own.map_or(String::new(), |own| format!(" ({own})"));
+            table.row([name, probability, left, value, number(quantity.sd, 2), quantity.unit.to_owned() + &which]);
         }
         if !first[0].is_empty() {
             let [name, probability, left] = first;
@@ -50,15 +59,22 @@ pub(super) fn page(diagnosis: &Diagnosis) -> String {
         }
     }
     if !among || verdict.status == Status::Unknown {
-        table.row(["something not in the table".to_owned(), number(verdict.unknown_probability, 3)]);
+        table.row(["something not in the table".to_owned(), of_one(verdict.unknown_probability)]);
     }
     text.push_str(&table.text());
     if diagnosis.candidates.iter().take(LISTED).any(|candidate| !candidate.fit.certified) {
-        text.push_str("  * not certified: it has not converged, too few starts agree, or fewer effects leave less\n");
+        text.push_str(
+            "  * not certified: it has not converged, too few starts led to this fit, or fewer effects leave less\n",
+        );
     }
     proof(diagnosis, &mut text);
     limits(diagnosis, &mut text);
     text
+}
+
+/// A probability, as far as anybody reads it.
+fn of_one(probability: f64) -> String {
+    if probability < LEAST { format!("<{LEAST}") } else { number(probability, 3) }
 }
 
 /// What was not fitted.
@@ -98,7 +114,7 @@ fn limits(diagnosis: &Diagnosis, text: &mut String) {
 
 /// From which amounts on each effect is seen and named.
 pub(super) fn limits_table(limits: &[Detectable]) -> String {
-    let mut table = Table::new(["effect", "from", "named from", "unit", "not told from"]);
+    let mut table = Table::new(["effect", "seen from", "named from", "unit", "cannot be told from"]);
     for limit in limits {
         let amount = |value: f64| if value.is_finite() { number(value, 2) } else { "never".to_owned() };
         table.row([

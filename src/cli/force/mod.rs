@@ -55,7 +55,7 @@ pub struct ForceArgs {
     /// With --trace: how long.
     #[arg(long, value_name = "S", default_value_t = 60.0, requires = "trace")]
     duration_s: f64,
-    /// Samples a second, of --plan and --trace.
+    /// Samples per second, of --plan and --trace.
     #[arg(long, value_name = "HZ", default_value_t = 100.0)]
     rate_hz: f64,
     /// Damping ratio of the modes, of --plan and --trace, as `identify` measures it.

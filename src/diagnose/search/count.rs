@@ -4,6 +4,7 @@ use std::sync::OnceLock;
 
 use rayon::prelude::*;
 
+use super::super::base;
 use super::super::misfit::{Misfit, needs};
 use super::super::refit::{self, Refit, least};
 use super::super::rods;
@@ -35,8 +36,10 @@ impl<'a> Search<'a, '_> {
         let count = self.count.or_else(|| rods::preferred(&self.context, &self.fits, rods::Among::Simple));
         let Some(count) = count else { return Ok(None) };
         let counted = counted.get_or_init(|| rods::with(self.context.experiment, count));
-        let settings = self.context.settings;
-        Self::of_base_model(self.prepared, counted, Taken::AtItsWord, settings, self.progress).map(Some)
+        let context = base::context(self.prepared, counted, Taken::AtItsWord, self.context.settings)?;
+        let fit = base::fitted_near(&context, &rods::begun_with(self.base(), count), self.prepared)?;
+        let begun_at = context.work.done();
+        Ok(Some(Self::begun(self.prepared, context, fit, begun_at, self.progress)))
     }
 
     /// Searches again with the number of rods that the recordings of a strip ask for, where that does better; [`Self::counted`] has asked where nothing is missing.

@@ -24,7 +24,7 @@ pub struct Render {
     pub width_px: u32,
     /// Picture height.
     pub height_px: u32,
-    /// Nominal frames a second.
+    /// Nominal frames per second.
     pub fps: f64,
     /// Length of the recording.
     pub duration_s: f64,

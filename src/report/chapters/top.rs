@@ -74,7 +74,7 @@ pub fn warnings(left: &Left) -> Chapter {
     }
     if let Some(undecided) = left.diagnosis.as_ref().map(|d| &d.undecided).filter(|u| !u.is_empty()) {
         warnings.push(format!(
-            "the budget of the diagnosis did not allow these rounds of its search: {}",
+            "the search of the diagnosis reached its limit of computation; not done, or not finished: {}",
             undecided.join(", ")
         ));
     }

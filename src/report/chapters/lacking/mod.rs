@@ -31,12 +31,12 @@ pub fn chapter(left: &Left) -> Chapter {
     if let Some(advice) = verdict.to_decide.as_ref().filter(|advice| !advice.is_empty()) {
         let class: Vec<String> = verdict.class.iter().map(|id| words(id)).collect();
         let class = if class.len() > 1 {
-            format!("The recording does not tell these apart: {}.", class.join("; "))
+            format!("The recording cannot distinguish these: {}.", class.join("; "))
         } else {
             String::new()
         };
         chapter.words(format!(
-            "<h3>What cannot be told, and the measurement that would tell</h3>\n{}<p class=\"decide\">{}</p>\n",
+            "<h3>What the recording cannot distinguish, and the measurement that would</h3>\n{}<p class=\"decide\">{}</p>\n",
             if class.is_empty() { class } else { paragraph(&class) },
             escaped(advice)
         ));
@@ -124,7 +124,7 @@ fn candidates(found: &Diagnosed) -> String {
     let heading = if among { "probability among these" } else { "probability" };
     let rows: Vec<Vec<String>> = rows.chain(unknown).collect();
     "<h3>Explanations compared</h3>\n".to_owned()
-        + &table(&["the base model and", heading, "coefficient ± 1 sd", "left of the angles (rms)"], rows)
+        + &table(&["the base model and", heading, "coefficient ± 1 sd", "residual of the angles (rms)"], rows)
 }
 
 fn proof(found: &Diagnosed) -> String {
@@ -152,15 +152,14 @@ fn proof(found: &Diagnosed) -> String {
         ["angle", "noise (1 sd)", "base model leaves", "with the effects named", "with the law that was learnt"];
     let headings = if found.verdict.law.is_some() { &headings[..] } else { &headings[..4] };
     format!(
-        "<h3>Proof: the prediction of what was not fitted</h3>\n{}{}",
+        "<h3>Check: the prediction of what was not fitted</h3>\n{}{}",
         paragraph(&format!("{from}Any fit improves with more parameters; a prediction does not.")),
         table(headings, rows)
     )
 }
 
 fn remains(remainder: &Remainder) -> String {
-    let place =
-        [remainder.place.as_ref().map(|p| at(p)), remainder.phase.as_ref().map(|p| format!("in phase with the {p}"))];
+    let place = [remainder.place.as_ref().map(|p| at(p)), remainder.phase.as_ref().map(|p| in_phase(p).to_owned())];
     let place: Vec<String> = place.into_iter().flatten().collect();
     let mut html = "<h3>What remains beside the effects named</h3>\n".to_owned();
     let rows = (0..remainder.rms_rad.len()).map(|link| {
@@ -178,7 +177,11 @@ fn remains(remainder: &Remainder) -> String {
         let _ = write!(html, ", strongest at {}", value(remainder.frequency_hz, 4, "Hz"));
     }
     let _ = writeln!(html, ".</p>");
-    html + &table(&["angle", "left (rms)", "over the noise"], rows)
+    html + &table(&["angle", "residual (rms)", "over the noise"], rows)
+}
+
+fn in_phase(phase: &str) -> &'static str {
+    if phase == "position" { "in phase with the angle, as a spring" } else { "in phase with the velocity, as a damper" }
 }
 
 fn at(place: &str) -> String {
@@ -196,7 +199,7 @@ fn learnt(law: &Law) -> String {
     let others = if others.is_empty() {
         String::new()
     } else {
-        format!("<p class=\"note\">Nearly as well do: {}</p>\n", others.join("; "))
+        format!("<p class=\"note\">Other formulas that fit nearly as well: {}</p>\n", others.join("; "))
     };
     format!(
         "<h3>The law that was learnt</h3>\n<p>It acts {}: {} ({})</p>\n{others}<p>For the experiment file:</p>\n{}",
@@ -220,7 +223,7 @@ fn limits(found: &Diagnosed) -> String {
             escaped(&d.confused_with.join(", ")),
         ]
     });
-    let rows = table(&["effect", "would have been seen from", "named from", "not told from"], rows);
+    let rows = table(&["effect", "would have been seen from", "named from", "cannot be told from"], rows);
     format!("<details><summary>What this recording could have shown</summary>\n{rows}</details>\n")
 }
 
