@@ -31,7 +31,7 @@ pub mod progress;
 mod digits;
 mod digest;
 mod statistics;
-mod held;
+mod hand_hold;
 
 pub mod video;
 pub mod steady;

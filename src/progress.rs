@@ -17,7 +17,7 @@ pub trait Progress: Sync {
 /// What a program that watches another one's progress hears, a line of JSON each.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
-pub enum Heard {
+pub enum ProgressEvent {
     /// A stage begins.
     Began {
         /// Which.

@@ -6,7 +6,7 @@ use crate::detect::{Album, Hue, Trial};
 use crate::error::{Error, Result};
 use crate::experiment::{Look, MarkColour, Rig};
 use crate::statistics::median;
-use crate::track::{MarkFound, Spare, Tracks};
+use crate::track::{MarkFound, Tracks, UnusedObject};
 
 /// A recording whose marks are to be judged.
 pub struct Rejected<'a> {
@@ -35,7 +35,7 @@ impl Rejected<'_> {
         }
         for (index, hue) in self.hues.iter().enumerate() {
             let seen = found.iter().filter(|f| usize::from(f.hue) == index && f.frames > 0).count();
-            let spares: Vec<&Spare> = tracks.spares.iter().filter(|s| usize::from(s.hue) == index).collect();
+            let spares: Vec<&UnusedObject> = tracks.spares.iter().filter(|s| usize::from(s.hue) == index).collect();
             if seen == 0 {
                 return Err(self.no_marks(hue, &spares)?);
             }
@@ -71,7 +71,7 @@ impl Rejected<'_> {
         }
     }
 
-    fn no_marks(&self, hue: &Hue, spares: &[&Spare]) -> Result<Error> {
+    fn no_marks(&self, hue: &Hue, spares: &[&UnusedObject]) -> Result<Error> {
         let strongest = self.album.strongest(hue)?;
         let kind = kind(&hue.colour);
         let found = if spares.is_empty() && strongest < hue.threshold {
@@ -112,8 +112,8 @@ impl Rejected<'_> {
         Ok(Error::NoMarks { path: self.path.to_owned(), colour, frames: self.frames, found, remedy })
     }
 
-    fn too_few(&self, hue: &Hue, found: usize, spares: &[&Spare]) -> Error {
-        let still: Vec<&Spare> = spares.iter().copied().filter(|s| !s.moves).collect();
+    fn too_few(&self, hue: &Hue, found: usize, spares: &[&UnusedObject]) -> Error {
+        let still: Vec<&UnusedObject> = spares.iter().copied().filter(|s| !s.moves).collect();
         let beside = if still.is_empty() {
             String::new()
         } else {
@@ -161,18 +161,18 @@ fn kind(colour: &MarkColour) -> String {
     }
 }
 
-fn things(spares: &[&Spare], colour: &MarkColour) -> String {
+fn things(spares: &[&UnusedObject], colour: &MarkColour) -> String {
     match spares.len() {
         1 => format!("another {} thing", colour.name),
         n => format!("{n} other {} things", colour.name),
     }
 }
 
-fn verb(spares: &[&Spare]) -> &'static str {
+fn verb(spares: &[&UnusedObject]) -> &'static str {
     if spares.len() == 1 { "s" } else { "" }
 }
 
-fn places(spares: &[&Spare]) -> String {
+fn places(spares: &[&UnusedObject]) -> String {
     let at: Vec<String> = spares.iter().take(LISTED).map(|s| point(s.position_px)).collect();
     format!(" at {}{}", at.join(", "), if spares.len() > LISTED { ", …" } else { "" })
 }

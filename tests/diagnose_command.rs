@@ -658,7 +658,7 @@ fn dry_bearings_are_found_in_a_joint_without_a_spring() {
     let report = folder.diagnosis(&angles, TWO_ARMS, &[]);
     let verdict = &report["verdict"];
     assert_eq!(verdict["effects"], serde_json::json!(["hinge_coulomb", "joint_hysteretic"]), "{verdict:#}");
-    assert!(verdict["statement"].as_str().unwrap().contains("dry friction in it"), "{verdict:#}");
+    assert!(verdict["statement"].as_str().unwrap().contains("like dry friction in the joint"), "{verdict:#}");
 }
 
 #[test]

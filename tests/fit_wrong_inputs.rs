@@ -127,7 +127,7 @@ fn answered(file: &File, rows: &Rows) -> freeswing::Result<Told> {
     let record = Record::of(&series, links)?;
     let seen = Seen::of(&record);
     if let Some(seen) = &seen {
-        fit::refuse_another_pace(&record, seen, &experiment)?;
+        fit::check_frequency(&record, seen, &experiment)?;
     }
     let pace = seen.as_ref().and_then(|seen| Pace::of(seen, &experiment));
     let fitted = fit::fit(&[record], &experiment, &base_parameters(&experiment, links))?;

@@ -156,7 +156,7 @@ struct Case {
 /// θ̈, and what friction bears where the hinge sticks.
 struct Answer {
     alpha_rad_s2: DVector<f64>,
-    hold_n_m: f64,
+    sticking_torque_n_m: f64,
 }
 
 impl Case {
@@ -279,8 +279,8 @@ impl Case {
             (matrix[(size - 1, 2)], matrix[(2, size - 1)]) = (1.0, -1.0);
         }
         let solved = solve(&matrix, &right);
-        let hold_n_m = if self.sticks { -solved[size - 1] } else { 0.0 };
-        Answer { alpha_rad_s2: DVector::from_fn(n, |i, _| solved[3 * i + 2]), hold_n_m }
+        let sticking_torque_n_m = if self.sticks { -solved[size - 1] } else { 0.0 };
+        Answer { alpha_rad_s2: DVector::from_fn(n, |i, _| solved[3 * i + 2]), sticking_torque_n_m }
     }
 
     fn by_the_model(&self) -> Answer {
@@ -301,8 +301,8 @@ impl Case {
             let flow_per_s = rate_rad_s * yields / self.effects().joint_hysteretic.unwrap().yield_rad;
             assert!((motion.acceleration[n + joint] - flow_per_s).abs() <= 1e-12 * flow_per_s.abs());
         }
-        let hold_n_m = if self.sticks { model.hold_n_m(&motion) } else { 0.0 };
-        Answer { alpha_rad_s2: DVector::from_column_slice(&motion.acceleration[..n]), hold_n_m }
+        let sticking_torque_n_m = if self.sticks { model.sticking_torque_n_m(&motion) } else { 0.0 };
+        Answer { alpha_rad_s2: DVector::from_column_slice(&motion.acceleration[..n]), sticking_torque_n_m }
     }
 
     /// The disagreement as a part of the largest acceleration.
@@ -523,8 +523,8 @@ fn a_held_hinge_bears_the_couple_of_its_constraint() {
         let gap = (&model.alpha_rad_s2 - &bodies.alpha_rad_s2).amax() / largest_rad_s2;
         assert!(gap < AGREES, "{what}: {gap:e}");
         assert!(model.alpha_rad_s2[0].abs() < 1e-12 * largest_rad_s2, "{what}: {}", model.alpha_rad_s2[0]);
-        let gap = (model.hold_n_m - bodies.hold_n_m).abs() / bodies.hold_n_m.abs();
-        assert!(gap < AGREES, "{what}: {} {} N m", model.hold_n_m, bodies.hold_n_m);
+        let gap = (model.sticking_torque_n_m - bodies.sticking_torque_n_m).abs() / bodies.sticking_torque_n_m.abs();
+        assert!(gap < AGREES, "{what}: {} {} N m", model.sticking_torque_n_m, bodies.sticking_torque_n_m);
     });
 }
 

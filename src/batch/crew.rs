@@ -18,7 +18,7 @@ use super::layers::{self, Layered};
 use super::state::{self, Fingerprint, Finished, Status};
 use crate::error::{Error, Result};
 use crate::output::{self, OutputFile};
-use crate::progress::Heard;
+use crate::progress::ProgressEvent;
 
 /// A recording to be run.
 #[derive(Debug)]
@@ -42,7 +42,7 @@ pub trait Watch: Sync {
     /// A run begins.
     fn begun(&self, lane: usize, name: &str);
     /// How far it is.
-    fn heard(&self, lane: usize, heard: &Heard);
+    fn heard(&self, lane: usize, heard: &ProgressEvent);
     /// It has ended.
     fn ended(&self, lane: usize, name: &str, finished: &Finished, seconds: f64);
     /// Whether no further one is to be begun.

@@ -2,11 +2,11 @@
 
 use crate::angles::Angle;
 use crate::experiment::Experiment;
-use crate::held::{caught_of, released_of};
+use crate::hand_hold::{caught_of, released_of};
 use crate::measure::{Measurement, Options, Steadying};
 use crate::statistics::median;
-use crate::track::hanging::{LEAST_TURN, MOST_MARKS};
-use crate::track::{Point, Spare};
+use crate::track::chain_detection::{LEAST_TURN, MOST_MARKS};
+use crate::track::{Point, UnusedObject};
 
 mod link;
 
@@ -134,7 +134,7 @@ fn spares(m: &Measurement) -> Vec<String> {
     };
     let widest_px = m.tracks.marks.iter().map(|points| range(points)).fold(0.0, f64::max);
     let listed = |moves: bool| -> Vec<String> {
-        let swings = |s: &Spare| s.moves && s.travel_px > LEAST_TRAVEL * widest_px;
+        let swings = |s: &UnusedObject| s.moves && s.travel_px > LEAST_TRAVEL * widest_px;
         let chosen = m.tracks.spares.iter().filter(|s| swings(s) == moves);
         chosen.map(|s| format!("({:.0}, {:.0})", s.position_px[0], s.position_px[1])).collect()
     };
@@ -147,7 +147,7 @@ fn spares(m: &Measurement) -> Vec<String> {
     let mut said = Vec::new();
     if !moving.is_empty() {
         let (one, all) = (moving.len() == 1, marks + moving.len());
-        let hang_on = m.tracks.spares.iter().any(|s| s.moves && s.hangs_on);
+        let hang_on = m.tracks.spares.iter().any(|s| s.moves && s.keeps_distance);
         let remedy = match (all <= MOST_MARKS, one) {
             (true, _) if !hang_on => format!(
                 "{} no distance from {}: measure what swings by itself in a run of its own, with --roi around it",
@@ -196,7 +196,7 @@ fn hinge_among(m: &Measurement) -> Option<[f64; 2]> {
         sorted.get(last * 19 / 20).zip(sorted.get(last / 20)).map_or(0.0, |(high, low)| high - low)
     };
     let travel_px = range(&|p| p[0]).max(range(&|p| p[1]));
-    let keeps = |s: &&Spare| {
+    let keeps = |s: &&UnusedObject| {
         let [x, y] = s.position_px;
         range(&|p| (p[0] - x).hypot(p[1] - y)) < HINGE_STRETCH * travel_px
     };

@@ -8,7 +8,7 @@ use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 
 use crate::error::Error;
 use crate::output;
-use crate::progress::{Heard, Progress};
+use crate::progress::{Progress, ProgressEvent};
 
 static CANCELLED: AtomicBool = AtomicBool::new(false);
 /// Bars whose work stops by itself when it is asked to.
@@ -20,7 +20,7 @@ const TICK: Duration = Duration::from_millis(200);
 
 /// From here on Ctrl-C, and the signals that end a program, ask work that listens to stop; any other work, or a second signal, ends with the temporary
 /// files removed.
-pub fn hear_interrupts() {
+pub fn install_signal_handler() {
     HANDLER.call_once(|| {
         let _ = ctrlc::set_handler(|| {
             let again = CANCELLED.swap(true, Ordering::SeqCst);
@@ -45,7 +45,7 @@ pub enum Shown {
 }
 
 /// Tells a program that watches. One that has gone hears nothing.
-fn tell(heard: &Heard) {
+fn tell(heard: &ProgressEvent) {
     let line = serde_json::to_string(heard).unwrap_or_default() + "\n";
     let _ = output::to_standard_output(line.as_bytes());
 }
@@ -108,7 +108,7 @@ impl Progress for Bar {
             Shown::AsLines | Shown::Nowhere => ProgressDrawTarget::hidden(),
         };
         if self.shown == Shown::AsLines {
-            tell(&Heard::Began { stage: stage.to_owned(), total });
+            tell(&ProgressEvent::Began { stage: stage.to_owned(), total });
         }
         let new = ProgressBar::with_draw_target(total, target);
         if let Ok(style) = ProgressStyle::with_template(self.template(total)) {
@@ -128,7 +128,7 @@ impl Progress for Bar {
         self.with(|bar| {
             bar.inc(steps);
             if self.shown == Shown::AsLines {
-                tell(&Heard::Stands { at: bar.position() });
+                tell(&ProgressEvent::Stands { at: bar.position() });
             }
         });
     }

@@ -13,13 +13,13 @@ use indicatif::{MultiProgress, ProgressBar, ProgressStyle};
 use super::bar::{self, Bar};
 use super::run::{Extent, Stage};
 use super::table::Table;
-use super::{Console, Target, words};
+use super::{Console, Target, arguments};
 use crate::batch::crew::Watch;
 use crate::batch::state::{Finished, Status};
 use crate::batch::{self, Intentions, Options, Plan, Plans, Shard, Tally};
 use crate::error::{Error, Result};
 use crate::output::{OutputFile, is_same_file};
-use crate::progress::{Heard, Progress};
+use crate::progress::{Progress, ProgressEvent};
 
 /// Run every recording and every table of angles below a folder, and sum them up.
 #[derive(Debug, clap::Args)]
@@ -108,7 +108,7 @@ impl BatchArgs {
         let Some(json) = &self.json else { return Ok(()) };
         let files = plans.recordings.iter().flat_map(|own| own.found.paths.iter().chain(&own.found.configs));
         let files: Vec<&Path> = files.map(PathBuf::as_path).collect();
-        words::keep_apart(&files, &[("--json".to_owned(), json)], "use another name")
+        arguments::refuse_overwriting(&files, &[("--json".to_owned(), json)], "use another name")
     }
 
     fn options(&self) -> Result<Options> {
@@ -244,14 +244,14 @@ impl Watch for Display {
         }
     }
 
-    fn heard(&self, lane: usize, heard: &Heard) {
+    fn heard(&self, lane: usize, heard: &ProgressEvent) {
         self.with_lane(lane, |bar| match heard {
-            Heard::Began { stage, total } => {
+            ProgressEvent::Began { stage, total } => {
                 bar.set_prefix(stage.clone());
                 bar.set_length(total.unwrap_or(0));
                 bar.set_position(0);
             }
-            Heard::Stands { at } => bar.set_position(*at),
+            ProgressEvent::Stands { at } => bar.set_position(*at),
         });
     }
 

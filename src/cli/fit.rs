@@ -77,9 +77,9 @@ impl FitArgs {
         let curves = self.curves.as_deref().map(OutputFile::create).transpose()?;
         let seen: Vec<Option<Seen>> = records.iter().map(Seen::of).collect();
         for (record, seen) in records.iter().zip(&seen) {
-            seen.as_ref().map_or(Ok(()), |seen| fit::refuse_another_pace(record, seen, &experiment))?;
+            seen.as_ref().map_or(Ok(()), |seen| fit::check_frequency(record, seen, &experiment))?;
         }
-        let window_s = std::f64::consts::TAU / model.pace_rad_s();
+        let window_s = std::f64::consts::TAU / model.characteristic_rad_s();
         let bar = console.bar_of_fits(self.quiet);
         bar.begin("fitting", Some(fit::stages(&[]) + fit::stages(&free)));
         let side = |free: &[Parameter]| Ok(Side::of(fit::fit_watched(&records, &experiment, free, &bar)?, window_s));

@@ -1,5 +1,6 @@
 //! The command line: parse → options → stage → write → exit code. One file a command.
 
+mod arguments;
 mod bar;
 mod batch;
 mod console;
@@ -20,20 +21,19 @@ mod shell;
 mod simulate;
 mod table;
 mod track;
-mod words;
 
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 use clap::{Parser, Subcommand};
 
+use arguments::Target;
 pub use bar::Bar;
 use console::Console;
-use words::Target;
 
 use crate::experiment::Experiment;
 use crate::fit::Record;
-use crate::fit::horizon::foretold;
+use crate::fit::predictability::foretold;
 use crate::output::OutputFile;
 use crate::series::AngleSeries;
 
@@ -78,8 +78,8 @@ pub struct TrackCli {
 impl Cli {
     /// Runs the command.
     pub fn run() -> ExitCode {
-        bar::hear_interrupts();
-        exit(words::read::<Self>(std::env::args_os()).and_then(|cli| cli.command.run(&Console::default())))
+        bar::install_signal_handler();
+        exit(arguments::read::<Self>(std::env::args_os()).and_then(|cli| cli.command.run(&Console::default())))
     }
 }
 
@@ -113,8 +113,8 @@ impl Command {
 impl TrackCli {
     /// Runs `track`.
     pub fn run() -> ExitCode {
-        bar::hear_interrupts();
-        let ran = words::read::<Self>(std::env::args_os()).and_then(|cli| cli.args.run(&Console::default()));
+        bar::install_signal_handler();
+        let ran = arguments::read::<Self>(std::env::args_os()).and_then(|cli| cli.args.run(&Console::default()));
         exit(ran.map(|()| ExitCode::SUCCESS))
     }
 }

@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 use clap::ValueEnum;
 
 use super::bar::Shown;
-use super::{Cli, Console, words};
+use super::{Cli, Console, arguments};
 use crate::batch::state;
 use crate::error::{Error, Result};
 use crate::experiment::Experiment;
@@ -155,7 +155,7 @@ impl RunArgs {
     fn stage(&self, stage: Stage, console: &Console) -> Result<()> {
         let Some(words) = self.words(stage)? else { return Ok(()) };
         console.log(&format!("\n$ {}", as_typed(&words)));
-        words::read::<Cli>(&words)?.command.run(console).map(drop)
+        arguments::read::<Cli>(&words)?.command.run(console).map(drop)
     }
 
     /// The command of a stage; nothing where a table of angles needs no tracking.
@@ -227,7 +227,7 @@ impl RunArgs {
         let outputs = OUTPUTS.map(|name| self.out.join(name));
         let outputs = outputs.iter().filter(|output| kept.as_ref() != Some(*output));
         let outputs: Vec<(String, &Path)> = outputs.map(|output| ("--out".to_owned(), output.as_path())).collect();
-        words::keep_apart(&inputs, &outputs, "give another folder")?;
+        arguments::refuse_overwriting(&inputs, &outputs, "give another folder")?;
         self.leave_others_alone(&outputs)?;
         // a batch's folder is its own: there what an earlier run left goes first, for it belongs to a recording that has changed
         if self.watched {

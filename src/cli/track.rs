@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use clap::{Args, ValueEnum};
 
-use super::{Console, Target, words};
+use super::{Console, Target, arguments};
 use crate::angles::{self, AngleSource};
 use crate::caution::slow_motion;
 use crate::detect::debug::DebugFolder;
@@ -14,7 +14,7 @@ use crate::measure::{Measurement, Options, Session, Steadying};
 use crate::output::OutputFile;
 use crate::overlay::{self, Overlay};
 use crate::sidecar::Sidecar;
-use crate::track::hanging::MOST_MARKS;
+use crate::track::chain_detection::MOST_MARKS;
 use crate::video::{Recording, StillTimes};
 
 /// Follow the marks of a recording and write their angles.
@@ -296,7 +296,7 @@ impl TrackArgs {
         }
         let inputs = [Some(&self.video), self.config.as_ref(), self.times.as_ref(), self.mask.as_ref()];
         let inputs: Vec<&Path> = inputs.into_iter().flatten().map(PathBuf::as_path).collect();
-        words::keep_apart(&inputs, &[("--out".to_owned(), &beside)], "use another name")
+        arguments::refuse_overwriting(&inputs, &[("--out".to_owned(), &beside)], "use another name")
     }
 
     fn most_bytes(&self) -> Result<Option<u64>> {

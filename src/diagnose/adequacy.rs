@@ -23,13 +23,13 @@ use crate::fit::whitening::Whitening;
 use crate::model::Parameter;
 use crate::progress::Progress;
 
-/// Replicates of the residuals.
+/// Replicates of the residuals (cost).
 const REPLICATES: usize = 500;
-/// What they are compared by.
+/// What they are compared by: so many numbers, see above.
 const STATISTICS: usize = 4;
-/// Values of a window.
+/// Values of a window (judgement).
 const WINDOW: usize = 40;
-/// Columns that differ by less than this part do the same.
+/// Columns that differ by less than this part do the same (judgement: a thousandth).
 const NEVER_TOLD: f64 = 1e-3;
 /// The smallest amount of an effect that a recording can show.
 #[derive(Debug, Clone)]
@@ -70,7 +70,7 @@ pub fn adequacy(
     let scores = laws::scores(&screen, &laws::cheap_to_score(context, effects));
     let basis = &screen.projection.basis;
     // of the hysteresis, the best of several yield angles
-    let is_fixed = |s: &&Score| !s.effect.is_scanned() && !s.effect.has_corners();
+    let is_fixed = |s: &&Score| !s.effect.is_scanned() && !s.effect.has_switching();
     let fixed: Vec<&Score> = scores.iter().filter(is_fixed).collect();
     let transform = FftPlanner::new().plan_fft_forward(basis.nrows());
     let statistics = |residual: &DVector<f64>| {

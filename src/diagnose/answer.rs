@@ -3,14 +3,14 @@
 use super::context::FitContext;
 use super::effect::{Effect, Place};
 use super::findings::Findings;
-use super::latent::Latent;
+use super::latent::LatentForce;
 use super::law_report::LearntLaw;
 use super::misfit::is_beyond_noise;
 use super::posterior::{Candidate, left_of_excess};
 use super::refit::Refit;
 use super::report::{
-    Answer, Baseline, Diagnosis, Drawn, Hypothetical, Lacking, Limits, Location, Pieces, Proof, Quantity, Remainder,
-    Trust, Unknown,
+    Answer, Baseline, CandidateReport, Diagnosis, Drawn, FitQuality, HoldoutResult, Limits, Location,
+    MissingTorqueSummary, Pieces, Quantity, Remainder, Unknown,
 };
 use super::settings::CertificateSettings;
 use super::torque::MissingTorque;
@@ -55,9 +55,9 @@ impl Diagnosis {
             specimen: specimen.to_owned(),
             baseline: Baseline::of(findings),
             location: Location::of(findings, energy_shares),
-            candidates: candidates.map(|candidate| Hypothetical::of(candidate, &settings.certificate)).collect(),
+            candidates: candidates.map(|candidate| CandidateReport::of(candidate, &settings.certificate)).collect(),
             verdict: Answer::of(findings),
-            heldout: Proof::of(findings),
+            heldout: HoldoutResult::of(findings),
             detectable: Limits(findings.adequacy.detectable.clone()),
             search: findings.rounds.clone(),
             undecided: findings.undecided.clone(),
@@ -107,14 +107,14 @@ impl Location {
             phase: findings.phase(),
             frequency_hz,
             statement: findings.place_statement(energy_shares),
-            missing_torque: findings.missing_torque.as_ref().map(Lacking::of),
+            missing_torque: findings.missing_torque.as_ref().map(MissingTorqueSummary::of),
             named_torque_n_m: energy::added_torque_n_m(findings.posterior.best()),
             unknown: findings.posterior.unknowns.iter().map(Unknown::of).collect(),
         }
     }
 }
 
-impl Lacking {
+impl MissingTorqueSummary {
     fn of(torque: &MissingTorque) -> Self {
         Self {
             place: torque.place,
@@ -128,7 +128,7 @@ impl Lacking {
 }
 
 impl Unknown {
-    fn of(latent: &Latent) -> Self {
+    fn of(latent: &LatentForce) -> Self {
         Self {
             place: latent.place(),
             form: latent.form.id(),
@@ -139,7 +139,7 @@ impl Unknown {
     }
 }
 
-impl Hypothetical {
+impl CandidateReport {
     fn of(candidate: &Candidate<'_>, settings: &CertificateSettings) -> Self {
         let fit = &candidate.fit;
         let coefficients = quantities(fit, &fit.added());
@@ -152,7 +152,7 @@ impl Hypothetical {
             rmse_rad: rmse_rad(fit),
             chi2: fit.chi2,
             bic: fit.chi2 + fit.x.len() as f64 * (fit.values() as f64).ln(),
-            fit: Trust {
+            fit: FitQuality {
                 converged: fit.converged,
                 starts_agreeing: fit.certificate.starts_agreeing,
                 nested_ok: fit.certificate.nested_ok,
@@ -198,7 +198,7 @@ impl Answer {
     }
 }
 
-impl Proof {
+impl HoldoutResult {
     fn of(findings: &Findings<'_>) -> Option<Self> {
         let held_out = findings.held_out.as_ref()?;
         let named_rmse_rad = held_out.augmented.rmse_rad.clone();
@@ -235,7 +235,7 @@ impl Drawn {
             before,
             after: (!effects.is_empty()).then_some((effects, after)),
             border_s,
-            swing_s: std::f64::consts::TAU / model.pace_rad_s(),
+            swing_s: std::f64::consts::TAU / model.characteristic_rad_s(),
             torque: findings.missing_torque.clone().filter(|torque| !torque.works_on.is_empty()),
         })
     }

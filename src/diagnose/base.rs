@@ -2,41 +2,41 @@
 
 use rayon::prelude::*;
 
+use super::base_priors::{DampingAssumption, base_with_priors};
 use super::context::FitContext;
 use super::effect::Effect;
 use super::hypothesis::Hypothesis;
-use super::learnt_noise::learnt_noise;
 use super::preparation::Prepared;
 use super::refit::Refit;
+use super::residual_noise::residual_noise;
 use super::settings::Settings;
-use super::taken::{Taken, base_of};
 use crate::error::{Error, Result};
 use crate::experiment::Experiment;
 use crate::fit::{Problem, Record};
 use crate::model::Parameter;
 
-/// Dampers to start the base model from, over the one it found.
+/// Dampers to start the base model from, over the one it found (start values).
 const WEAKER: [f64; 2] = [0.1, 0.01];
 
 /// The effects that may be missing from a context's base model.
 pub fn candidates(context: &FitContext<'_>) -> Vec<Effect> {
-    let may_be = |effect: &Effect| effect.may_be_missing(context.experiment, &context.base, context.marks());
+    let may_be = |effect: &Effect| effect.is_applicable(context.experiment, &context.base, context.marks());
     Effect::ALL.into_iter().filter(may_be).collect()
 }
 
 /// The context of a diagnosis with the file taken in some way.
 ///
 /// # Errors
-/// As [`base_of`].
+/// As [`base_with_priors`].
 pub fn context<'a>(
     prepared: &'a Prepared,
     experiment: &'a Experiment,
-    taken: Taken,
+    taken: DampingAssumption,
     settings: &'a Settings,
 ) -> Result<FitContext<'a>> {
     let records = &prepared.records;
     let marks = records.first().map_or(0, Record::links);
-    let (base, beliefs) = base_of(experiment, marks, taken, &settings.search)?;
+    let (base, beliefs) = base_with_priors(experiment, marks, taken, &settings.search)?;
     let begun = beginning(prepared, &prepared.begun, experiment, &base)?;
     let step_error_rad = prepared.step_error_rad;
     let work = prepared.work.clone();
@@ -48,13 +48,14 @@ pub fn context<'a>(
         beliefs,
         step_error_rad,
         begun,
-        fine_strip: None,
+        identified_strip: None,
         laws: Vec::new(),
         work,
     })
 }
 
-/// Where a base model's descent begins: what was not free when the start was sought, where the file has it; a strip of fewer rods may start in fewer shapes.
+/// The start of the base model's fit: values of the preparation where a parameter was free there, else those of the file; a strip of fewer rods may start in
+/// fewer modes.
 fn beginning(prepared: &Prepared, x: &[f64], experiment: &Experiment, base: &[Parameter]) -> Result<Vec<f64>> {
     let problem = Problem::new(&prepared.records, experiment, base)?;
     let stated = problem.start_values()?;
@@ -65,7 +66,7 @@ fn beginning(prepared: &Prepared, x: &[f64], experiment: &Experiment, base: &[Pa
     Ok(parameters.chain(problem.starts_in_shapes(starts, shapes)).collect())
 }
 
-/// The base model's fit, with the noise that it leaves.
+/// The base model's fit, with the noise that it leaves. Where its motion has lost step, more steps only bend its parameters to what it lacks.
 ///
 /// # Errors
 /// [`Error::Simulation`] where no motion near the start values follows the recordings.
@@ -78,7 +79,7 @@ pub fn fitted<'a>(context: &FitContext<'a>, prepared: &Prepared) -> Result<Refit
     let ended = beginning(prepared, &prepared.ended, context.experiment, &context.base)?;
     let from = |x: Vec<f64>| {
         let fit = context.descend_from(&nothing, &prepared.noise, x, steps.few_steps)?;
-        let is_at_its_end = fit.converged || lacks_something(context, &fit);
+        let is_at_its_end = fit.converged || fit.has_lost_step(&context.settings.misfit);
         if is_at_its_end { Some(fit) } else { context.go_on(&fit, steps.most_steps - steps.few_steps) }
     };
     let (first, other) = rayon::join(|| from(context.begun.clone()), || from(ended));
@@ -98,24 +99,20 @@ pub fn fitted_near<'a>(context: &FitContext<'a>, near: &Refit<'_>, prepared: &Pr
 /// A fit judged by the noise that it leaves.
 fn with_its_noise<'a>(context: &FitContext<'a>, fit: Refit<'a>) -> Option<Refit<'a>> {
     let descent = &context.settings.descent;
-    let steps = if lacks_something(context, &fit) { descent.first_steps } else { descent.most_steps };
-    match learnt_noise(context, &fit) {
-        Some(noise) => context.judged_by(&noise, &fit, steps),
+    let has_lost_step = fit.has_lost_step(&context.settings.misfit);
+    let steps = if has_lost_step { descent.first_steps } else { descent.most_steps };
+    match residual_noise(context, &fit) {
+        Some(noise) => context.with_noise(&noise, &fit, steps),
         None => Some(fit),
     }
 }
 
-/// Whether a fit leaves so much of the swing that its model lacks something: more steps only bend it further to what that is.
-fn lacks_something(context: &FitContext<'_>, fit: &Refit<'_>) -> bool {
-    fit.left_share() > context.settings.misfit.much
-}
-
-/// The base model anew from weaker dampers, where it leaves much and damps more than short stretches say: what it lacks can have driven its own damper so high that a
-/// mode is gone, and no descent leads back.
+/// The base model fitted again from dampers ten and a hundred times weaker, where it leaves much and damps more than short stretches say: a missing effect can
+/// raise the damper until a mode is overdamped, and no descent leads back.
 fn from_weaker_dampers<'a>(context: &FitContext<'a>, fit: Refit<'a>) -> Refit<'a> {
     let damper = Parameter::JointDamping;
     let of_stretches = context.base.iter().position(|p| *p == damper).map_or(0.0, |place| context.begun[place]);
-    let damps_more = |value: &f64| *value > of_stretches && lacks_something(context, &fit);
+    let damps_more = |value: &f64| *value > of_stretches && fit.relative_residual() > context.settings.misfit.much;
     let Some(strong) = fit.value(damper).filter(damps_more) else { return fit };
     let weaker = WEAKER
         .par_iter()

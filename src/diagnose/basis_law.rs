@@ -14,7 +14,7 @@ use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
 use super::effect::Place;
-use super::latent::{Form, Latent, SIZES};
+use super::latent::{Form, LatentForce, SIZES};
 use super::linearisation::{Input, Linearisation, Row};
 use super::refit::Refit;
 use super::screen::Projection;
@@ -205,7 +205,7 @@ pub fn basis_laws(
     around: &[Linearisation],
     variance: f64,
     sizes: impl Fn(Place) -> [f64; SIZES] + Sync,
-) -> Vec<Latent> {
+) -> Vec<LatentForce> {
     let Some(projection) = Projection::of(fit) else { return Vec::new() };
     let rows = projection.residual.len();
     let Some(swings) = swings(fit, around) else { return Vec::new() };
@@ -248,7 +248,7 @@ pub fn basis_laws(
             };
             0.5 * along.iter().zip(&eigen.eigenvalues).map(of).sum::<f64>()
         };
-        Latent::likeliest(Form::Law(place), sizes(place).into_iter().map(|size| (size, gain(size))))
+        LatentForce::likeliest(Form::Law(place), sizes(place).into_iter().map(|size| (size, gain(size))))
     };
     places.collect::<Vec<_>>().into_par_iter().map(likeliest).collect()
 }

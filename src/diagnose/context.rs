@@ -11,11 +11,11 @@ use crate::fit::whitening::RecordNoise;
 use crate::fit::{Belief, Problem, Record};
 use crate::model::{Parameter, Work};
 
-/// A yield angle of the joint's hysteresis to expect, as a part of the largest bend, and how far from it that may be, as a part of itself.
+/// A yield angle of the joint's hysteresis to expect, as a part of the largest bend, and how far from it that may be, as a part of itself (judgement).
 const YIELD: (f64, f64) = (0.2, 2.5);
-/// The same of a joint that has no spring: a bearing, whose friction is dry.
+/// The same of a joint that has no spring: a bearing, whose friction is dry (judgement: it yields at once, as both bearings of a real double arm do).
 const DRY_YIELD: (f64, f64) = (1e-3, 0.5);
-/// The strip while bending all along it is only a candidate.
+/// The strip while bending all along it is only a candidate (cost: a tenth of that of eight rods).
 const CANDIDATE: BendingStrip = BendingStrip { rods: 3, bending_n_m2: None };
 
 /// What every fit of one diagnosis shares.
@@ -33,11 +33,11 @@ pub struct FitContext<'a> {
     pub beliefs: Vec<Belief>,
     /// Of the integration.
     pub step_error_rad: f64,
-    /// Where the base model's descent began: parameters and starts that short stretches led to. Empty where that is not known.
+    /// Parameters and initial states from multiple shooting on short stretches, where the base model's fit began; empty where they are not known.
     pub begun: Vec<f64>,
-    /// The strip that bends everywhere, where that is the answer: of as many rods, and with as many shapes at its start, as one that is the base model, which is dear.
-    /// Of few, and no further shapes, where it is only a candidate.
-    pub fine_strip: Option<BendingStrip>,
+    /// The discretisation of a strip that bends all along, once that is the answer: as fine as that of a base model. `None` while bending is only a candidate,
+    /// with few rods and no further modes.
+    pub identified_strip: Option<BendingStrip>,
     /// Laws learnt from the recordings, beside those of the file; their coefficients stand among the base model's.
     pub laws: Vec<Law>,
     /// What the fits have cost.
@@ -60,16 +60,16 @@ impl<'a> FitContext<'a> {
             experiment: &mut experiment,
             yield_rad: self.yield_rad(),
             view: self.settings.prior.view,
-            strip: self.fine_strip.unwrap_or(CANDIDATE),
+            strip: self.identified_strip.unwrap_or(CANDIDATE),
         };
         hypothesis.effects.iter().for_each(|effect| effect.set_up(&mut set_up));
         let mut problem = Problem::new(self.records, &experiment, &free)?;
         problem.work = self.work.clone();
         problem.noise = noise.to_vec();
         problem.beliefs = beliefs;
-        if free.contains(&Parameter::BendingStiffness) && !self.is_strip() && self.fine_strip.is_none() {
+        if free.contains(&Parameter::BendingStiffness) && !self.is_strip() && self.identified_strip.is_none() {
             // no more is free at its start than in the rods it is compared with
-            problem.further_shapes = 0;
+            problem.extra_modes = 0;
         }
         problem.accuracy = problem.accuracy_of(problem.longest_s(), self.step_error_rad);
         if let Some((record, at_s)) = hypothesis.dropped {
@@ -88,18 +88,9 @@ impl<'a> FitContext<'a> {
         FitContext { records, begun, ..self.clone() }
     }
 
-    /// Largest measured difference of two neighbouring angles; of one link the largest angle.
-    pub fn largest_bend_rad(&self) -> f64 {
-        let of = |record: &Record| {
-            let rows = 0..record.len();
-            let bend = |row: usize| match &record.theta_rad[..] {
-                [first, second, ..] => Some((second[row]? - first[row]?).abs()),
-                [only] => only[row].map(f64::abs),
-                [] => None,
-            };
-            rows.filter_map(bend).fold(0.0, f64::max)
-        };
-        self.records.iter().map(of).fold(1e-6, f64::max)
+    /// The bend that every joint reaches, in the recording in which it is largest; of one link the largest angle.
+    pub fn common_bend_rad(&self) -> f64 {
+        self.records.iter().map(Record::common_bend_rad).fold(0.0, f64::max)
     }
 
     /// Whether the base model's joint has a spring.
@@ -110,7 +101,7 @@ impl<'a> FitContext<'a> {
     /// What is believed of a hysteresis' yield angle, and its standard deviation.
     pub fn yield_rad(&self) -> (f64, f64) {
         let (share, scatter) = if self.has_spring() { YIELD } else { DRY_YIELD };
-        let yield_rad = share * self.largest_bend_rad();
+        let yield_rad = share * self.common_bend_rad();
         (yield_rad, scatter * yield_rad)
     }
 
@@ -147,7 +138,7 @@ pub fn first_part(records: &[Record], part: f64) -> Vec<Record> {
     records.iter().map(|record| record.until(rows(record))).collect()
 }
 
-/// Noise without errors in step with the swing: what a model lacks is in step as well, and no descent must be told not to mind it.
-pub fn without_errors_in_step(noise: &[RecordNoise]) -> Vec<RecordNoise> {
-    noise.iter().map(|noise| RecordNoise { in_step: 0.0, ..noise.clone() }).collect()
+/// The noise without errors that are synchronous with the motion: missing physics is synchronous, too, and must not be discounted while it is sought.
+pub fn without_synchronous_errors(noise: &[RecordNoise]) -> Vec<RecordNoise> {
+    noise.iter().map(|noise| RecordNoise { synchronous: 0.0, ..noise.clone() }).collect()
 }

@@ -112,7 +112,7 @@ pub enum Cost {
     ManyRods,
 }
 
-/// What an effect does to a swing before anything else.
+/// The main action of an effect on the motion.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Acts {
     /// It takes energy away, as the base model's own damper does.
@@ -127,7 +127,7 @@ pub enum Acts {
 
 /// What a specimen must have for an effect to mean anything.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Needs {
+pub enum Requires {
     /// Nothing.
     Nothing,
     /// A joint.
@@ -154,8 +154,8 @@ pub struct Entry {
     /// What it does.
     pub acts: Acts,
     /// Whether it means anything.
-    pub needs: Needs,
-    /// Whether an encoder cannot err so.
+    pub needs: Requires,
+    /// Whether it is excluded where the sensor is an encoder.
     pub of_camera: bool,
     /// The part of its own torque by which its law may be wrong before something else is suspected beside it. That of friction and of hysteresis is larger: how they go
     /// with speed, and over from sticking to slip, has as many forms as there are authors.
@@ -226,7 +226,7 @@ impl SetUp<'_> {
     }
 
     /// A camera looks askew by no more than its owner fails to see.
-    fn looks_askew(&mut self) {
+    fn add_oblique_view(&mut self) {
         let of = |parameter| Belief { parameter, value: 0.0, sd: self.view };
         self.beliefs.extend([Parameter::ViewStretch, Parameter::ViewShear].map(of));
     }
@@ -242,7 +242,7 @@ const EXACT: f64 = 0.002;
 const APPROXIMATE: f64 = 0.05;
 
 const fn entry(parameters: &'static [Parameter], place: Place, acts: Acts, words: &'static str) -> Entry {
-    let (cost, needs, law_error) = (Cost::Ordinary, Needs::Nothing, EXACT);
+    let (cost, needs, law_error) = (Cost::Ordinary, Requires::Nothing, EXACT);
     let set_up: fn(&mut SetUp<'_>) = |_| {};
     Entry {
         id: "",
@@ -288,11 +288,11 @@ static TABLE: [Entry; 18] = {
         of_camera(position(entry(&[P::AngleGain], Camera, Otherwise, "a scale error common to all angles"))),
         Entry {
             id: "camera_oblique",
-            set_up: |problem| problem.looks_askew(),
+            set_up: |problem| problem.add_oblique_view(),
             ..of_camera(position(entry(&[P::ViewStretch, P::ViewShear], Camera, Otherwise, "an oblique camera view")))
         },
         Entry {
-            needs: Needs::Joint,
+            needs: Requires::Joint,
             ..of_camera(velocity(entry(
                 &[P::DifferentialLag],
                 Camera,
@@ -312,21 +312,21 @@ static TABLE: [Entry; 18] = {
         },
         Entry { shapes: PROPORTIONAL, ..position(entry(&[P::HingeStiffness], Hinge, Pace, "a spring at the hinge")) },
         Entry {
-            needs: Needs::Joint,
+            needs: Requires::Joint,
             shapes: &["cube"],
             ..position(entry(&[P::JointCubicStiffness], Joint, Pace, "a joint whose stiffness changes with the bend"))
         },
         Entry {
             id: "joint_hysteretic",
             cost: Cost::Corners,
-            needs: Needs::Joint,
+            needs: Requires::Joint,
             law_error: APPROXIMATE,
             set_up: |problem| problem.yields(),
             shapes: DRY,
             ..velocity(entry(&[P::HysteresisTorque, P::HysteresisYield], Joint, Loss, "hysteresis of the joint"))
         },
         Entry {
-            needs: Needs::Spring,
+            needs: Requires::Spring,
             ..position(entry(&[P::RestCurl], Joint, Otherwise, "a strip that is curled at rest"))
         },
         Entry {
@@ -346,7 +346,7 @@ static TABLE: [Entry; 18] = {
         },
         Entry {
             cost: Cost::ManyRods,
-            needs: Needs::Strip,
+            needs: Requires::Strip,
             set_up: |problem| problem.bend(),
             ..position(entry(&[P::BendingStiffness], Joint, Otherwise, "bending all along the strip"))
         },
@@ -408,17 +408,17 @@ impl Effect {
     }
 
     /// Whether a motion with it costs many times what others do.
-    pub fn is_dear(self) -> bool {
+    pub fn is_expensive(self) -> bool {
         matches!(self.entry().cost, Cost::Corners | Cost::ManyRods)
     }
 
     /// Whether its score costs many times what others do.
-    pub fn is_dear_to_score(self) -> bool {
+    pub fn is_expensive_to_score(self) -> bool {
         matches!(self.entry().cost, Cost::Corners | Cost::EveryFrequency)
     }
 
     /// Whether every corner of its law ends a step.
-    pub fn has_corners(self) -> bool {
+    pub fn has_switching(self) -> bool {
         self.entry().cost == Cost::Corners
     }
 
@@ -434,13 +434,13 @@ impl Effect {
     }
 
     /// Whether it is missing from the base model of an experiment with this many angles, and can be missing at all.
-    pub fn may_be_missing(self, experiment: &Experiment, base: &[Parameter], marks: usize) -> bool {
+    pub fn is_applicable(self, experiment: &Experiment, base: &[Parameter], marks: usize) -> bool {
         let strip = experiment.specimen.links.is_empty();
         let meaningful = match self.entry().needs {
-            Needs::Nothing => true,
-            Needs::Joint => marks > 1,
-            Needs::Spring => base.iter().any(|parameter| parameter.is_spring()),
-            Needs::Strip => marks > 1 && strip && base.contains(&Parameter::JointStiffness),
+            Requires::Nothing => true,
+            Requires::Joint => marks > 1,
+            Requires::Spring => base.iter().any(|parameter| parameter.is_spring()),
+            Requires::Strip => marks > 1 && strip && base.contains(&Parameter::JointStiffness),
         };
         let meaningful = meaningful && !(self.entry().of_camera && experiment.rig.sensor == Sensor::Encoder);
         // a camera that misses frames, and the first coefficient of a named effect

@@ -1,4 +1,4 @@
-//! How probable each hypothesis is: its likelihood, weighed by how much of what it could have been it had to be.
+//! The evidence of each hypothesis, by Laplace's approximation.
 //!
 //! Laplace's approximation of the evidence, with the coefficients' sizes log-uniform over ln R (no size is likelier than another):
 //!
@@ -12,11 +12,14 @@
 
 use super::effect::{Effect, Place};
 use super::hypothesis::Hypothesis;
-use super::laws::law_of;
+use super::laws::{Estimates, law_of};
 use super::noise;
 use super::refit::Refit;
 use super::settings::PriorSettings;
 use crate::model::Parameter;
+
+/// Largest correlation from row to row of what a fit leaves (numerics: (1 + ρ)/(1 − ρ) is at most 199).
+const MOST_RHO: f64 = 0.99;
 
 /// How much the best hypothesis leaves, over the variance of the noise.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -35,7 +38,7 @@ impl Scatter {
     pub fn of(fit: &Refit<'_>, values: usize) -> Self {
         let excess = fit.chi2 / values as f64 - 1.0;
         let Some((left, _)) = (excess > 0.0).then(|| fit.linearised()).flatten() else { return Self::NOISE };
-        let rho = noise::of_all(left.as_slice()).colour.rho.clamp(0.0, 0.99);
+        let rho = noise::of_all(left.as_slice()).colour.rho.clamp(0.0, MOST_RHO);
         Self { of_values: 1.0 + excess, of_all: 1.0 + excess * (1.0 + rho) / (1.0 - rho) }
     }
 }
@@ -73,33 +76,28 @@ pub fn ln_evidence(
     counts: f64,
 ) -> f64 {
     let likelihood = -0.5 * fit.chi2 / scatter.of_all;
-    let is_weighed = |effect: &&Effect| law_of(**effect).strength(**effect, &|_| (0.0, 0.0)).is_some();
-    let weighed: Vec<Effect> = fit.hypothesis.effects.iter().filter(is_weighed).copied().collect();
-    let added: Vec<Parameter> = weighed.iter().flat_map(|effect| effect.parameters()).copied().collect();
-    if added.is_empty() {
+    let estimates = Estimates::of(fit, scatter.of_values);
+    if estimates.effects.is_empty() {
         return likelihood;
     }
-    let covariance = fit.covariance(&added) * scatter.of_values;
-    let mut ln_volume = 0.5 * (covariance.clone() * std::f64::consts::TAU).determinant().max(1e-300).ln();
-    let of = |parameter: Parameter| {
-        let i = added.iter().position(|p| *p == parameter).unwrap_or(0);
-        (fit.value(parameter).unwrap_or(0.0), covariance[(i, i)].sqrt())
-    };
+    let determinant = (estimates.covariance.clone() * std::f64::consts::TAU).determinant();
+    let mut ln_volume = 0.5 * determinant.max(1e-300).ln();
+    let of = |parameter: Parameter| estimates.value(parameter);
     let mut not_told = 0;
-    for effect in weighed {
+    for effect in estimates.effects.iter().copied() {
         let law = law_of(effect);
-        let Some((value, sd)) = law.strength(effect, &of).filter(|_| law.is_possible(fit, settings)) else {
+        let Some((value, _)) = law.strength(effect, &of).filter(|_| law.is_possible(fit, settings)) else {
             return f64::NEG_INFINITY;
         };
         let fall = (least_without(effect) - fit.chi2) / scatter.of_all;
         let needed = scatter.of_values > settings.much_left && fall > counts;
-        let is_told = value.abs() > settings.told_from_zero * sd;
+        let is_told = estimates.tells(effect, settings);
         not_told += usize::from(!is_told);
         // a law of no size is none, however much more is left without it; and two of any size, as long as they grow together, are none
         if value == 0.0 || !(needed || is_told) || not_told > 1 {
             return f64::NEG_INFINITY;
         }
-        ln_volume -= (value.abs() * settings.sizes).ln() + law.ln_kinds(fit, effect, &of, settings);
+        ln_volume -= (value.abs() * settings.sizes).ln() + law.ln_multiplicity(fit, effect, &of, settings);
     }
     let ln = likelihood + ln_volume;
     if ln.is_nan() { f64::NEG_INFINITY } else { ln }

@@ -83,7 +83,7 @@ impl<'a> Findings<'a> {
 
     /// The effects named, the one that explains most first.
     pub fn named_effects(&self) -> Vec<Effect> {
-        self.posterior.by_what_they_explain(self.named())
+        self.posterior.by_contribution(self.named())
     }
 
     /// Where what is missing acts.

@@ -46,7 +46,7 @@ impl Term {
     }
 
     /// Its formula with the numbers of its coefficients.
-    pub fn with_numbers(&self) -> String {
+    pub fn formula_with_values(&self) -> String {
         let number = |word: &str| self.law.parameters.get(word).map(|own| format!("{:.3e}", own.start));
         // a negative number turns the sign before it
         with_words(&self.law.formula, number).replace("--", "").replace("- -", "+ ")
@@ -55,7 +55,7 @@ impl Term {
 
 /// The largest values of the state at a place, and the length of the recordings.
 #[derive(Debug, Clone, Copy)]
-pub struct Largest {
+pub struct StateRange {
     /// Of the angle (rad); of a strip or tip 0.
     pub angle: f64,
     /// Of the rate (rad/s), or of the wind (m/s).
@@ -138,13 +138,13 @@ const WITH_ANGLE: [Modulation; 2] = [
 ];
 
 /// Every term at a place.
-pub fn terms(place: LawPlace, largest: Largest) -> Vec<Term> {
+pub fn terms(place: LawPlace, largest: StateRange) -> Vec<Term> {
     let variables = place.variables();
     let states = &variables[..variables.len() - 1];
     states.iter().flat_map(|state| of_state(place, state, largest)).collect()
 }
 
-fn of_state(place: LawPlace, state: &'static str, largest: Largest) -> Vec<Term> {
+fn of_state(place: LawPlace, state: &'static str, largest: StateRange) -> Vec<Term> {
     let (size, own): (f64, &[Shape]) = match state {
         "angle" => (largest.angle, &OF_ANGLE),
         "rate" => (largest.rate, &OF_RATE),
@@ -247,7 +247,7 @@ mod tests {
     use crate::model::effects::formula::Formula;
     use crate::model::{Chain, Motion};
 
-    const LARGEST: Largest = Largest { angle: 0.5, rate: 4.0, time_s: 30.0 };
+    const LARGEST: StateRange = StateRange { angle: 0.5, rate: 4.0, time_s: 30.0 };
     const PLACES: [LawPlace; 4] = [LawPlace::Hinge, LawPlace::Joint, LawPlace::Strip, LawPlace::Tip];
 
     #[test]
@@ -283,7 +283,7 @@ mod tests {
         let of = |a: f64| {
             let mut term = bump.clone();
             term.law.parameters.get_mut("a").unwrap().start = a;
-            term.with_numbers()
+            term.formula_with_values()
         };
         assert_eq!(of(0.002), "-2.000e-3 * exp(-((angle + 2.500e-1) / 7.500e-2) ^ 2 / 2)");
         assert_eq!(of(-0.002), "2.000e-3 * exp(-((angle + 2.500e-1) / 7.500e-2) ^ 2 / 2)");

@@ -1,14 +1,14 @@
-//! The proof: fit on one part, predict the other with every coefficient frozen.
+//! The hold-out test: one part is fitted, the other predicted with all coefficients as they are.
 
 use rayon::prelude::*;
 
-use super::context::{FitContext, without_errors_in_step};
+use super::context::{FitContext, without_synchronous_errors};
 use super::effect::Effect;
 use super::hypothesis::Hypothesis;
 use super::misfit::{is_beyond_noise, leaves_more_than_noise};
 use super::posterior::{Candidate, Posterior, weigh};
 use super::refit::Refit;
-use super::search::horizon::continued_alone;
+use super::search::horizon::continue_one;
 use crate::experiment::Law;
 use crate::fit::{Belief, Problem, Record, Residuals, recordings, residuals_of};
 use crate::model::Parameter;
@@ -51,7 +51,7 @@ impl HeldOut {
 impl Prediction {
     /// Of nothing yet, from what was fitted.
     fn from(fitted: &Refit<'_>, laws: &[Law]) -> Self {
-        let variance = (fitted.chi2 / fitted.values().max(1) as f64).max(1.0);
+        let variance = fitted.variance_ratio();
         let deviations = |law: &Law| {
             let coefficients: Vec<Parameter> = law.coefficients().map(|(parameter, _)| parameter).collect();
             let precision = fitted.covariance(&coefficients).try_inverse()?;
@@ -95,7 +95,7 @@ pub fn borne_out<'a>(
 
 /// The posterior led by the effects that are more probable than not each by itself, where a law that was learnt has put one of them in the place of a name; and
 /// its proof. Where nothing remains beside the names, it must be among the sets that the table's fits do not tell apart.
-pub fn led_by_likely<'a>(
+pub fn reorder_by_inclusion<'a>(
     context: &FitContext<'a>,
     posterior: Posterior<'a>,
     proof: Option<HeldOut>,
@@ -130,9 +130,9 @@ pub fn predicted(context: &FitContext<'_>, fit: &Refit<'_>, from_s: Option<f64>)
     // a prediction is held against what was seen, whoever erred
     let fit = plain(fit);
     match border(context, from_s)? {
-        Border::Row(rows, _) => along(context, &fit, rows),
-        Border::Piece(pieces, _) => beyond(context, &fit, pieces),
-        Border::Record(last) => across(context, &fit, last),
+        HoldoutSplit::Row(rows, _) => along(context, &fit, rows),
+        HoldoutSplit::Piece(pieces, _) => beyond(context, &fit, pieces),
+        HoldoutSplit::Record(last) => across(context, &fit, last),
     }
 }
 
@@ -146,9 +146,9 @@ fn held_out(
     let of_fits = || fits.par_iter().with_max_len(1).map(|fit| predicted(context, fit, from_s)).collect::<Vec<_>>();
     let (baseline, augmented) = rayon::join(|| predicted(context, null, from_s), of_fits);
     let (record, from_s) = match border(context, from_s) {
-        Some(Border::Row(_, border_s)) => (0, border_s),
-        Some(Border::Piece(_, border_s)) => (0, border_s),
-        Some(Border::Record(last)) => (last, context.records[last].t_s[0]),
+        Some(HoldoutSplit::Row(_, border_s)) => (0, border_s),
+        Some(HoldoutSplit::Piece(_, border_s)) => (0, border_s),
+        Some(HoldoutSplit::Record(last)) => (last, context.records[last].t_s[0]),
         None => return vec![None; fits.len()],
     };
     let proof = |augmented: Option<Prediction>| {
@@ -158,7 +158,7 @@ fn held_out(
 }
 
 /// What is not fitted.
-enum Border {
+enum HoldoutSplit {
     /// A single recording from this row, and this stamp, on.
     Row(usize, f64),
     /// A single recording in pieces, so many of which are fitted, up to this stamp.
@@ -167,9 +167,9 @@ enum Border {
     Record(usize),
 }
 
-fn border(context: &FitContext<'_>, from_s: Option<f64>) -> Option<Border> {
+fn border(context: &FitContext<'_>, from_s: Option<f64>) -> Option<HoldoutSplit> {
     if context.recordings() > 1 {
-        return recordings(context.records).last().map(|pieces| Border::Record(pieces.start));
+        return recordings(context.records).last().map(|pieces| HoldoutSplit::Record(pieces.start));
     }
     let (record, last) = (context.records.first()?, context.records.last()?);
     let (first_s, last_s) = (record.t_s[0], last.t_s[last.len() - 1]);
@@ -177,17 +177,17 @@ fn border(context: &FitContext<'_>, from_s: Option<f64>) -> Option<Border> {
     if context.is_in_pieces() {
         // whole pieces are fitted
         let fitted = context.records.partition_point(|piece| piece.t_s[0] <= border_s).checked_sub(1)?;
-        return (fitted > 0).then(|| Border::Piece(fitted, context.records[fitted].t_s[0]));
+        return (fitted > 0).then(|| HoldoutSplit::Piece(fitted, context.records[fitted].t_s[0]));
     }
     let rows = record.t_s.partition_point(|t| *t < border_s);
     let is_long = |rows: usize| rows >= crate::series::FEWEST_ROWS;
-    (is_long(rows) && is_long(record.len() - rows)).then_some(Border::Row(rows, border_s))
+    (is_long(rows) && is_long(record.len() - rows)).then_some(HoldoutSplit::Row(rows, border_s))
 }
 
 /// The same judged without errors in step with the swing; what it left is no more known.
 fn plain<'a>(fit: &Refit<'a>) -> Refit<'a> {
     let mut fit = fit.clone();
-    fit.problem.noise = without_errors_in_step(&fit.problem.noise);
+    fit.problem.noise = without_synchronous_errors(&fit.problem.noise);
     fit
 }
 
@@ -198,7 +198,7 @@ fn along(context: &FitContext<'_>, fit: &Refit<'_>, rows: usize) -> Option<Predi
     let refitted = part.refit(&fit.hypothesis, fit, &[])?;
     // what leaves far more than noise may have lost step between here and there
     let grown = leaves_more_than_noise(&refitted, &context.settings.noise);
-    let grown = grown.then(|| continued_alone(&part, &refitted)).flatten();
+    let grown = grown.then(|| continue_one(&part, &refitted)).flatten();
     let refitted = grown.into_iter().chain([refitted]).min_by(|a, b| a.chi2.total_cmp(&b.chi2))?;
     let whole = context.problem_near(&fit.hypothesis, &refitted).ok()?;
     let rmse_rad = errors(&whole.predict(0, &refitted.x, false).ok()?.values, record, rows)?;

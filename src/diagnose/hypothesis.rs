@@ -18,13 +18,13 @@ impl Hypothesis {
     }
 
     /// Whether its motion costs many times what others do.
-    pub fn is_dear(&self) -> bool {
-        self.effects.iter().any(|effect| effect.is_dear())
+    pub fn is_expensive(&self) -> bool {
+        self.effects.iter().any(|effect| effect.is_expensive())
     }
 
     /// Whether every corner of a law of it ends a step.
-    pub fn has_corners(&self) -> bool {
-        self.effects.iter().any(|effect| effect.has_corners())
+    pub fn has_switching(&self) -> bool {
+        self.effects.iter().any(|effect| effect.has_switching())
     }
 
     /// Whether another one has all of its effects.

@@ -24,15 +24,15 @@ use nalgebra::{DMatrix, DVector};
 use super::effect::Place;
 use super::linearisation::{Input, Linearisation};
 use super::refit::Refit;
-use crate::fit::across::Memo;
-use crate::fit::whitening::{Colour, IN_STEP_SHAPES, RecordNoise, in_step_shapes};
+use crate::fit::angle_correlation::ConditionalCache;
+use crate::fit::whitening::{Colour, RecordNoise, SYNCHRONOUS_TERMS, synchronous_basis};
 use crate::statistics::median_step_s;
 
-/// Standard deviations of the fitted state and parameters at which their prior stands.
+/// Standard deviations of the fitted state and parameters at which their prior stands (numerics: as good as free).
 const WIDE: f64 = 300.0;
-/// Least white noise beside noise that goes on, in units of its variance.
+/// Least white noise beside noise that goes on, in units of its variance (numerics: next to none).
 const WHITE: f64 = 1e-4;
-/// Sizes tried, a factor each.
+/// Sizes tried, a factor each (start values).
 pub(super) const SIZES: usize = 9;
 const SIZE_FACTOR: f64 = 3.0;
 
@@ -40,7 +40,7 @@ const SIZE_FACTOR: f64 = 3.0;
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Form {
     /// Any smooth course in time.
-    Course(Input),
+    TimeHistory(Input),
     /// Any law of the state at a place ([`super::basis_law`]).
     Law(Place),
 }
@@ -49,7 +49,7 @@ impl Form {
     /// Where it acts.
     pub fn place(self) -> Place {
         match self {
-            Self::Course(input) => input.place(),
+            Self::TimeHistory(input) => input.place(),
             Self::Law(place) => place,
         }
     }
@@ -57,7 +57,7 @@ impl Form {
     /// The name in files.
     pub fn id(self) -> &'static str {
         match self {
-            Self::Course(_) => "course",
+            Self::TimeHistory(_) => "course",
             Self::Law(_) => "law",
         }
     }
@@ -65,7 +65,7 @@ impl Form {
 
 /// An unknown torque (or offset).
 #[derive(Debug, Clone)]
-pub struct Latent {
+pub struct LatentForce {
     /// What it is.
     pub form: Form,
     /// Its standard deviation: N·m, or rad of the camera.
@@ -76,7 +76,7 @@ pub struct Latent {
     pub tried: Vec<(f64, f64)>,
 }
 
-impl Latent {
+impl LatentForce {
     /// Of the size with the largest gain, of some (size, gain) beside nothing.
     pub fn likeliest(form: Form, tried: impl Iterator<Item = (f64, f64)>) -> Self {
         let tried: Vec<(f64, f64)> = std::iter::once((0.0, 0.0)).chain(tried).collect();
@@ -95,7 +95,7 @@ pub fn sizes(typical: f64) -> [f64; SIZES] {
     std::array::from_fn(|k| typical * SIZE_FACTOR.powi(k as i32 + 1 - SIZES as i32))
 }
 
-/// What the filter comes by.
+/// Events that the Kalman filter reports.
 enum Stage<'s> {
     /// A row, before anything of it is seen: state and covariance.
     Row(&'s DVector<f64>, &'s DMatrix<f64>),
@@ -119,7 +119,7 @@ pub struct Filter<'a> {
     /// Of the recording.
     noise: &'a RecordNoise,
     /// Errors in step that each angle may have, `[mark][row]`; none of an angle that was not tracked.
-    in_step: Vec<Vec<[f64; IN_STEP_SHAPES]>>,
+    synchronous: Vec<Vec<[f64; SYNCHRONOUS_TERMS]>>,
     input: Input,
     /// From each row to the next, the noise included.
     transitions: Vec<DMatrix<f64>>,
@@ -141,20 +141,20 @@ pub enum Beyond {
 
 /// What is assumed of an unknown of any course.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Assumed {
+pub struct LatentConfig {
     /// What it has to account for.
     pub beyond: Beyond,
     /// T, in units of the time in which the swing goes on by a radian.
     pub memory: f64,
 }
 
-impl Assumed {
-    /// One that goes with the swing, beside a fit.
-    pub const BESIDE: Self = Self { beyond: Beyond::TheFit, memory: 1.0 };
-    /// All that a base model lacks: a gust or a knock as well, which are sudden.
-    pub const SUDDEN: Self = Self { beyond: Beyond::TheFit, memory: 0.3 };
-    /// The same around another fit, for its course.
-    pub const INSTEAD: Self = Self { beyond: Beyond::TheBaseModel, memory: 1.0 };
+impl LatentConfig {
+    /// One that goes with the swing, beside a fit (judgement: its memory is a radian of it).
+    pub const RESIDUAL: Self = Self { beyond: Beyond::TheFit, memory: 1.0 };
+    /// All that a base model lacks: a gust or a knock as well, which are sudden (judgement: a third of that memory).
+    pub const SHORT_MEMORY: Self = Self { beyond: Beyond::TheFit, memory: 0.3 };
+    /// The same around another fit, for its course (judgement: the memory of the first).
+    pub const TOTAL: Self = Self { beyond: Beyond::TheBaseModel, memory: 1.0 };
 }
 
 impl<'a> Filter<'a> {
@@ -164,11 +164,11 @@ impl<'a> Filter<'a> {
         record: usize,
         (around, variance): (&'a Linearisation, f64),
         input: Input,
-        Assumed { beyond, memory }: Assumed,
+        LatentConfig { beyond, memory }: LatentConfig,
     ) -> Option<Self> {
         let problem = &fit.problem;
         let (model, _) = problem.model(record, &fit.x[..problem.free.len()]).ok()?;
-        let memory_s = memory / model.pace_rad_s();
+        let memory_s = memory / model.characteristic_rad_s();
         let pattern = |k: usize| DMatrix::from_columns(&[around.pattern(input, &around.rows[k].theta_rad)]);
         let mut transitions = around.transitions(memory_s, pattern);
         let sd = |i: usize| 1.0 / fit.normal[(i, i)].max(1e-300).sqrt();
@@ -182,8 +182,9 @@ impl<'a> Filter<'a> {
         wide.extend((0..problem.free.len()).map(|i| WIDE * sd(i)));
         let noise = &problem.noise[record];
         wide.extend(vec![0.0; marks]);
-        let in_step = if noise.in_step > 0.0 { in_step_shapes(&problem.records[record], noise) } else { Vec::new() };
-        wide.extend(vec![variance.sqrt(); in_step.len() * IN_STEP_SHAPES]);
+        let synchronous =
+            if noise.synchronous > 0.0 { synchronous_basis(&problem.records[record], noise) } else { Vec::new() };
+        wide.extend(vec![variance.sqrt(); synchronous.len() * SYNCHRONOUS_TERMS]);
         let mut begin = vec![0.0; wide.len()];
         if beyond == Beyond::TheBaseModel {
             for place in fit.added().iter().filter_map(|p| fit.place(*p)) {
@@ -201,7 +202,7 @@ impl<'a> Filter<'a> {
             }
             (first + marks..total).for_each(|of_step| transition[(of_step, of_step)] = 1.0);
         }
-        Some(Self { around, variance, noise, in_step, input, transitions, memory_s, begin, wide })
+        Some(Self { around, variance, noise, synchronous, input, transitions, memory_s, begin, wide })
     }
 
     /// ln L up to a constant, for a standard deviation of the unknown.
@@ -282,7 +283,7 @@ impl<'a> Filter<'a> {
     }
 
     /// Runs the filter; `hear` gets all that it comes by.
-    fn run(&self, size: f64, hear: &mut dyn FnMut(Stage<'_>)) {
+    fn run(&self, size: f64, on_event: &mut dyn FnMut(Stage<'_>)) {
         let (n, total) = (self.around.links, self.wide.len());
         let input = self.around.state();
         let mut z = DVector::from_column_slice(&self.begin);
@@ -291,7 +292,7 @@ impl<'a> Filter<'a> {
         let mut moved = DMatrix::zeros(total, total);
         let (mut slopes, mut gain) = (DVector::zeros(total), DVector::zeros(total));
         let goes_together = !self.noise.across.is_none();
-        let mut memo = Memo::new(&self.noise.across);
+        let mut memo = ConditionalCache::new(&self.noise.across);
         for k in 0..self.around.rows.len() {
             if k > 0 {
                 let transition = &self.transitions[k - 1];
@@ -302,7 +303,7 @@ impl<'a> Filter<'a> {
                 p[(input, input)] += size * size * (1.0 - (-2.0 * fade).exp());
             }
             self.add_noise(k, &mut p);
-            hear(Stage::Row(&z, &p));
+            on_event(Stage::Row(&z, &p));
             let row = &self.around.rows[k];
             // of the marks above: which, what is left, how it is seen, its white noise
             let mut above: Vec<(usize, f64, DVector<f64>, f64)> = Vec::new();
@@ -313,10 +314,10 @@ impl<'a> Filter<'a> {
                     slopes[input] = 1.0;
                 }
                 self.of_noise().enumerate().for_each(|(of, i)| slopes[i] = f64::from(u8::from(of == mark)));
-                for (of, shapes) in self.in_step.iter().enumerate() {
-                    let first = self.of_noise().end + of * IN_STEP_SHAPES;
-                    let own = if of == mark { shapes[k] } else { [0.0; IN_STEP_SHAPES] };
-                    slopes.rows_mut(first, IN_STEP_SHAPES).copy_from_slice(&own);
+                for (of, shapes) in self.synchronous.iter().enumerate() {
+                    let first = self.of_noise().end + of * SYNCHRONOUS_TERMS;
+                    let own = if of == mark { shapes[k] } else { [0.0; SYNCHRONOUS_TERMS] };
+                    slopes.rows_mut(first, SYNCHRONOUS_TERMS).copy_from_slice(&own);
                 }
                 let mut white_rad = self.white_sd_rad(k, mark);
                 if goes_together {
@@ -334,7 +335,7 @@ impl<'a> Filter<'a> {
                 p.mul_to(&slopes, &mut gain);
                 let variance = white_rad * white_rad + slopes.dot(&gain);
                 let innovation = left - slopes.dot(&z);
-                hear(Stage::Value { slopes: &slopes, innovation, variance, gain: &gain });
+                on_event(Stage::Value { slopes: &slopes, innovation, variance, gain: &gain });
                 z.axpy(innovation / variance, &gain, 1.0);
                 p.ger(-1.0 / variance, &gain, &gain, 1.0);
                 slopes.fill(0.0);
@@ -350,8 +351,8 @@ impl<'a> Filter<'a> {
 }
 
 /// The unknown with any course, of the size that makes the recordings likeliest. `typical` is a large size: gravity's torque, or the noise.
-pub fn likeliest(filters: &[Filter<'_>], input: Input, typical: f64) -> Latent {
+pub fn likeliest(filters: &[Filter<'_>], input: Input, typical: f64) -> LatentForce {
     let nothing: f64 = filters.iter().map(|f| f.log_likelihood(0.0)).sum();
     let gain = |size: f64| -> f64 { filters.iter().map(|f| f.log_likelihood(size)).sum::<f64>() - nothing };
-    Latent::likeliest(Form::Course(input), sizes(typical).into_iter().map(|size| (size, gain(size))))
+    LatentForce::likeliest(Form::TimeHistory(input), sizes(typical).into_iter().map(|size| (size, gain(size))))
 }

@@ -123,13 +123,13 @@ fn toml_of(term: &Term) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::diagnose::grammar::{Largest, terms};
+    use crate::diagnose::grammar::{StateRange, terms};
     use crate::experiment::{Experiment, LawPlace};
 
     #[test]
     fn a_file_takes_every_term_back() {
         for place in [LawPlace::Hinge, LawPlace::Joint, LawPlace::Strip, LawPlace::Tip] {
-            for term in terms(place, Largest { angle: 0.5, rate: 4.0, time_s: 30.0 }) {
+            for term in terms(place, StateRange { angle: 0.5, rate: 4.0, time_s: 30.0 }) {
                 let read = Experiment::parse(&toml_of(&term), std::path::Path::new("e.toml")).unwrap();
                 assert_eq!(read.model.law, vec![term.law]);
             }

@@ -108,7 +108,7 @@ impl Linearisation {
         }
         let flows = true_s.windows(2).map(|pair| {
             let length_s = pair[1] - pair[0];
-            let parts = (model.pace_rad_s() * length_s / HELD_RAD).ceil().clamp(1.0, MOST_PARTS) as usize;
+            let parts = (model.characteristic_rad_s() * length_s / HELD_RAD).ceil().clamp(1.0, MOST_PARTS) as usize;
             let middle_s = |part: usize| pair[0] + length_s * (part as f64 + 0.5) / parts as f64;
             (0..parts).map(|part| flow(&model, &problem.free, &swing, middle_s(part))).collect()
         });

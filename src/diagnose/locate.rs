@@ -1,15 +1,15 @@
 //! Where a model differs from a recording: time, amplitude, phase, frequency.
 
 use super::effect::{Phase, Place};
+use super::latent_forces::place_of_all;
 use super::posterior::Posterior;
 use super::refit::Refit;
 use super::settings::Settings;
-use super::unknowns::place_of_all;
 use crate::fit::{Residuals, Verdict, recordings};
 
 /// Where something unknown acts: sought around the base model, near the effect that explains most.
 pub fn place_of_unknown(posterior: &Posterior<'_>, settings: &Settings) -> Option<Place> {
-    let of_nearest = posterior.by_what_they_explain(posterior.best()).first().map(|effect| effect.place());
+    let of_nearest = posterior.by_contribution(posterior.best()).first().map(|effect| effect.place());
     place_of_all(posterior.base(), of_nearest, settings.verdict.places)
 }
 
@@ -32,7 +32,7 @@ pub fn departure(null: &Refit<'_>) -> Departure {
         let first = pieces.start;
         let Some(residuals) = null.residuals_of(pieces) else { continue };
         let Ok((model, _)) = null.problem.model(first, &null.x[..null.problem.free.len()]) else { continue };
-        let window_s = std::f64::consts::TAU / model.pace_rad_s();
+        let window_s = std::f64::consts::TAU / model.characteristic_rad_s();
         let verdict = Verdict::of(&residuals, window_s);
         let wrong: Vec<_> = verdict.windows.iter().filter(|w| w.links.iter().any(|l| l.misfit)).collect();
         let (Some(first), Some(last)) = (wrong.first(), wrong.last()) else { continue };
@@ -41,7 +41,7 @@ pub fn departure(null: &Refit<'_>) -> Departure {
         return Departure {
             time_s: Some([first.from_s, last.until_s]),
             amplitude_rad: Some([least, most]),
-            frequency_hz: strongest_hz(&residuals, model.pace_rad_s()),
+            frequency_hz: strongest_hz(&residuals, model.characteristic_rad_s()),
             goes_with: goes_with(&residuals),
         };
     }
@@ -64,10 +64,10 @@ fn goes_with(residuals: &Residuals) -> Option<Phase> {
 }
 
 /// The frequency at which what is left is strongest.
-fn strongest_hz(residuals: &Residuals, pace_rad_s: f64) -> Option<f64> {
+fn strongest_hz(residuals: &Residuals, characteristic_rad_s: f64) -> Option<f64> {
     let values = residuals.values.iter().max_by_key(|v| v.len())?;
     let span_s = values.last()?.t_s - values.first()?.t_s;
-    let swing_hz = pace_rad_s / std::f64::consts::TAU;
+    let swing_hz = characteristic_rad_s / std::f64::consts::TAU;
     let count = (8.0 * swing_hz * span_s) as usize;
     let power = |k: usize| {
         let rate = std::f64::consts::TAU * k as f64 / span_s;

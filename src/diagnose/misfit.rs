@@ -9,20 +9,21 @@ use super::settings::{MisfitSettings, NoiseSettings};
 #[derive(Debug, Clone, Copy)]
 pub struct Misfit {
     /// χ² from which on a fit leaves more than noise.
-    pub too_much: f64,
+    pub chi2_limit: f64,
     /// It leaves more than noise.
     pub unexplained: bool,
-    /// And so does every other effect beside it, as far as that is known; or it leaves so little that many may explain it.
-    pub unsolved: bool,
+    /// And no further effect that was fitted beside it brings χ² down to the noise; or χ² is so small that many may.
+    pub unexplained_by_any: bool,
     /// It leaves little.
     little: bool,
     /// Its motion has lost step with a recording.
     pub out_of_step: bool,
-    /// A spring of the base model has gone far from what the file and the recordings' modes say: it stands for what is missing, and is no place to start from.
-    pub strayed: bool,
+    /// A spring of the base model has drifted far from what the file and the recordings' modes say: it compensates for something missing, and is no start for
+    /// anything else.
+    pub spring_drifted: bool,
     /// An effect that is not scanned for would explain some of it.
     pub seen: bool,
-    /// A dear start leads somewhere where its first steps leave less than this χ².
+    /// An expensive start is given up unless its first steps lead below this χ².
     pub leads: f64,
 }
 
@@ -31,20 +32,20 @@ impl Misfit {
     pub fn of(context: &FitContext<'_>, fit: &Refit<'_>, scores: &[Score]) -> Self {
         let settings = &context.settings.misfit;
         let values = context.values() as f64;
-        let too_much = most_of_noise(context.values(), settings);
-        let left_share = fit.left_share();
-        let out_of_step = left_share > settings.out_of_step;
-        let unexplained = left_share > settings.much || fit.chi2 > too_much;
+        let chi2_limit = chi2_noise_limit(context.values(), settings);
+        let relative_residual = fit.relative_residual();
+        let out_of_step = relative_residual > settings.out_of_step;
+        let unexplained = relative_residual > settings.much || fit.chi2 > chi2_limit;
         let least_fall = settings.leads * (fit.chi2 - values);
-        let beyond_hope = context.settings.descent.beyond_hope * fit.chi2;
+        let hopeless_ratio = context.settings.descent.hopeless_ratio * fit.chi2;
         Self {
-            too_much,
+            chi2_limit,
             unexplained,
-            unsolved: unexplained,
+            unexplained_by_any: unexplained,
             little: fit.chi2 < settings.little * values,
             out_of_step,
-            strayed: unexplained && has_strayed(fit, settings.strays),
-            leads: if unexplained && !out_of_step { fit.chi2 - least_fall } else { beyond_hope },
+            spring_drifted: unexplained && has_drifted(fit, settings.strays),
+            leads: if unexplained && !out_of_step { fit.chi2 - least_fall } else { hopeless_ratio },
             seen: scores.iter().any(|s| s.gain > settings.counts && !s.effect.is_scanned()),
         }
     }
@@ -52,12 +53,12 @@ impl Misfit {
     /// The same where these are fits of other effects.
     #[must_use]
     pub fn beside(self, others: &[Refit<'_>]) -> Self {
-        Self { unsolved: self.unexplained && (self.little || least_chi2(others) > self.too_much), ..self }
+        Self { unexplained_by_any: self.unexplained && (self.little || least_chi2(others) > self.chi2_limit), ..self }
     }
 }
 
 /// Whether a spring of the file's has become so many times as stiff, or as soft.
-fn has_strayed(fit: &Refit<'_>, times: f64) -> bool {
+fn has_drifted(fit: &Refit<'_>, times: f64) -> bool {
     let Ok(stated) = fit.problem.start_values() else { return false };
     let pairs =
         fit.problem.free.iter().zip(stated).filter(|(parameter, stated)| parameter.is_spring() && *stated > 0.0);
@@ -66,20 +67,14 @@ fn has_strayed(fit: &Refit<'_>, times: f64) -> bool {
 }
 
 /// The largest χ² of so many values that is still noise.
-pub fn most_of_noise(values: usize, settings: &MisfitSettings) -> f64 {
+pub fn chi2_noise_limit(values: usize, settings: &MisfitSettings) -> f64 {
     let values = values as f64;
     values + settings.deviations * (2.0 * values).sqrt()
 }
 
-/// What a fit leaves, in variances of what the best one leaves, and what its effects must gain.
+/// χ² over the variance that the best fit leaves, plus a penalty for each effect.
 pub fn needs(fit: &Refit<'_>, best: &Refit<'_>, settings: &MisfitSettings) -> f64 {
-    let variance = (best.chi2 / best.values().max(1) as f64).max(1.0);
-    fit.chi2 / variance + settings.counts * fit.hypothesis.effects.len() as f64
-}
-
-/// Whether a motion has lost step with a recording: what is left is a good part of the swing.
-pub fn is_out_of_step(fit: &Refit<'_>, settings: &MisfitSettings) -> bool {
-    fit.left_share() > settings.out_of_step
+    fit.chi2 / best.variance_ratio() + settings.counts * fit.hypothesis.effects.len() as f64
 }
 
 /// Whether a fit leaves so much that the noise does not matter.

@@ -1,40 +1,41 @@
-//! What the model lacks: where simulation and recording differ, the physics left out, and the proof that it was that.
+//! Model diagnosis: where simulation and recording differ, which missing effect explains it, and a check of that explanation by prediction.
 //!
 //! | step | | files |
 //! |---|---|---|
 //! | 1 | the recordings are prepared: outliers, noise, where the base model's descent starts | [`preparation`] |
-//! | 2 | the base model is fitted | [`taken`], [`base`], [`context`], [`refit`], [`descents`], [`noise`], [`learnt_noise`] |
+//! | 2 | the base model is fitted | [`base_priors`], [`base`], [`context`], [`refit`], [`fitting`], [`noise`], [`residual_noise`] |
 //! | 3 | what it lacks is sought: effects are proposed, fitted, kept | [`mod@search`], [`screen`], [`stretches`], [`misfit`], [`laws`] |
 //! | 4 | a strip's rods are counted; where two links are found to be a strip, what it lacks is sought | [`rods`], [`mod@search`] |
-//! | 5 | the hypotheses are weighed, beside something that is not in the table | [`posterior`], [`evidence`], [`bag`], [`unknowns`], [`rounding`], [`latent`], [`basis_law`] |
+//! | 5 | the hypotheses are weighed, beside something that is not in the table | [`posterior`], [`evidence`], [`bagging`], [`latent_forces`], [`rounding`], [`latent`], [`basis_law`] |
 //! | 6 | in doubt the search goes on, in pieces of the recordings where these are long enough, and they are weighed again | [`mod@search`], [`preparation`], [`search::horizon`] |
 //! | 7 | what was not fitted is predicted | [`heldout`] |
 //! | 8 | what the names leave is learnt, as a law that no table holds | [`learnt`], [`grammar`] |
 //! | 9 | the base model is judged, and what could have been seen; the verdict: the answer, its class, what would decide | [`adequacy`], [`verdict`] |
-//! | 10 | place, time, amplitude and phase are found, and all of it told | [`locate`], [`torque`], [`energy`], [`findings`], [`words`], [`report`], [`answer`], [`law_report`], [`quantity`] |
+//! | 10 | place, time, amplitude and phase are found, and all of it told | [`locate`], [`torque`], [`energy`], [`findings`], [`statements`], [`report`], [`answer`], [`law_report`], [`quantity`] |
 //!
 //! The table of effects is [`effect`], every threshold stands in [`settings`], and [`plan`] asks the same before an experiment. A file imports only from files that
 //! stand before it: [`settings`], [`effect`], [`hypothesis`] and [`context`] import nothing of what follows.
 
 pub mod adequacy;
 pub mod answer;
-pub mod bag;
+pub mod bagging;
 pub mod base;
+pub mod base_priors;
 pub mod basis_law;
 pub mod context;
-pub mod descents;
 pub mod effect;
 pub mod energy;
 pub mod evidence;
 pub mod findings;
+pub mod fitting;
 pub mod grammar;
 pub mod heldout;
 pub mod hypothesis;
 pub mod latent;
+pub mod latent_forces;
 pub mod law_report;
 pub mod laws;
 pub mod learnt;
-pub mod learnt_noise;
 pub mod linearisation;
 pub mod locate;
 pub mod misfit;
@@ -45,17 +46,16 @@ pub mod preparation;
 pub mod quantity;
 pub mod refit;
 pub mod report;
+pub mod residual_noise;
 pub mod rods;
 pub mod rounding;
 pub mod screen;
 pub mod search;
 pub mod settings;
+pub mod statements;
 pub mod stretches;
-pub mod taken;
 pub mod torque;
-pub mod unknowns;
 pub mod verdict;
-pub mod words;
 
 use std::sync::OnceLock;
 
@@ -79,7 +79,7 @@ pub use verdict::Status;
 /// What may be asked of a diagnosis.
 #[derive(Debug, Clone, Default)]
 pub struct Options {
-    /// Recordings made anew from the base model and fitted, to judge it by; with none, residuals are made anew to first order.
+    /// Number of parametric bootstrap recordings for the base model's p-value; with none, replicates of the residuals to first order.
     pub bootstraps: usize,
     /// The stamp from which on a single recording is predicted; two thirds through it otherwise.
     pub predict_from_s: Option<f64>,
@@ -103,21 +103,22 @@ pub fn diagnose(
     let prepared = preparation::prepare(records, experiment, settings)?;
     // 2. the base model
     progress.begin("base model", None);
-    let search = Search::of_base_model(&prepared, &prepared.experiment, prepared.taken_at_first(), settings, progress)?;
+    let search =
+        Search::of_base_model(&prepared, &prepared.experiment, prepared.initial_damping(), settings, progress)?;
     let mut search = search.counted(&counted)?;
     // 3. what it lacks
     search.run();
     // 4. a strip's rods
-    let mut search = search.recounted(&counted)?;
-    let search = match search.of_bending_strip(records, &bending) {
+    let mut search = search.searched_with_preferred_rods(&counted)?;
+    let search = match search.bending_strip_search(records, &bending) {
         Some(strip) => {
             let mut strip = strip.counted(&counted)?;
             strip.run();
             if strip.is_behind() {
                 search
             } else {
-                let (strip, _) = weighed(strip.recounted(&counted)?, &pieces, settings, progress);
-                search.beside_strip(strip)
+                let (strip, _) = weighed(strip.searched_with_preferred_rods(&counted)?, &pieces, settings, progress);
+                search.with_strip_fits(strip)
             }
         }
         None => search,
@@ -132,12 +133,12 @@ pub fn diagnose(
     progress.begin("law", None);
     let (needed, learnt) = learnt::beside(&context, &posterior, &effects, held_out.as_ref(), options.predict_from_s);
     let posterior = Posterior { needed, ..posterior };
-    let (posterior, held_out) = heldout::led_by_likely(&context, posterior, held_out, options.predict_from_s);
+    let (posterior, held_out) = heldout::reorder_by_inclusion(&context, posterior, held_out, options.predict_from_s);
     // 9. the base model by itself, and the verdict
     let adequacy = adequacy::adequacy(&context, posterior.base(), &effects, options.bootstraps, progress);
     let verdict = verdict::Verdict::of(&posterior, context.marks(), held_out.as_ref(), settings);
     // 10. where, when and how
-    let unknown_at = verdict.leaves_it_open().then(|| locate::place_of_unknown(&posterior, settings)).flatten();
+    let unknown_at = verdict.is_open().then(|| locate::place_of_unknown(&posterior, settings)).flatten();
     let findings = Findings {
         departure: locate::departure(posterior.base()),
         remaining: locate::departure(posterior.best()),
@@ -155,7 +156,7 @@ pub fn diagnose(
     Ok(Diagnosis::of(&findings, &experiment.specimen.name))
 }
 
-/// The hypotheses weighed. Where something unknown is likelier than not, or far more than noise is left, the search goes on first.
+/// Computes the posterior. Extends the search first where the residual is far above the noise, or an effect outside the table is more likely than not.
 fn weighed<'a, 'p>(
     search: Search<'a, 'p>,
     pieces: &'a OnceLock<Prepared>,

@@ -2,12 +2,12 @@
 
 use super::adequacy::{Detectable, detectable};
 use super::base::candidates;
+use super::base_priors::{DampingAssumption, base_with_priors};
 use super::context::FitContext;
 use super::hypothesis::Hypothesis;
 use super::laws;
 use super::screen::Screen;
 use super::settings::Settings;
-use super::taken::{Taken, base_of};
 use crate::error::{Error, Result};
 use crate::experiment::Experiment;
 use crate::fit::Record;
@@ -35,7 +35,7 @@ pub fn planned(experiment: &Experiment, plan: &Plan) -> Result<Vec<Detectable>> 
     let record = [recorded(experiment, plan)?];
     let marks = record[0].links();
     let settings = Settings::default();
-    let (base, beliefs) = base_of(experiment, marks, Taken::AtItsWord, &settings.search)?;
+    let (base, beliefs) = base_with_priors(experiment, marks, DampingAssumption::AsStated, &settings.search)?;
     let context = FitContext {
         records: &record,
         experiment,
@@ -44,7 +44,7 @@ pub fn planned(experiment: &Experiment, plan: &Plan) -> Result<Vec<Detectable>> 
         beliefs,
         step_error_rad: step_error_rad(plan.noise_rad),
         begun: Vec::new(),
-        fine_strip: None,
+        identified_strip: None,
         laws: Vec::new(),
         work: Work::default(),
     };

@@ -1,17 +1,17 @@
 //! The posterior: how probable each hypothesis is, beside the others and beside something that no table holds.
 
-use super::bag;
+use super::bagging;
 use super::effect::{Effect, Place};
 use super::energy::added_torque_n_m;
 use super::evidence::{self, Scatter, normalised};
 use super::hypothesis::Compared;
-use super::latent::{Assumed, Latent};
+use super::latent::{LatentConfig, LatentForce};
+use super::latent_forces::unknowns;
 use super::laws::law_of;
-use super::misfit::{leaves_more_than_noise, most_of_noise, needs};
+use super::misfit::{chi2_noise_limit, leaves_more_than_noise, needs};
 use super::refit::{self, Refit};
 use super::rounding::rounded;
 use super::settings::Settings;
-use super::unknowns::unknowns;
 use crate::fit::Record;
 use crate::fit::whitening::RecordNoise;
 
@@ -29,8 +29,8 @@ pub struct Candidate<'a> {
     pub probability: f64,
     /// Posterior where nothing outside the table is at work.
     pub if_named: f64,
-    /// Posterior of these names, whatever remains beside them: what they stand for is not asked.
-    pub in_layers: f64,
+    /// Probability of this set of effects, over the cases with and without something that remains beside it.
+    pub mixture_probability: f64,
 }
 
 /// Hypotheses beside the unknown.
@@ -47,7 +47,7 @@ pub struct Posterior<'a> {
     /// Those rivals.
     pub uncertified: Vec<Vec<Effect>>,
     /// That something around the likeliest fit, at each place.
-    pub unknowns: Vec<Latent>,
+    pub unknowns: Vec<LatentForce>,
     /// How many effects of a hypothesis have been held against every other.
     pub compared: Compared,
     /// How probable each effect is where any law may stand in its place; nothing where that was not asked.
@@ -89,7 +89,7 @@ pub fn weigh<'a>(fits: Vec<Refit<'a>>, effects: usize, compared: &Compared, sett
     let mut posterior: Vec<f64> =
         fits.iter().map(|fit| if is_seen(fit) { ln(fit) } else { f64::NEG_INFINITY }).collect();
     let best = (0..fits.len()).max_by(|a, b| posterior[*a].total_cmp(&posterior[*b])).unwrap_or(0);
-    let latents = unknowns(&fits[best], fits[best].chi2 / values as f64, Assumed::BESIDE);
+    let latents = unknowns(&fits[best], fits[best].chi2 / values as f64, LatentConfig::RESIDUAL);
     let law_error_n_m = law_error_n_m(&fits[best], added_torque_n_m(&fits[best]));
     let coloured = settings.noise.coloured;
     let gain = (unknown_gain(&latents, law_error_n_m, slow_errors_rad(&fits[best]), coloured)
@@ -103,19 +103,19 @@ pub fn weigh<'a>(fits: Vec<Refit<'a>>, effects: usize, compared: &Compared, sett
         at_best[*rival] = at_best[*rival].max(posterior[best] + ln_prior(&fits[*rival]) - ln_prior(&fits[best]));
     }
     let others: Vec<&Refit<'_>> = fits.iter().collect();
-    let genuine: Vec<f64> = fits.iter().map(|fit| genuine(fit, &others, compared, settings)).collect();
-    let lowest = normalised(&at_best)[best] * genuine[best];
+    let not_imitated: Vec<f64> = fits.iter().map(|fit| not_imitated(fit, &others, compared, settings)).collect();
+    let lowest = normalised(&at_best)[best] * not_imitated[best];
     let uncertified = rivals.iter().map(|rival| fits[*rival].hypothesis.effects.clone()).collect();
     let if_named = normalised(&posterior[..fits.len()]);
     let mut probability = normalised(&posterior);
     let mut unknown = probability.pop().unwrap_or(0.0);
     let remains = unknown;
-    let layers = Layers { fits: &fits, best, ln_posterior: &posterior, if_named: &if_named };
-    let in_layers = layers.probabilities((scatter, remains), settings);
+    let layers = RemainderMixture { fits: &fits, best, ln_posterior: &posterior, if_named: &if_named };
+    let mixture_probability = layers.probabilities((scatter, remains), settings);
     // a name, above all a support that moves, may be a stand-in for what is not known
-    for (genuine, probability) in genuine.iter().zip(&mut probability) {
-        unknown += (1.0 - genuine) * *probability;
-        *probability *= genuine;
+    for (not_imitated, probability) in not_imitated.iter().zip(&mut probability) {
+        unknown += (1.0 - not_imitated) * *probability;
+        *probability *= not_imitated;
     }
     let mut candidates: Vec<Candidate<'a>> = fits
         .into_iter()
@@ -125,7 +125,7 @@ pub fn weigh<'a>(fits: Vec<Refit<'a>>, effects: usize, compared: &Compared, sett
             ln_posterior: posterior[place],
             probability: probability[place],
             if_named: if_named[place],
-            in_layers: in_layers[place],
+            mixture_probability: mixture_probability[place],
         })
         .collect();
     // where the unknown takes all, or next to all, their order among themselves still counts
@@ -145,7 +145,7 @@ pub fn weigh<'a>(fits: Vec<Refit<'a>>, effects: usize, compared: &Compared, sett
 
 /// The names in layers: P(S) = (1 − z) P(S | nothing remains) + z g P(S | something remains), z being the probability that something does, and g the odds
 /// that names which leave so much are at work.
-struct Layers<'f, 'a> {
+struct RemainderMixture<'f, 'a> {
     fits: &'f [Refit<'a>],
     /// The likeliest.
     best: usize,
@@ -155,11 +155,11 @@ struct Layers<'f, 'a> {
     if_named: &'f [f64],
 }
 
-impl Layers<'_, '_> {
+impl RemainderMixture<'_, '_> {
     fn probabilities(&self, (scatter, remains): (Scatter, f64), settings: &Settings) -> Vec<f64> {
         let Self { fits, if_named, .. } = *self;
-        let bagged = match remains > NEGLIGIBLE {
-            true => self.bagged(scatter, settings),
+        let bagged_posterior = match remains > NEGLIGIBLE {
+            true => self.bagged_posterior(scatter, settings),
             false => if_named.to_vec(),
         };
         let base = fits.iter().find(|f| f.hypothesis.effects.is_empty());
@@ -167,13 +167,13 @@ impl Layers<'_, '_> {
             let left = base.map_or(1.0, |base| left_of_excess(&fits[place], base));
             let named = !fits[place].hypothesis.effects.is_empty();
             let odds = if named { settings.prior.odds_where_left(left) } else { 1.0 };
-            (1.0 - remains) * if_named[place] + remains * odds * bagged[place]
+            (1.0 - remains) * if_named[place] + remains * odds * bagged_posterior[place]
         };
         (0..fits.len()).map(of).collect()
     }
 
     /// P(S | something remains). A fit that is not certified may be a false minimum: it counts for nothing beside those that are.
-    fn bagged(&self, scatter: Scatter, settings: &Settings) -> Vec<f64> {
+    fn bagged_posterior(&self, scatter: Scatter, settings: &Settings) -> Vec<f64> {
         let counts = |place: usize| place == self.best || self.fits[place].is_certified(&settings.certificate);
         let ln_weight = |(place, fit): (usize, &Refit<'_>)| match counts(place) {
             true => self.ln_posterior[place] + 0.5 * fit.chi2 / scatter.of_all,
@@ -181,7 +181,7 @@ impl Layers<'_, '_> {
         };
         let ln_weight: Vec<f64> = self.fits.iter().enumerate().map(ln_weight).collect();
         let together = ((scatter.of_all - 1.0) / (scatter.of_values - 1.0).max(1e-9)).max(1.0);
-        bag::bagged(self.fits, &ln_weight, (scatter.of_values, together))
+        bagging::bagged_posterior(self.fits, &ln_weight, (scatter.of_values, together))
     }
 }
 
@@ -194,7 +194,7 @@ pub fn left_of_excess(fit: &Refit<'_>, base: &Refit<'_>) -> f64 {
 /// The rivals of the likeliest fit that are not certified, and leave so little more that a better fit of theirs might count. One that leaves only noise stands in
 /// no false minimum, however few starts have led there.
 fn uncertified_within_reach(fits: &[Refit<'_>], best: usize, settings: &Settings) -> Vec<usize> {
-    let only_noise = most_of_noise(fits[best].values(), &settings.misfit);
+    let only_noise = chi2_noise_limit(fits[best].values(), &settings.misfit);
     let needs = |fit: &Refit<'_>| needs(fit, &fits[best], &settings.misfit);
     let reach = needs(&fits[best]) + settings.certificate.within;
     let is_rival = |place: &usize| {
@@ -205,8 +205,8 @@ fn uncertified_within_reach(fits: &[Refit<'_>], best: usize, settings: &Settings
     (0..fits.len()).filter(is_rival).collect()
 }
 
-/// The odds that a fit's effects are what has been filmed, and stand for nothing else.
-fn genuine(fit: &Refit<'_>, others: &[&Refit<'_>], compared: &Compared, settings: &Settings) -> f64 {
+/// The probability that a fit's effects are the cause, and do not imitate another one.
+fn not_imitated(fit: &Refit<'_>, others: &[&Refit<'_>], compared: &Compared, settings: &Settings) -> f64 {
     let effects = &fit.hypothesis.effects;
     if effects.is_empty() {
         return 1.0;
@@ -224,13 +224,13 @@ fn genuine_alone(effect: Effect, is_further: bool, fit: &Refit<'_>, others: &[&R
 
 /// The odds that one of them is what it seems to be, as its own law and those beside it say.
 fn odds(effect: Effect, fit: &Refit<'_>, others: &[&Refit<'_>], settings: &Settings) -> f64 {
-    let beside = if completes_a_law(effect, fit, others) { settings.prior.completes_a_law } else { 1.0 };
+    let beside = if within_law_error(effect, fit, others) { settings.prior.within_law_error } else { 1.0 };
     beside.min(law_of(effect).odds(fit, others, settings))
 }
 
 /// Whether an effect explains no more than the error of another one's law: of two torques that go with the position, or with the velocity, the smaller may be what the
 /// larger one's law lacks.
-fn completes_a_law(effect: Effect, fit: &Refit<'_>, others: &[&Refit<'_>]) -> bool {
+fn within_law_error(effect: Effect, fit: &Refit<'_>, others: &[&Refit<'_>]) -> bool {
     let explained = |effect: Effect| {
         let rest = fit.hypothesis.without(effect).effects;
         others.iter().find(|other| other.hypothesis.effects == rest).map(|without| without.chi2 - fit.chi2)
@@ -258,18 +258,19 @@ fn law_error_n_m(fit: &Refit<'_>, added_n_m: f64) -> f64 {
 /// The errors that tracked or rounded angles may have from one swing to the next, as large as those in step with it.
 fn slow_errors_rad(fit: &Refit<'_>) -> f64 {
     let of_record = |(noise, record): (&RecordNoise, &Record)| {
-        noise.in_step.max(record.rounding) * noise.sd_rad.iter().copied().fold(0.0, f64::max)
+        noise.synchronous.max(record.rounding) * noise.sd_rad.iter().copied().fold(0.0, f64::max)
     };
     fit.problem.noise.iter().zip(fit.problem.records).map(of_record).fold(0.0, f64::max)
 }
 
 /// How much likelier an unknown of any size makes the recordings than one that a law's own error, or the tracker's, allows.
-fn unknown_gain(latents: &[Latent], law_error_n_m: f64, slow_errors_rad: f64, coloured: f64) -> f64 {
-    let within =
-        |latent: &Latent, allowed: f64| latent.tried.iter().filter(|t| t.0 <= allowed).map(|t| t.1).fold(0.0, f64::max);
-    let is_camera = |latent: &&Latent| latent.place() == Place::Camera;
+fn unknown_gain(latents: &[LatentForce], law_error_n_m: f64, slow_errors_rad: f64, coloured: f64) -> f64 {
+    let within = |latent: &LatentForce, allowed: f64| {
+        latent.tried.iter().filter(|t| t.0 <= allowed).map(|t| t.1).fold(0.0, f64::max)
+    };
+    let is_camera = |latent: &&LatentForce| latent.place() == Place::Camera;
     let wander = latents.iter().find(is_camera).map_or(0.0, |camera| within(camera, slow_errors_rad));
-    let of = |latent: &Latent| {
+    let of = |latent: &LatentForce| {
         // an offset that wanders may be noise of another colour than was learnt
         let own = if is_camera(&latent) { coloured } else { within(latent, law_error_n_m) };
         latent.gain - own.max(wander)
@@ -284,7 +285,7 @@ fn gain_of_rounding(fit: &Refit<'_>, law_error_n_m: f64, coloured: f64) -> f64 {
     let gain = |records: Vec<Record>| {
         let (mut made, values) = (fit.clone(), fit.values() as f64);
         made.problem.records = &records;
-        let latents = unknowns(&made, fit.chi2 / values, Assumed::BESIDE);
+        let latents = unknowns(&made, fit.chi2 / values, LatentConfig::RESIDUAL);
         unknown_gain(&latents, law_error_n_m, slow_errors_rad(&made), coloured)
     };
     rounded(fit).into_iter().map(gain).fold(0.0, f64::max)
@@ -293,7 +294,7 @@ fn gain_of_rounding(fit: &Refit<'_>, law_error_n_m: f64, coloured: f64) -> f64 {
 /// How much likelier anything that leaves only noise makes the recordings than a fit that failed: one that leaves far more, being out of step with a recording, shows no
 /// small torque that would mend it, and one that has not come to its end shows only what is left of its way.
 fn gain_over_a_failed_fit(fit: &Refit<'_>, scatter: Scatter, settings: &Settings) -> f64 {
-    let stopped = !fit.converged && fit.chi2 > most_of_noise(fit.values(), &settings.misfit);
+    let stopped = !fit.converged && fit.chi2 > chi2_noise_limit(fit.values(), &settings.misfit);
     let gain = 0.5 * (fit.chi2 - fit.values() as f64) / scatter.of_all;
     if stopped || leaves_more_than_noise(fit, &settings.noise) { gain } else { f64::NEG_INFINITY }
 }
@@ -312,7 +313,7 @@ impl<'a> Posterior<'a> {
 
     /// Whether a name of the likeliest fit often stands for something else, or two of them may together: a frequency, and how it goes with amplitude, is what any
     /// nonlinear spring changes.
-    pub fn may_stand_in(&self, settings: &Settings) -> bool {
+    pub fn may_be_imitation(&self, settings: &Settings) -> bool {
         let (best, others) = (self.best(), self.fits());
         let effects = &best.hypothesis.effects;
         let of_frequency = effects.iter().filter(|effect| effect.entry().is_of_frequency()).count();
@@ -342,17 +343,18 @@ impl<'a> Posterior<'a> {
     /// sought, all descriptions.
     fn inclusion(&self, effect: Effect, settings: &Settings) -> f64 {
         let others = self.fits();
-        let genuine = |fit: &Refit<'_>| {
-            let explaining = self.by_what_they_explain(fit);
+        let not_imitated = |fit: &Refit<'_>| {
+            let explaining = self.by_contribution(fit);
             let compared = self.compared.of(&fit.hypothesis.effects);
             let is_further = explaining.iter().skip(compared).any(|further| *further == effect);
             genuine_alone(effect, is_further, fit, &others, settings)
         };
         let with = || self.candidates.iter().filter(|c| c.fit.hypothesis.has(effect));
-        let counts = with().filter(|c| c.in_layers > NEGLIGIBLE);
-        let of_table = counts.map(|c| c.in_layers * genuine(&c.fit)).fold(0.0, |sum, p| sum + p).min(1.0);
+        let counts = with().filter(|c| c.mixture_probability > NEGLIGIBLE);
+        let of_table =
+            counts.map(|c| c.mixture_probability * not_imitated(&c.fit)).fold(0.0, |sum, p| sum + p).min(1.0);
         let needed = self.needed.iter().find(|own| own.effect == effect);
-        let likeliest = with().next().map_or(1.0 - settings.prior.imitated, |c| genuine(&c.fit));
+        let likeliest = with().next().map_or(1.0 - settings.prior.imitated, |c| not_imitated(&c.fit));
         // the descriptions hold those of the table, too
         needed.map_or(of_table, |needed| needed.probability * likeliest)
     }
@@ -363,7 +365,7 @@ impl<'a> Posterior<'a> {
     }
 
     /// A fit's effects, the one that explains most first: without which it would be worst.
-    pub fn by_what_they_explain(&self, fit: &Refit<'_>) -> Vec<Effect> {
+    pub fn by_contribution(&self, fit: &Refit<'_>) -> Vec<Effect> {
         let mut effects = fit.hypothesis.effects.clone();
         let left_without = |effect: &Effect| {
             let others = fit.hypothesis.without(*effect).effects;

@@ -1,22 +1,27 @@
 //! What all searches begin with: recordings without outliers, their noise, and where the base model's descent starts.
 
+use super::base_priors::{DampingAssumption, stated};
 use super::context::first_part;
 use super::settings::{SearchSettings, Settings};
-use super::taken::{Taken, stated};
 use crate::error::Result;
 use crate::experiment::Experiment;
 use crate::fit::noise::noise_rad;
 use crate::fit::problem::step_error_rad;
-use crate::fit::search::{End, best_end, seen_starts};
-use crate::fit::shooting::STATE_NEAR;
+use crate::fit::record::refuse_empty;
+use crate::fit::search::{End, best_robust_fit, observed_starts};
+use crate::fit::shooting::STATE_WINDOW_RAD;
 use crate::fit::whitening::{Colour, RecordNoise};
-use crate::fit::{Problem, Record, Seen, refuse_another_pace};
+use crate::fit::{Problem, Record, Seen, check_frequency};
 use crate::model::{Parameter, Work};
 use crate::progress::Silent;
 use crate::series::FEWEST_ROWS;
 
 /// Of fewer pieces none would be left to be predicted.
 const FEWEST_PIECES: usize = 3;
+/// What the starts of short stretches take from the correlation of neighbouring residuals (judgement)…
+const OF_STARTS: f64 = 0.05;
+/// … which is at most this with it (judgement).
+const MOST_RHO: f64 = 0.9;
 
 /// What the recordings, cleaned of outliers, are held against.
 pub struct Prepared {
@@ -43,10 +48,11 @@ pub struct Prepared {
 impl Prepared {
     /// The same with every recording cut in pieces of some swings at a pace, integrated as exactly as is worth it where models leave far more than noise; `None`
     /// where that makes fewer than three of each.
-    pub fn in_pieces(&self, settings: &Settings, pace_rad_s: f64) -> Option<Self> {
+    pub fn in_pieces(&self, settings: &Settings, characteristic_rad_s: f64) -> Option<Self> {
         let (swings, beyond) = (settings.search.piece_swings, settings.noise.beyond);
         let least_rad = self.noise.iter().flat_map(|own| &own.sd_rad).copied().fold(f64::INFINITY, f64::min);
-        let (length_s, reach_s) = (swings * std::f64::consts::TAU / pace_rad_s, STATE_NEAR / pace_rad_s);
+        let (length_s, reach_s) =
+            (swings * std::f64::consts::TAU / characteristic_rad_s, STATE_WINDOW_RAD / characteristic_rad_s);
         let (mut records, mut noise, mut starts) = (Vec::new(), Vec::new(), Vec::new());
         for (record, own_noise) in self.records.iter().zip(&self.noise) {
             let pieces = record.pieces(length_s);
@@ -76,9 +82,9 @@ impl Prepared {
     }
 
     /// How a search takes the file at first.
-    pub fn taken_at_first(&self) -> Taken {
+    pub fn initial_damping(&self) -> DampingAssumption {
         let marks = self.records.first().map_or(0, Record::links);
-        Taken::at_first(&self.experiment, marks, self.part < 1.0)
+        DampingAssumption::at_first(&self.experiment, marks, self.part < 1.0)
     }
 }
 
@@ -89,15 +95,16 @@ impl Prepared {
 /// [`crate::error::Error::Table`] for a recording that swings at another pace than the specimen can; [`crate::error::Error::Simulation`] where the specimen
 /// cannot swing, or no motion near any start follows the recordings.
 pub fn prepare(records: &[Record], experiment: &Experiment, settings: &Settings) -> Result<Prepared> {
+    refuse_empty(records)?;
     for record in records {
-        Seen::of(record).map_or(Ok(()), |seen| refuse_another_pace(record, &seen, experiment))?;
+        Seen::of(record).map_or(Ok(()), |seen| check_frequency(record, &seen, experiment))?;
     }
     let marks = records.first().map_or(0, Record::links);
-    let base = stated(experiment, marks, Taken::AtItsWord);
+    let base = stated(experiment, marks, DampingAssumption::AsStated);
     let noise_rad: Vec<Vec<f64>> = records.iter().map(noise_rad).collect();
     let part = affordable_part(records, experiment, &base, &noise_rad, &settings.search)?;
     let early = if part < 1.0 { first_part(records, part) } else { records.to_vec() };
-    let End { mut problem, outcome, shot, begun } = best_end(&early, experiment, &base, &noise_rad, &Silent)?;
+    let End { mut problem, outcome, shot, begun } = best_robust_fit(&early, experiment, &base, &noise_rad, &Silent)?;
     problem.noise.clone_from(&shot.noise);
     problem.integrate_below_the_noise();
     let step_error_rad = problem.accuracy.step_error_rad;
@@ -129,8 +136,8 @@ fn affordable_part(
     let mut problem = Problem::new(records, experiment, base)?;
     let least_rad = noise_rad.iter().flatten().copied().fold(f64::INFINITY, f64::min);
     problem.accuracy = problem.accuracy_of(problem.longest_s(), step_error_rad(least_rad));
-    let x = [problem.start_values()?, seen_starts(&problem)?].concat();
-    let swings = problem.longest_s() * problem.model(0, &[])?.0.pace_rad_s() / std::f64::consts::TAU;
+    let x = [problem.start_values()?, observed_starts(&problem)?].concat();
+    let swings = problem.longest_s() * problem.model(0, &[])?.0.characteristic_rad_s() / std::f64::consts::TAU;
     // a motion that runs away has cost what it has
     _ = problem.blocks(&x);
     let affordable = settings.budget as f64 / (settings.evaluations * problem.work.done().max(1) as f64);
@@ -144,7 +151,7 @@ fn coloured(residuals: &[(usize, usize, f64)], white: &[RecordNoise], least: f64
         let r: Vec<f64> = residuals.iter().filter(|r| r.0 == record && r.1 == link).map(|r| r.2).collect();
         let power: f64 = r.iter().map(|v| v * v).sum();
         let rho = r.windows(2).map(|w| w[0] * w[1]).sum::<f64>() / power.max(1e-300);
-        if rho > least { Colour { rho: (rho + 0.05).min(0.9), share: 1.0 } } else { Colour::default() }
+        if rho > least { Colour { rho: (rho + OF_STARTS).min(MOST_RHO), share: 1.0 } } else { Colour::default() }
     };
     let with_colour = |(record, white): (usize, &RecordNoise)| {
         let colour = (0..white.sd_rad.len()).map(|link| of(record, link)).collect();

@@ -5,7 +5,7 @@ use std::ops::Range;
 use nalgebra::{DMatrix, DVector};
 
 use super::hypothesis::Hypothesis;
-use super::settings::CertificateSettings;
+use super::settings::{CertificateSettings, MisfitSettings};
 use crate::fit::descent::{Ending, Outcome};
 use crate::fit::problem::stacked;
 use crate::fit::{Problem, Residuals, recordings, residuals_of};
@@ -26,11 +26,11 @@ pub struct Refit<'a> {
     pub normal: DMatrix<f64>,
     /// Steps of the descent.
     pub steps: usize,
-    /// With this damping it goes on.
+    /// Levenberg and Marquardt's damping at the end, to continue with.
     pub damping: f64,
     /// Whether the descent ended in a minimum.
     pub converged: bool,
-    /// How far it may be trusted to be the best of its hypothesis.
+    /// Evidence that this is the global minimum of the hypothesis.
     pub certificate: Certificate,
 }
 
@@ -123,13 +123,18 @@ impl<'a> Refit<'a> {
         Some((model, swing, true_s))
     }
 
-    /// What is left of the worst recording, as a part of the swing: root mean squares of both.
-    pub fn left_share(&self) -> f64 {
-        (0..self.problem.records.len()).map(|record| self.left_share_of(record)).fold(0.0, f64::max)
+    /// The relative residual of the worst recording: root mean square of the residual over that of the angles.
+    pub fn relative_residual(&self) -> f64 {
+        (0..self.problem.records.len()).map(|record| self.relative_residual_of(record)).fold(0.0, f64::max)
+    }
+
+    /// Whether its motion has lost step with a recording: what is left is a good part of the swing.
+    pub fn has_lost_step(&self, settings: &MisfitSettings) -> bool {
+        self.relative_residual() > settings.out_of_step
     }
 
     /// The same of one recording.
-    pub fn left_share_of(&self, record: usize) -> f64 {
+    pub fn relative_residual_of(&self, record: usize) -> f64 {
         let Ok(prediction) = self.problem.predict(record, &self.x, false) else { return f64::INFINITY };
         let data = &self.problem.records[record];
         let (mut left, mut whole) = (0.0, 0.0);
@@ -154,6 +159,11 @@ impl<'a> Refit<'a> {
     /// What it leaves of a record.
     pub fn residuals(&self, record: usize) -> Option<Residuals> {
         residuals_of(&self.problem, &self.x, record).ok()
+    }
+
+    /// χ² of each value, and no less than that of noise: by so much more than the noise its residuals scatter.
+    pub fn variance_ratio(&self) -> f64 {
+        (self.chi2 / self.values().max(1) as f64).max(1.0)
     }
 
     /// What it leaves of the angles, over their noise: root mean squares, of the worst recording.

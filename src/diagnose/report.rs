@@ -28,11 +28,11 @@ pub struct Diagnosis {
     #[serde(rename = "where")]
     pub location: Location,
     /// The hypotheses, likeliest first.
-    pub candidates: Vec<Hypothetical>,
+    pub candidates: Vec<CandidateReport>,
     /// The verdict.
     pub verdict: Answer,
     /// The prediction of what was not fitted.
-    pub heldout: Option<Proof>,
+    pub heldout: Option<HoldoutResult>,
     /// What could have been seen.
     pub detectable: Limits,
     /// What each round of the search came to.
@@ -94,7 +94,7 @@ pub struct Location {
     /// The same in words.
     pub statement: String,
     /// The torque that the base model lacks.
-    pub missing_torque: Option<Lacking>,
+    pub missing_torque: Option<MissingTorqueSummary>,
     /// Root mean square of the torque of the likeliest effects.
     pub named_torque_n_m: f64,
     /// The unknown around the likeliest hypothesis.
@@ -103,7 +103,7 @@ pub struct Location {
 
 /// The torque that the base model lacks, in numbers.
 #[derive(Debug, Clone, Copy, Serialize)]
-pub struct Lacking {
+pub struct MissingTorqueSummary {
     /// Where.
     pub place: Place,
     /// Root mean square.
@@ -135,7 +135,7 @@ pub struct Unknown {
 
 /// A hypothesis, fitted and weighed.
 #[derive(Debug, Clone, Serialize)]
-pub struct Hypothetical {
+pub struct CandidateReport {
     /// The effects beside the base model.
     pub effects: Vec<Effect>,
     /// Its posterior probability.
@@ -153,7 +153,7 @@ pub struct Hypothetical {
     /// Schwarz's criterion.
     pub bic: f64,
     /// How far the fit may be trusted to be the best of its hypothesis.
-    pub fit: Trust,
+    pub fit: FitQuality,
     /// The coefficients in the order of the effects.
     #[serde(skip)]
     pub coefficients: Vec<(Parameter, Quantity)>,
@@ -161,7 +161,7 @@ pub struct Hypothetical {
 
 /// How far a fit may be trusted to be the best of its hypothesis.
 #[derive(Debug, Clone, Copy, Serialize)]
-pub struct Trust {
+pub struct FitQuality {
     /// Nothing is to be gained where it stands.
     pub converged: bool,
     /// Independent starts that ended there.
@@ -228,7 +228,7 @@ pub struct Remainder {
 
 /// What was not fitted, predicted.
 #[derive(Debug, Clone, Serialize)]
-pub struct Proof {
+pub struct HoldoutResult {
     /// From which stamp on.
     pub from_s: f64,
     /// Of which recording.
@@ -246,7 +246,7 @@ pub struct Proof {
     pub noise_rad: Vec<f64>,
 }
 
-impl Proof {
+impl HoldoutResult {
     /// What was fitted, and what predicted.
     pub fn words(&self) -> String {
         if self.whole_recording {

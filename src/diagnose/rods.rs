@@ -1,7 +1,7 @@
 //! How many rods stand for a strip.
 //!
-//! A chain of n rods swings as the strip does up to an error in proportion to ε = 1/n². For a large release and little noise that error is seen, and a
-//! law would be named for it. So the rods are counted, too: their χ² over ε is a parabola, of which three counts tell the lowest point.
+//! The error of a chain of n rods is in proportion to ε = 1/n². For a large release and little noise that error is seen, and a law would be named for it. So
+//! the rods are counted, too: χ² over ε is nearly a parabola, of which three counts tell the lowest point.
 
 use rayon::prelude::*;
 
@@ -12,15 +12,16 @@ use crate::experiment::{Experiment, Model};
 use crate::model::Parameter;
 
 /// Counts between two marks that are tried beside the usual one: near to it, as from a chain that swings a little slower to one that swings a little faster a
-/// fit stays in step. Then so many to which a parabola leads, and the bounds of these.
+/// fit stays in step. Then so many to which a parabola leads (cost), and the bounds of these (judgement).
 const TRIED: [usize; 2] = [12, 6];
 const GUIDED: usize = 2;
 const FEWEST: usize = 4;
 const MOST: usize = 20;
-/// Fits that leave least, of which those with fewer effects are compared.
+/// Fits that leave least, of which those with fewer effects are compared (cost).
 pub const LEADERS: usize = 5;
-/// A fit that leaves so many times the χ² of the best one is not led below that by another count.
-const MISCOUNTED: f64 = 10.0;
+/// A fit that leaves so many times the χ² of the best one is not led below that by another count (cost: up to four times was seen, with two thirds of
+/// the rods and 0.33 mrad of noise).
+const MAX_CHI2_RATIO: f64 = 10.0;
 /// A spring at the hinge has at least this part of the compliance of half a rod (judgement: a clamp has all of it).
 const LEAST: f64 = 0.1;
 /// Links that are rigid between the marks: no parabola leads there.
@@ -52,14 +53,14 @@ impl<'s> Weights<'s> {
 }
 
 /// Fits of one hypothesis with several numbers of rods.
-struct Counted<'c> {
+struct RodCountScan<'c> {
     /// Of every count from none to the most.
     contexts: &'c [FitContext<'c>],
     /// The count, and its fit; the usual one first.
     fits: Vec<(usize, Refit<'c>)>,
 }
 
-impl<'c> Counted<'c> {
+impl<'c> RodCountScan<'c> {
     /// Fits with another count, from where the fits with the two nearest ones lead: all values change with ε.
     fn try_count(&mut self, pieces: usize) -> Option<()> {
         if self.fits.iter().any(|(tried, _)| *tried == pieces) {
@@ -150,15 +151,15 @@ fn with_hinge(fit: &Refit<'_>, x: &[f64], of: impl Fn(f64, f64) -> f64, pieces: 
 
 /// Which fits are compared.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Among {
+pub enum ComparedFits {
     /// Those that leave least.
-    Leaders,
+    Best,
     /// Where they leave much, those of one effect, too.
     Simple,
 }
 
 /// The number of rods between two marks that the recordings ask for, if it is not the usual one; `None` also where the file asks for another.
-pub fn preferred(context: &FitContext<'_>, fits: &[Refit<'_>], among: Among) -> Option<usize> {
+pub fn preferred_rod_count(context: &FitContext<'_>, fits: &[Refit<'_>], among: ComparedFits) -> Option<usize> {
     let usual = Model::default().pieces;
     if !context.is_strip() || context.experiment.model.pieces != usual {
         return None;
@@ -168,28 +169,28 @@ pub fn preferred(context: &FitContext<'_>, fits: &[Refit<'_>], among: Among) -> 
     // one effect of a leader may only make up for the count, and be told from the others where that is right
     let leaders = refit::best(fits, LEADERS, |_| true, |fit| weights.weight(fit));
     // what leaves many times as much is not led to the best by another count
-    let may_win = |fit: &&Refit<'_>| fit.chi2 < MISCOUNTED * best.chi2;
+    let may_win = |fit: &&Refit<'_>| fit.chi2 < MAX_CHI2_RATIO * best.chi2;
     let within = |fit: &Refit<'_>| leaders.iter().any(|leader| fit.hypothesis.is_within(&fits[*leader].hypothesis));
-    let simple = |fit: &Refit<'_>| fit.hypothesis.effects.len() < 2 && !fit.hypothesis.is_dear();
+    let simple = |fit: &Refit<'_>| fit.hypothesis.effects.len() < 2 && !fit.hypothesis.is_expensive();
     let unexplained = weights.scatter > weights.settings.search.count_unexplained;
     let compared: Vec<&Refit<'_>> = fits
         .iter()
-        .filter(|fit| within(fit) || among == Among::Simple && unexplained && simple(fit))
+        .filter(|fit| within(fit) || among == ComparedFits::Simple && unexplained && simple(fit))
         .filter(may_win)
         .collect();
     let better = weights.weight(best) - weights.settings.search.worth_a_count;
     // a single effect may only lead the way where nothing else is left: beside a wrong effect a wrong count makes up for what that one gets wrong
     let wanted = |fit: &Refit<'_>| match among {
-        Among::Leaders => {
+        ComparedFits::Best => {
             better.min(weights.with_chi2(fit, weights.settings.search.count_unexplained * context.values() as f64))
         }
-        Among::Simple => better,
+        ComparedFits::Simple => better,
     };
     let experiments: Vec<Experiment> = (0..=MOST).map(|pieces| with(context.experiment, pieces)).collect();
     let contexts: Vec<FitContext<'_>> =
         experiments.iter().map(|experiment| FitContext { experiment, ..context.clone() }).collect();
     let promised = compared.par_iter().with_max_len(1).filter_map(|fit| {
-        let mut counted = Counted { contexts: &contexts, fits: vec![(usual, (*fit).clone())] };
+        let mut counted = RodCountScan { contexts: &contexts, fits: vec![(usual, (*fit).clone())] };
         for pieces in TRIED {
             counted.try_count(pieces)?;
         }
@@ -200,7 +201,7 @@ pub fn preferred(context: &FitContext<'_>, fits: &[Refit<'_>], among: Among) -> 
                 counted.try_count(pieces);
             }
         }
-        if among == Among::Simple && unexplained {
+        if among == ComparedFits::Simple && unexplained {
             counted.try_count(RIGID);
         }
         counted.best(&weights).filter(|(_, weight)| *weight < wanted(fit))
@@ -208,7 +209,7 @@ pub fn preferred(context: &FitContext<'_>, fits: &[Refit<'_>], among: Among) -> 
     promised.min_by(|a, b| a.1.total_cmp(&b.1)).map(|(pieces, _)| pieces)
 }
 
-/// Whether fits with another count do better, as was promised. Each round has learnt a noise of its own; the first one's is the yardstick.
+/// Whether another count lowers the penalised χ², both judged by the noise of the first search.
 pub fn is_kept(context: &FitContext<'_>, before: &[Refit<'_>], after: &[Refit<'_>]) -> bool {
     let weights = Weights::of(context, before);
     let (Some(old), Some(new)) = (weights.best(before), weights.best(after)) else { return false };

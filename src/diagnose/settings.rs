@@ -1,8 +1,9 @@
 //! Every threshold of a diagnosis, with its source.
 //!
 //! Where a value comes from stands after it: *statistics*, it follows from a distribution; *training bank*, it was set on the training banks of the concealed
-//! benchmark (`fixtures/concealed`), never on test banks; *cost*, it bounds the work, and is set where more work changed no answer there; *judgement*, an
-//! experimenter's convention. Grids of start values and steps of numerical methods are no thresholds: they stand where they are used.
+//! benchmark (`fixtures/concealed`), never on test banks; *cost*, it bounds the work, and is set where more work changed no answer there; *physics*, it
+//! follows from how such things move; *judgement*, an experimenter's convention. Grids of start values and steps of numerical methods are no thresholds: they
+//! stand where they are used, as *start values* and *numerics*.
 
 /// All of them.
 #[derive(Debug, Clone, Default)]
@@ -67,9 +68,9 @@ pub struct DescentSettings {
     /// It has converged when the next step promises less than this part of the mean square (statistics: 0.02 of a χ² is 0.01 of an ln-likelihood).
     pub enough: f64,
     /// A fit from short stretches, or of a strip, goes on where its first steps lead below this multiple of the base model's χ² (training bank).
-    pub beyond_hope: f64,
+    pub hopeless_ratio: f64,
     /// A strip goes on where its first steps lead below this multiple of the base model's χ² (training bank).
-    pub hopeful: f64,
+    pub strip_continue_ratio: f64,
 }
 
 /// Which fits lack something.
@@ -77,7 +78,7 @@ pub struct DescentSettings {
 pub struct MisfitSettings {
     /// A fit that leaves this part of the swing lacks something, whatever the noise (judgement).
     pub much: f64,
-    /// A motion that leaves more than this part of the swing has lost step (a phase lag of 0.35 rad).
+    /// A motion that leaves more than this part of the swing has lost step (judgement: a phase lag of 0.35 rad).
     pub out_of_step: f64,
     /// χ² beyond its expectation by this many standard deviations is worth a dear hypothesis (statistics: 4 σ).
     pub deviations: f64,
@@ -87,25 +88,25 @@ pub struct MisfitSettings {
     pub leads: f64,
     /// A fall of χ² by this much counts (statistics: 3 σ of one number).
     pub counts: f64,
-    /// A spring that has become so many times as stiff as the file and the recordings' modes say, or as soft, stands for something else. *Judgement*: a file may
-    /// be wrong ten times over.
+    /// A spring that has become so many times as stiff as the file and the recordings' modes say, or as soft, stands for something else (judgement: a file
+    /// may be wrong ten times over).
     pub strays: f64,
 }
 
 /// Up to which share of the budget each phase of a search may go (cost).
 #[derive(Debug, Clone, Copy)]
 pub struct BudgetShares {
-    /// Single effects and pairs.
+    /// Single effects and pairs (cost).
     pub usual: f64,
-    /// Restarts.
+    /// Restarts (cost).
     pub restarts: f64,
-    /// Further starts of the fits that count.
+    /// Further starts of the fits that count (cost).
     pub certified: f64,
-    /// From the beginning on, more effects and fewer. What is left is for further starts of what that found.
+    /// From the beginning on, more effects and fewer (cost). What is left is for further starts of what that found.
     pub further: f64,
-    /// A law that no table holds is learnt beside all of that, with this much.
+    /// A law that no table holds is learnt beside all of that, with this much (cost: no recording comes near a minute with it).
     pub law: f64,
-    /// And made simpler, turn by turn, until so much is spent.
+    /// And made simpler, turn by turn, until so much is spent (cost).
     pub simpler: f64,
 }
 
@@ -136,7 +137,7 @@ pub struct SearchSettings {
     /// Fits from which pairs are built (cost).
     pub pair_seeds: usize,
     /// Of these, the ones beside which what is dear to score is looked for (cost).
-    pub dear_seeds: usize,
+    pub expensive_seeds: usize,
     /// Fits that leave this many times the best one's χ² are no seeds (cost).
     pub far: f64,
     /// No pair is promised less than this part of its seed's χ²: a promise from afar is worth little (training bank).
@@ -152,7 +153,7 @@ pub struct SearchSettings {
     /// … elsewhere, where a parameter of the base model differs by more than this part (training bank).
     pub elsewhere: f64,
     /// A clock takes the pace of a base model if it leaves less than this part of the swing that that one leaves (judgement: a tenth).
-    pub takes_the_pace: f64,
+    pub frequency_match_residual: f64,
     /// A fit whose χ² is this many times the best one's, and this much more, is not made any better (cost).
     pub hopeless: f64,
     /// A χ² that was this many times as large was not yet a minimum's: the noise is learnt again (training bank).
@@ -173,13 +174,13 @@ pub struct SearchSettings {
     pub followed: usize,
     /// … of the first part of recordings of which the whole is dear so many altogether (cost)…
     pub carried: usize,
-    /// … unless they leave more than this many times what the best of them does.
+    /// … unless they leave more than this many times what the best of them does (cost).
     pub keeps_up: f64,
     /// Effects that an answer has at first (judgement: a bank of single effects and pairs has calibrated no more).
     pub main_effects: usize,
     /// Most effects of one hypothesis (training bank: of four several quartets did equally well)…
     pub most_effects: usize,
-    /// … and most coefficients.
+    /// … and most coefficients (judgement: two effects of one beside a support, which has three).
     pub most_coefficients: usize,
     /// Effects that are tried beside a fit that has some (cost).
     pub tried: usize,
@@ -198,9 +199,9 @@ pub struct SearchSettings {
 /// Which fits count.
 #[derive(Debug, Clone)]
 pub struct CertificateSettings {
-    /// Two ends are one where their χ² differ by less than this many variances of what is left (0.2 is a tenth of an ln-likelihood).
+    /// Two ends are one where their χ² differ by less than this many variances of what is left (statistics: 0.2 is a tenth of an ln-likelihood).
     pub agrees: f64,
-    /// Independent starts that must end there.
+    /// Independent starts that must end there (judgement).
     pub starts: usize,
     /// Fits that are given further starts until so many agree (cost)…
     pub most: usize,
@@ -213,14 +214,14 @@ pub struct CertificateSettings {
 pub struct PriorSettings {
     /// ln R: coefficients over four decades (judgement: nobody knows beforehand how much a hinge rubs).
     pub sizes: f64,
-    /// The same of yield angles: over a factor of thirty.
+    /// The same of yield angles: over a factor of thirty (judgement).
     pub yields: f64,
-    /// Of a support's frequency, over the swing's.
+    /// Of a support's frequency, over the swing's (judgement).
     pub frequencies: f64,
     /// Standard deviation of the stretch and of the shear of a view, and of a gain: half the square of the angle by which it is askew (judgement: set up by eye, to some 20°).
     pub view: f64,
     /// Coefficients of less than this many standard deviations are not told from zero (statistics).
-    pub told_from_zero: f64,
+    pub min_significance: f64,
     /// From this variance on, over the noise's, a fall of χ² counts instead of a standard deviation (training bank).
     pub much_left: f64,
     /// Of nothing missing, of one effect, of two (judgement: as many of each as a laboratory has).
@@ -251,7 +252,7 @@ pub struct PriorSettings {
     pub support_in_step: f64,
     /// Odds of a name that gains no more than the error of another name's law, and of a support that gains little: its three free numbers complete any law that is only
     /// nearly right (training bank, of supports only).
-    pub completes_a_law: f64,
+    pub within_law_error: f64,
     /// That little, in standard deviations (training bank).
     pub slight: f64,
     /// A clock that jumps by a part of a frame is with these odds a camera's (training bank).
@@ -261,7 +262,7 @@ pub struct PriorSettings {
 /// Which answer that makes.
 #[derive(Debug, Clone)]
 pub struct VerdictSettings {
-    /// A probability from which on something counts as likelier than not.
+    /// A probability from which on something counts as likelier than not (statistics: the median probability model).
     pub even: f64,
     /// An answer stands alone when it is at least this probable (judgement: three to one).
     pub alone: f64,
@@ -278,9 +279,10 @@ pub struct VerdictSettings {
     pub places: f64,
     /// An effect is seen at this many standard deviations (statistics)…
     pub seen: f64,
-    /// … and named when it is this many from its nearest rival.
+    /// … and named when it is this many from its nearest rival (judgement: what the concealed benchmark counts as strong).
     pub named: f64,
-    /// Two effects whose signatures go together by more than this are not named apart at twice the size at which they are seen.
+    /// Two effects whose signatures go together by more than this are not named apart at twice the size at which they are seen (statistics: less than
+    /// 3 σ lie between them there).
     pub confused: f64,
 }
 
@@ -340,7 +342,14 @@ impl Default for NoiseSettings {
 
 impl Default for DescentSettings {
     fn default() -> Self {
-        Self { first_steps: 4, few_steps: 12, most_steps: 30, enough: 0.02, beyond_hope: 10.0, hopeful: 1.2 }
+        Self {
+            first_steps: 4,
+            few_steps: 12,
+            most_steps: 30,
+            enough: 0.02,
+            hopeless_ratio: 10.0,
+            strip_continue_ratio: 1.2,
+        }
     }
 }
 
@@ -364,7 +373,7 @@ impl Default for SearchSettings {
             length_share: 0.005,
             asked: 3,
             pair_seeds: 6,
-            dear_seeds: 3,
+            expensive_seeds: 3,
             far: 100.0,
             afar: 0.01,
             most_pairs: 20,
@@ -372,7 +381,7 @@ impl Default for SearchSettings {
             promising: 3.0,
             leader_leaves: 0.5,
             elsewhere: 0.3,
-            takes_the_pace: 0.1,
+            frequency_match_residual: 0.1,
             hopeless: 10.0,
             far_down: 3.0,
             restart_seeds: 2,
@@ -410,7 +419,7 @@ impl Default for PriorSettings {
             yields: 3.4,
             frequencies: 10.0,
             view: 0.06,
-            told_from_zero: 1.5,
+            min_significance: 1.5,
             much_left: 4.0,
             none: 0.25,
             one: 0.40,
@@ -424,7 +433,7 @@ impl Default for PriorSettings {
             imitated: 0.03,
             not_compared: 0.7,
             support_in_step: 0.8,
-            completes_a_law: 0.35,
+            within_law_error: 0.35,
             slight: 25.0,
             part_of_a_frame: 0.6,
         }

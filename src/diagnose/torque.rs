@@ -2,13 +2,13 @@
 //! recording to follow.
 
 use super::effect::{Phase, Place};
-use super::latent::{Assumed, Filter, Form, Latent};
+use super::latent::{Filter, Form, LatentConfig, LatentForce};
+use super::latent_forces::unknowns;
 use super::linearisation::{Input, Linearisation};
 use super::refit::Refit;
-use super::unknowns::unknowns;
 use super::{energy, noise};
 
-/// A torque that works less than this part of what it could, with the angle or with its rate, has no phase.
+/// A torque that works less than this part of what it could, with the angle or with its rate, has no phase (judgement).
 const NO_PHASE: f64 = 0.3;
 /// Rows in each cycle of a torque whose frequency is told (judgement).
 const ROWS_A_CYCLE: usize = 4;
@@ -39,20 +39,20 @@ pub struct MissingTorque {
 /// The torque that the base model lacks, at a place, or where it explains most, in the recording that the base model reproduces worst; `fit` is the
 /// likeliest one of the table, whose motion follows the recordings.
 pub fn missing(fit: &Refit<'_>, null: &Refit<'_>, at: Option<Place>) -> Option<MissingTorque> {
-    let variance = (fit.chi2 / fit.values() as f64).max(1.0);
-    let worst = |record: &usize| null.left_share_of(*record);
+    let variance = fit.variance_ratio();
+    let worst = |record: &usize| null.relative_residual_of(*record);
     let record = (0..fit.problem.records.len()).max_by(|a, b| worst(a).total_cmp(&worst(b)))?;
-    let around = unknowns(fit, variance, Assumed::INSTEAD);
+    let around = unknowns(fit, variance, LatentConfig::TOTAL);
     let likeliest = around.iter().find(|u| u.gain > 0.0 && at.is_none_or(|place| u.place() == place))?;
     MissingTorque::of(fit, record, likeliest, variance)
 }
 
 impl MissingTorque {
     /// Beside a fit, in one of its recordings; `variance` scales that of the noise.
-    pub fn of(fit: &Refit<'_>, record: usize, unknown: &Latent, variance: f64) -> Option<Self> {
-        let Form::Course(input) = unknown.form else { return None };
+    pub fn of(fit: &Refit<'_>, record: usize, unknown: &LatentForce, variance: f64) -> Option<Self> {
+        let Form::TimeHistory(input) = unknown.form else { return None };
         let around = Linearisation::of(fit, record)?;
-        let course = Filter::new(fit, record, (&around, variance), input, Assumed::INSTEAD)?.course(unknown.size);
+        let course = Filter::new(fit, record, (&around, variance), input, LatentConfig::TOTAL)?.course(unknown.size);
         let rms = (course.iter().map(|c| c.0 * c.0).sum::<f64>() / course.len().max(1) as f64).sqrt();
         let torque: Vec<f64> = course.iter().map(|c| c.0).collect();
         let span_s = around.t_s.last()? - around.t_s.first()?;

@@ -95,11 +95,14 @@ impl Verdict {
         if let Some(replaced) = replaced(posterior, settings) {
             return nothing(Status::Unknown, replaced);
         }
-        Self::naming(weighed, |w| w.probability, unknown, marks, settings)
+        match with_names(weighed).next() {
+            Some(best) => Self::from_best(best, weighed, |w| w.probability, unknown, marks, settings),
+            None => nothing(Status::Unknown, unknown),
+        }
     }
 
     /// Whether something outside the table is at least as likely as the names that are given.
-    pub fn leaves_it_open(&self) -> bool {
+    pub fn is_open(&self) -> bool {
         let names_stand = matches!(self.status, Status::Adequate | Status::Identified);
         self.status == Status::Unknown || self.unknown >= self.class_probability && !names_stand
     }
@@ -116,8 +119,12 @@ impl Verdict {
         if !is_clear {
             class.extend(from(settings.verdict.told_apart).map(|own| own.0).filter(|effect| !effects.contains(effect)));
         }
-        let companions =
-            companions(&posterior.candidates, |w| w.in_layers, (&effects, &class), settings.verdict.told_apart);
+        let companions = companions(
+            &posterior.candidates,
+            |w| w.mixture_probability,
+            (&effects, &class),
+            settings.verdict.told_apart,
+        );
         Self {
             status: if is_clear { Status::Identified } else { Status::Ambiguous },
             to_decide: to_decide(&effects, &without(&class, &companions), marks),
@@ -131,15 +138,14 @@ impl Verdict {
     }
 
     /// The likeliest names and their class.
-    fn naming(
+    fn from_best(
+        best: &Candidate<'_>,
         weighed: &[Candidate<'_>],
         probability: impl Fn(&Candidate<'_>) -> f64,
         unknown: f64,
         marks: usize,
         settings: &Settings,
     ) -> Self {
-        let named: Vec<&Candidate<'_>> = with_names(weighed).collect();
-        let best = named[0];
         let mut class = not_told_apart(weighed, &probability, settings.verdict.told_apart);
         let effects = best.fit.hypothesis.effects.clone();
         let status = if probability(best) >= settings.verdict.alone { Status::Identified } else { Status::Ambiguous };
@@ -148,8 +154,8 @@ impl Verdict {
         }
         let companions = companions(weighed, &probability, (&effects, &class), settings.verdict.told_apart);
         let to_decide = to_decide(&effects, &without(&class, &companions), marks);
-        let within = |w: &&&Candidate<'_>| w.fit.hypothesis.effects.iter().all(|c| class.contains(c));
-        let class_probability = named.iter().filter(within).map(|w| probability(w)).sum();
+        let within = |w: &&Candidate<'_>| w.fit.hypothesis.effects.iter().all(|c| class.contains(c));
+        let class_probability = with_names(weighed).filter(within).map(&probability).sum();
         let probability = probability(best);
         Self { status, effects, class, companions, probability, class_probability, unknown, to_decide }
     }
@@ -157,7 +163,7 @@ impl Verdict {
 
 /// Where a law of no table takes the place of the name that explains most, how likely that is: the other names may complete what is not there.
 fn replaced(posterior: &Posterior<'_>, settings: &Settings) -> Option<f64> {
-    let leading = posterior.by_what_they_explain(posterior.best()).first().copied()?;
+    let leading = posterior.by_contribution(posterior.best()).first().copied()?;
     let needed = posterior.needed.iter().find(|own| own.effect == leading)?;
     (needed.replaced > settings.verdict.even).then_some(needed.replaced)
 }

@@ -59,7 +59,7 @@ pub enum Ending {
     /// No step promises anything more.
     Converged,
     /// After the most steps.
-    LostPatience,
+    StepLimit,
     /// No step makes it better, though one should.
     Stuck,
 }
@@ -113,7 +113,7 @@ impl Descent {
             return None;
         }
         let (mut damping, mut growth) = (self.damping, GROWTH);
-        let mut ending = Ending::LostPatience;
+        let mut ending = Ending::StepLimit;
         let mut steps = 0;
         while steps < self.most_steps {
             if self.judged.is_some_and(|(after, bound)| steps == after && normals.cost >= bound) {
@@ -256,7 +256,7 @@ mod tests {
             let outcome = judged.run(vec![-1.2, 1.0], &[f64::NEG_INFINITY; 2], valley).unwrap();
             (outcome.steps, outcome.ending)
         };
-        assert_eq!(ended(0.0), (2, Ending::LostPatience));
+        assert_eq!(ended(0.0), (2, Ending::StepLimit));
         let (steps, ending) = ended(f64::INFINITY);
         assert!(steps > 2 && ending == Ending::Converged);
     }

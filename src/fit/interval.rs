@@ -8,18 +8,19 @@ use super::problem::stacked;
 use crate::model::Parameter;
 use crate::progress::Progress;
 
-/// 95 % of a normal distribution lie within this many standard deviations.
+/// 95 % of a normal distribution lie within this many standard deviations (statistics).
 const Z95: f64 = 1.959_964;
-/// χ² of one degree of freedom: 95 % lie below.
+/// χ² of one degree of freedom: 95 % lie below (statistics).
 const CHI2_95: f64 = Z95 * Z95;
-/// Lags over which residuals are tested for correlation, and their χ² at 0.1 %.
+/// Lags over which residuals are tested for correlation (judgement), and their χ² at 0.1 % (statistics).
 const LAGS: usize = 10;
 const CHI2_LAGS: f64 = 29.59;
-/// Points of a profile tried for each end of an interval.
+/// Points of a profile tried for each end of an interval (cost).
 const PROFILE_POINTS: usize = 8;
-/// Variance of what is left, over the noise's, beyond which an interval is the curvature's: the model is wrong by more than it can tell.
+/// Variance of what is left, over the noise's, beyond which an interval is the curvature's: the model is wrong by more than it can tell (judgement:
+/// five times the noise).
 const FAR_FROM_NOISE: f64 = 25.0;
-/// A combination of parameters is not determined when its logarithm is less certain than this.
+/// A combination of parameters is not determined when its logarithm is less certain than this (judgement: a factor e).
 const UNDETERMINED: f64 = 1.0;
 
 /// A fitted parameter.
@@ -140,10 +141,11 @@ fn widened(problem: &Problem<'_>, outcome: &Outcome, inverse: &DMatrix<f64>, whi
     for (record, block) in blocks_of_recordings(problem, outcome) {
         let data = &problem.records[record];
         let step_s = (data.t_s[data.len() - 1] - data.t_s[0]) / (data.len() - 1).max(1) as f64;
-        let pace_rad_s =
-            problem.model(record, &outcome.x[..problem.free.len()]).map_or(9.0, |(model, _)| model.pace_rad_s());
+        let characteristic_rad_s = problem
+            .model(record, &outcome.x[..problem.free.len()])
+            .map_or(9.0, |(model, _)| model.characteristic_rad_s());
         // a swing and a half
-        let lags = (1.5 * std::f64::consts::TAU / pace_rad_s / step_s).ceil() as usize;
+        let lags = (1.5 * std::f64::consts::TAU / characteristic_rad_s / step_s).ceil() as usize;
         // the angles of one instant belong together
         let mut scores = DMatrix::<f64>::zeros(variables, data.len());
         for (link, rows) in links_of(problem, record).into_iter().enumerate() {

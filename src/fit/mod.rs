@@ -5,17 +5,17 @@
 //! | [`base`] | what is free unless told otherwise |
 //! | [`record`] | the angles of a recording |
 //! | [`noise`] | its noise, from the table alone |
-//! | [`seen`] | its modes, without the model |
-//! | [`pace`] | how fast it swings beside the specimen: wrong lengths, clocks and units |
-//! | [`horizon`] | how far a motion can be foretold |
+//! | [`observed_modes`] | its modes, without the model |
+//! | [`frequency_check`] | how fast it swings beside the specimen: wrong lengths, clocks and units |
+//! | [`predictability`] | how far a motion can be foretold |
 //! | [`predict`] | what the model says the camera sees |
 //! | [`problem`] | what is fitted to what |
-//! | [`across`] | how the noise of its angles goes together |
-//! | [`begin`] | where a fit begins: with the seen modes |
+//! | [`angle_correlation`] | how the noise of its angles goes together |
+//! | [`start_values`] | where a fit begins: with the seen modes |
 //! | [`shooting`] | multiple shooting: start values that cannot be out of step |
 //! | [`search`] | several beginnings, the best end: the robust fit of `fit` and of a diagnosis' base model |
 //! | [`descent`] | Levenberg–Marquardt with bounds |
-//! | [`straight`] | the variables in which a hysteresis is fitted |
+//! | [`transformed`] | the variables in which a hysteresis is fitted |
 //! | [`interval`] | standard deviations and 95 % intervals |
 //! | [`whitening`] | residuals in units of their noise |
 //! | [`verdict`] | does the model reproduce the recording? |
@@ -23,21 +23,21 @@
 //! Output error: the motion from the first row on is the model's own, and the residual is what the recording shows beyond it. Each recording's
 //! initial angles and rates are free.
 
-pub mod across;
+pub mod angle_correlation;
 pub mod base;
-pub mod begin;
 pub mod descent;
-pub mod horizon;
+pub mod frequency_check;
 pub mod interval;
 pub mod noise;
-pub mod pace;
+pub mod observed_modes;
 pub mod predict;
+pub mod predictability;
 pub mod problem;
 pub mod record;
 pub mod search;
-pub mod seen;
 pub mod shooting;
-pub mod straight;
+pub mod start_values;
+pub mod transformed;
 pub mod verdict;
 pub mod whitening;
 
@@ -49,12 +49,12 @@ use crate::statistics::median;
 
 pub use base::base_parameters;
 pub use descent::{Descent, Ending};
+pub use frequency_check::{Pace, check_frequency};
 pub use interval::Estimate;
-pub use pace::{Pace, refuse_another_pace};
+pub use observed_modes::Seen;
 pub use predict::Prediction;
 pub use problem::{Belief, Problem};
 pub use record::{Record, recordings};
-pub use seen::Seen;
 pub use verdict::Verdict;
 
 /// Residuals beyond this many standard deviations of their neighbours are outliers.
@@ -161,7 +161,7 @@ impl Fit {
 
 /// Fits the free parameters and every recording's start.
 ///
-/// It begins with the values of `experiment.model` and, where these lead nowhere, with those that the recordings' modes say ([`begin`]): each time first
+/// It begins with the values of `experiment.model` and, where these lead nowhere, with those that the recordings' modes say ([`start_values`]): each time first
 /// multiple shooting ([`shooting`]), then whole recordings as one motion each. The best end is descended from once more with outliers left out.
 ///
 /// # Errors
@@ -187,7 +187,7 @@ pub fn fit_watched(
 ) -> Result<Fit> {
     let noise_rad: Vec<Vec<f64>> = records.iter().map(noise::noise_rad).collect();
     let search::End { problem, outcome: first, .. } =
-        search::best_end(records, experiment, free, &noise_rad, progress)?;
+        search::best_robust_fit(records, experiment, free, &noise_rad, progress)?;
     let (kept, outliers) = without_outliers(&problem, &first.x)?;
     let problem = Problem { records: &kept, ..problem };
     let descent = Descent { most_steps: 30, enough: 1e-3, ..Descent::default() };
@@ -222,7 +222,7 @@ pub(crate) fn without_outliers(problem: &Problem<'_>, x: &[f64]) -> Result<(Vec<
                 .filter(|(value, _)| value.link == link)
                 .map(|(value, r)| (value.row, *r))
                 .collect();
-            for row in standing_out(own) {
+            for row in outlier_rows(own) {
                 record.theta_rad[link][row] = None;
                 outliers[index].push(Outlier { link, row });
             }
@@ -232,7 +232,7 @@ pub(crate) fn without_outliers(problem: &Problem<'_>, x: &[f64]) -> Result<(Vec<
 }
 
 /// Rows whose residual stands out; the farthest first, as it moves its neighbours' medians.
-fn standing_out(mut own: Vec<(usize, f64)>) -> Vec<usize> {
+fn outlier_rows(mut own: Vec<(usize, f64)>) -> Vec<usize> {
     let most = own.len() / 50;
     let sizes: Vec<f64> = (0..own.len()).map(|i| apart(&own, i).abs()).collect();
     let scale = |sizes: &[f64]| 1.4826 * median(&mut sizes.to_vec()).unwrap_or(0.0);

@@ -44,7 +44,7 @@ pub struct Problem<'a> {
     /// What is known of free parameters beforehand.
     pub beliefs: Vec<Belief>,
     /// Shapes free at each start beyond the angles between marks.
-    pub further_shapes: usize,
+    pub extra_modes: usize,
     /// What its integrations have cost.
     pub work: Work,
 }
@@ -83,7 +83,7 @@ impl<'a> Problem<'a> {
             accuracy: Accuracy::default(),
             dropped_at_s: vec![f64::INFINITY; records.len()],
             beliefs: Vec::new(),
-            further_shapes: model.start().ncols() - model.chain().groups().len(),
+            extra_modes: model.start().ncols() - model.chain().groups().len(),
             work: Work::default(),
         })
     }
@@ -100,7 +100,7 @@ impl<'a> Problem<'a> {
 
     /// Number of angles, and as many rates, in which each motion starts: those between marks, and further shapes.
     pub fn shapes(&self) -> usize {
-        self.marks() + self.further_shapes
+        self.marks() + self.extra_modes
     }
 
     /// Where a recording's start stands among the variables.
@@ -170,8 +170,8 @@ impl<'a> Problem<'a> {
     /// The same with the shapes of a strip whose hinge has the spring that the variables give it, unless they are alike. A strip starts in its lowest modes, and
     /// those of one that is clamped are no sum of those of one that hangs free.
     #[must_use]
-    pub fn held_as(mut self, x: &[f64]) -> Self {
-        if let Some(spring) = self.hinge_spring(x).filter(|_| !self.is_held_as(x)) {
+    pub fn with_modes_at(mut self, x: &[f64]) -> Self {
+        if let Some(spring) = self.hinge_spring(x).filter(|_| !self.has_modes_at(x)) {
             self.experiment.model.effects.hinge_stiffness = Some(spring);
         }
         self
@@ -179,7 +179,7 @@ impl<'a> Problem<'a> {
 
     /// The same with the shapes of another problem's strip, where both have a spring at the hinge.
     #[must_use]
-    pub fn held_like(mut self, other: &Problem<'_>) -> Self {
+    pub fn with_modes_of(mut self, other: &Problem<'_>) -> Self {
         if [&self, other].iter().all(|problem| problem.free.contains(&Parameter::HingeStiffness)) {
             self.experiment.model.effects.hinge_stiffness = other.experiment.model.effects.hinge_stiffness;
         }
@@ -188,7 +188,7 @@ impl<'a> Problem<'a> {
 
     /// Whether the shapes are those of a strip held as the variables say, to a tenth of the spring at its hinge and of its own K, with which its modes change
     /// less than their amplitudes are told.
-    pub fn is_held_as(&self, x: &[f64]) -> bool {
+    pub fn has_modes_at(&self, x: &[f64]) -> bool {
         let effects = &self.experiment.model.effects;
         let (Some(spring), Some(bending)) = (self.hinge_spring(x), effects.distributed_flexibility) else {
             return true;
@@ -302,7 +302,7 @@ impl<'a> Problem<'a> {
     }
 
     /// Sets the noise to what some residuals (in units of the present noise) say, robustly.
-    pub fn learn_noise(&mut self, residuals: &[(usize, usize, f64)], variables: usize) {
+    pub fn update_noise(&mut self, residuals: &[(usize, usize, f64)], variables: usize) {
         for record in 0..self.records.len() {
             for link in 0..self.marks() {
                 let of = |r: &&(usize, usize, f64)| r.0 == record && r.1 == link;
@@ -406,13 +406,13 @@ mod tests {
         let free = [Parameter::HingeStiffness, Parameter::JointDamping];
         let problem = Problem::new(records, &experiment, &free).unwrap();
         let (loose, clamped) = ([0.0, 1e-7], [1e-2, 1e-7]);
-        assert!(problem.is_held_as(&loose) && !problem.is_held_as(&clamped));
+        assert!(problem.has_modes_at(&loose) && !problem.has_modes_at(&clamped));
         let shapes = |problem: &Problem<'_>| problem.model(0, &clamped).unwrap().0.start();
-        let held = problem.clone().held_as(&clamped);
-        assert!(held.is_held_as(&clamped) && (shapes(&held) - shapes(&problem)).amax() > 0.1);
-        assert_eq!(shapes(&problem.held_like(&held)), shapes(&held));
+        let held = problem.clone().with_modes_at(&clamped);
+        assert!(held.has_modes_at(&clamped) && (shapes(&held) - shapes(&problem)).amax() > 0.1);
+        assert_eq!(shapes(&problem.with_modes_of(&held)), shapes(&held));
         // rods have no shapes that depend on it
         experiment.model.effects.distributed_flexibility = None;
-        assert!(Problem::new(records, &experiment, &free).unwrap().is_held_as(&clamped));
+        assert!(Problem::new(records, &experiment, &free).unwrap().has_modes_at(&clamped));
     }
 }

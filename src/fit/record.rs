@@ -8,8 +8,11 @@ use crate::series::AngleSeries;
 use crate::series::noise::rounding_in_step;
 
 /// Errors of a tracked angle in step with the swing, as a share of its noise: 0.007 px beside a noise of 0.025 to 0.035 px in the training videos of the
-/// concealed benchmark.
+/// concealed benchmark (training bank).
 const TRACKED_IN_STEP: f64 = 0.25;
+
+/// A bend that is not seen: no share of it is zero (numerics).
+const LEAST_BEND_RAD: f64 = 1e-6;
 
 /// One recording of a specimen.
 #[derive(Debug, Clone, PartialEq)]
@@ -23,7 +26,7 @@ pub struct Record {
     /// Relative standard deviation of each value, `[link][row]`: 1 where the table says nothing.
     pub relative_sd: Vec<Vec<f64>>,
     /// Errors in step with the swing that each angle may have, as a share of its noise: none where the table holds nothing but angles.
-    pub in_step: f64,
+    pub synchronous: f64,
     /// The part of an encoder's rounding that is in step with the swing, as a share of its noise ([`rounding_in_step`]). The recorded angles, rounded themselves, do
     /// not show where it is.
     pub rounding: f64,
@@ -34,6 +37,18 @@ pub struct Record {
     pub stated_rad: Vec<f64>,
 }
 
+/// Refuses to fit where there is nothing to fit.
+///
+/// # Errors
+/// [`Error::Simulation`] where there is no recording, or one without rows.
+pub fn refuse_empty(records: &[Record]) -> Result<()> {
+    if records.is_empty() || records.iter().any(Record::is_empty) {
+        let detail = "a recording without rows, or none at all; give tables with angles".to_owned();
+        return Err(Error::Simulation { detail });
+    }
+    Ok(())
+}
+
 impl Record {
     /// Angles that are all known equally well, with nothing but noise in them.
     pub fn uniform(path: impl Into<PathBuf>, t_s: Vec<f64>, theta_rad: Vec<Vec<Option<f64>>>) -> Self {
@@ -42,7 +57,7 @@ impl Record {
             relative_sd: vec![vec![1.0; t_s.len()]; theta_rad.len()],
             t_s,
             theta_rad,
-            in_step: 0.0,
+            synchronous: 0.0,
             rounding: 0.0,
             continues: false,
             stated_rad: Vec::new(),
@@ -70,7 +85,7 @@ impl Record {
             t_s: series.t_s.clone(),
             theta_rad: series.theta_rad.clone(),
             relative_sd,
-            in_step: if series.tracked { TRACKED_IN_STEP } else { 0.0 },
+            synchronous: if series.tracked { TRACKED_IN_STEP } else { 0.0 },
             rounding: if series.tracked { 0.0 } else { rounding_in_step(&series.t_s, &series.theta_rad) },
             continues: false,
             stated_rad: if series.tracked {
@@ -101,7 +116,7 @@ impl Record {
             t_s: self.t_s[rows.clone()].to_vec(),
             theta_rad: self.theta_rad.iter().map(|column| column[rows.clone()].to_vec()).collect(),
             relative_sd: self.relative_sd.iter().map(|column| column[rows.clone()].to_vec()).collect(),
-            in_step: self.in_step,
+            synchronous: self.synchronous,
             rounding: self.rounding,
             continues: self.continues,
             stated_rad: self.stated_rad.clone(),
@@ -142,6 +157,16 @@ impl Record {
     /// The largest angle of any link, to either side.
     pub fn largest_angle_rad(&self) -> f64 {
         self.theta_rad.iter().flatten().flatten().fold(0.0, |most, angle| most.max(angle.abs()))
+    }
+
+    /// The bend that every joint reaches: of each the largest difference of its two angles, of these the least; of one link its largest angle. Never zero.
+    pub fn common_bend_rad(&self) -> f64 {
+        let of = |pair: &[Vec<Option<f64>>]| {
+            let bends = pair[0].iter().zip(&pair[1]).filter_map(|(upper, lower)| Some(((*lower)? - (*upper)?).abs()));
+            bends.fold(0.0, f64::max)
+        };
+        let least = self.theta_rad.windows(2).map(of).reduce(f64::min);
+        least.unwrap_or_else(|| self.largest_angle_rad()).max(LEAST_BEND_RAD)
     }
 
     /// Number of angles.
@@ -237,7 +262,7 @@ mod tests {
 
     fn record(rows: usize) -> Record {
         Record {
-            in_step: 0.25,
+            synchronous: 0.25,
             ..Record::uniform(
                 "made",
                 (0..rows).map(|row| 0.1 * row as f64).collect(),

@@ -1,8 +1,9 @@
 //! Several beginnings, the best end.
 
 use super::descent::{Descent, Outcome};
-use super::shooting::{self, STATE_NEAR, Shot};
-use super::{Problem, Record, begin, straight};
+use super::record::refuse_empty;
+use super::shooting::{self, STATE_WINDOW_RAD, ShootingResult};
+use super::{Problem, Record, start_values, transformed};
 use crate::error::{Error, Result};
 use crate::experiment::{Experiment, Hysteresis, SupportMotion};
 use crate::model::Parameter;
@@ -10,27 +11,28 @@ use crate::progress::Progress;
 use crate::series::FEWEST_ROWS;
 
 /// Mean χ² that a descent may leave in the whole and in so many values in a row, before another beginning is tried. The noise is known to a tenth; of 40 values
-/// the mean scatters by 0.22. Outliers count no more than their bound.
+/// the mean scatters by 0.22. Outliers count no more than their bound (statistics).
 const LEFT: f64 = 1.4;
 const LEFT_ANYWHERE: f64 = 2.5;
 const IN_A_ROW: usize = 40;
 const BOUND: f64 = 4.0;
-/// A descent that leaves more than this, over the variance of the noise, is tried from the values as they are, too.
-const ASTRAY: f64 = 25.0;
-/// Beginnings of a hysteresis: its yield angle as part of the largest bend, its share of the spring; and the part of the recordings that chooses.
+/// A descent that leaves more than this, over the variance of the noise, is tried from the values as they are, too (judgement: five times the noise).
+const POOR_FIT: f64 = 25.0;
+/// Beginnings of a hysteresis: its yield angle as part of the largest bend, its share of the spring (start values); and the part of the recordings that chooses
+/// (cost).
 const YIELDS: [f64; 3] = [0.05, 0.2, 0.6];
 const SPRINGS: [f64; 2] = [0.4, 0.9];
 const BEGINNING: f64 = 0.15;
-/// Parts of the rows that are followed one after the other, before all of them.
+/// Parts of the rows that are followed one after the other, before all of them (numerics: each at most twice the one before).
 pub const PARTS: [f64; 4] = [0.1, 0.2, 0.35, 0.6];
-/// Frequencies of what is left are looked at this finely for the length of the recording, up to this one; and so many of the strongest are begun with.
+/// Frequencies of what is left are looked at this finely for the length of the recording, up to this one; and so many of the strongest are begun with (cost).
 const FINENESS: f64 = 2.0;
 const HIGHEST_HZ: f64 = 20.0;
 const PEAKS: usize = 4;
-/// Another end is better where it leaves less by this part.
+/// Another end is better where it leaves less by this part (judgement).
 const BETTER: f64 = 1e-3;
 /// Beginnings, each of which is a stage.
-pub const STAGES: u64 = begin::MOST + 1;
+pub const STAGES: u64 = start_values::MOST + 1;
 
 /// What all beginnings share.
 #[derive(Clone, Copy)]
@@ -48,7 +50,7 @@ pub struct End<'a> {
     /// With which result.
     pub outcome: Outcome,
     /// Where it began: where short stretches led to.
-    pub shot: Shot,
+    pub shot: ShootingResult,
     /// The experiment with the values from which those began.
     pub begun: Experiment,
 }
@@ -57,15 +59,16 @@ pub struct End<'a> {
 ///
 /// # Errors
 /// [`Error::Simulation`] where the specimen cannot swing, or no motion near any beginning follows the recordings.
-pub fn best_end<'a>(
+pub fn best_robust_fit<'a>(
     records: &'a [Record],
     experiment: &Experiment,
     free: &[Parameter],
     noise_rad: &[Vec<f64>],
     progress: &dyn Progress,
 ) -> Result<End<'a>> {
+    refuse_empty(records)?;
     let search = Search { records, free, noise_rad };
-    let order = begin::beginnings(records, experiment, free);
+    let order = start_values::start_experiments(records, experiment, free);
     let (mut best, mut failed): (Option<End<'a>>, Option<Error>) = (None, None);
     for begun in &order {
         if search.may_find_more(best.as_ref()) {
@@ -76,7 +79,7 @@ pub fn best_end<'a>(
         }
         progress.advance(1);
     }
-    progress.advance(begin::MOST.saturating_sub(order.len() as u64));
+    progress.advance(start_values::MOST.saturating_sub(order.len() as u64));
     if free.contains(&Parameter::HysteresisTorque) && search.may_find_more(best.as_ref()) {
         let yielding = search.with_hysteresis(order.last().unwrap_or(experiment), best.as_ref())?;
         best = better(best, yielding.map_or(Ok(None), |begun| search.from(&begun))?);
@@ -112,7 +115,7 @@ pub fn refused() -> Error {
 
 /// Descends in the variables that suit the problem; the blocks at the end are those of its own.
 pub fn descend(problem: &Problem<'_>, descent: &Descent, x: Vec<f64>) -> Option<Outcome> {
-    let outcome = straight::descend(problem, descent, x)?;
+    let outcome = transformed::descend(problem, descent, x)?;
     let blocks = problem.blocks(&outcome.x)?;
     Some(Outcome { blocks, ..outcome })
 }
@@ -122,7 +125,7 @@ impl<'a> Search<'a, '_> {
         let mut problem = Problem::new(self.records, experiment, self.free)?;
         // without parameters nothing but the starts is sought, which the recording shows
         let shot = if self.free.is_empty() {
-            Shot { x: seen_starts(&problem)?, noise: problem.noise.clone(), residuals: Vec::new() }
+            ShootingResult { x: observed_starts(&problem)?, noise: problem.noise.clone(), residuals: Vec::new() }
         } else {
             shooting::multiple_shooting(&mut problem)?
         };
@@ -138,14 +141,14 @@ impl<'a> Search<'a, '_> {
         let from_stretches = descend(&problem, &robust, shot.x.clone());
         let is_astray = |end: &Outcome| {
             // a stop has a false minimum at every turn: no end is worse than where it could have begun
-            end.cost > ASTRAY * end.residuals() as f64 || problem.cost(&stated) < end.cost
+            end.cost > POOR_FIT * end.residuals() as f64 || problem.cost(&stated) < end.cost
         };
         let again = !self.free.is_empty() && from_stretches.as_ref().is_none_or(is_astray);
         let from_stated = if again { descend(&problem, &robust, stated) } else { None };
         let ends = [from_stretches, from_stated].into_iter().flatten();
         let best = ends.min_by(|a, b| a.cost.total_cmp(&b.cost));
         Ok(best.map(|outcome| {
-            let (problem, outcome) = straight::as_held(problem, &robust, outcome);
+            let (problem, outcome) = transformed::update_strip_modes(problem, &robust, outcome);
             End { problem, outcome, shot, begun: experiment.clone() }
         }))
     }
@@ -172,11 +175,11 @@ impl<'a> Search<'a, '_> {
         if beginning.iter().any(|record| record.values(0..record.len()) < 4 * end.x.len()) {
             return Ok(None);
         }
-        let largest_rad = self.records.iter().map(largest_bend_rad).fold(0.0, f64::max);
+        let common_rad = self.records.iter().map(Record::common_bend_rad).fold(0.0, f64::max);
         let mut found: Option<(f64, Experiment)> = None;
         for (share_of_bend, share_of_spring) in YIELDS.iter().flat_map(|y| SPRINGS.iter().map(move |s| (y, s))) {
             let mut tried = experiment.clone();
-            let (model, yield_rad) = (&mut tried.model, share_of_bend * largest_rad);
+            let (model, yield_rad) = (&mut tried.model, share_of_bend * common_rad);
             let torque_n_m = share_of_spring * model.k_eq_n_m_per_rad * yield_rad;
             model.effects.joint_hysteretic = Some(Hysteresis { torque_n_m, yield_rad });
             model.k_eq_n_m_per_rad *= 1.0 - share_of_spring;
@@ -205,7 +208,7 @@ impl<'a> Search<'a, '_> {
             let early: Vec<Record> = self.records.iter().map(|record| record.until(rows(record))).collect();
             let problem = Problem { records: &early, ..end.problem.clone() };
             let robust = Descent { huber: 4.0, most_steps: 20, enough: 0.1, ..Descent::default() };
-            x = straight::descend(&problem, &robust, x)?.x;
+            x = transformed::descend(&problem, &robust, x)?.x;
         }
         let robust = Descent { huber: 4.0, most_steps: 30, enough: 0.03, ..Descent::default() };
         let outcome = descend(&end.problem, &robust, x)?;
@@ -236,7 +239,7 @@ impl<'a> Search<'a, '_> {
             x.extend_from_slice(&end.outcome.x[free.len()..]);
             let robust = Descent { huber: 4.0, most_steps: 30, enough: 0.03, damping: 1e-8, ..Descent::default() };
             let outcome = descend(&problem, &robust, x.clone());
-            let shot = Shot { x, ..end.shot.clone() };
+            let shot = ShootingResult { x, ..end.shot.clone() };
             ends.extend(outcome.map(|outcome| End { problem, outcome, shot, begun: tried }));
         }
         Ok(ends)
@@ -273,22 +276,13 @@ fn strongest_hz(end: &End<'_>) -> Vec<f64> {
 ///
 /// # Errors
 /// [`Error::Simulation`] where the specimen cannot swing.
-pub fn seen_starts(problem: &Problem<'_>) -> Result<Vec<f64>> {
-    let reach_s = STATE_NEAR / problem.model(0, &[])?.0.pace_rad_s();
-    let further = vec![0.0; problem.further_shapes];
+pub fn observed_starts(problem: &Problem<'_>) -> Result<Vec<f64>> {
+    let reach_s = STATE_WINDOW_RAD / problem.model(0, &[])?.0.characteristic_rad_s();
+    let further = vec![0.0; problem.extra_modes];
     let of = |record: &Record| {
         let near = record.state_near(0, reach_s);
         let column = |i: usize| near.iter().map(move |n| n[i]).collect::<Vec<_>>();
         [column(0), further.clone(), column(1), further.clone()].concat()
     };
     Ok(problem.records.iter().flat_map(of).collect())
-}
-
-/// Largest measured difference of two neighbouring angles.
-fn largest_bend_rad(record: &Record) -> f64 {
-    let of = |pair: &[Vec<Option<f64>>]| {
-        let bends = pair[0].iter().zip(&pair[1]).filter_map(|(upper, lower)| Some(((*lower)? - (*upper)?).abs()));
-        bends.fold(0.0, f64::max)
-    };
-    record.theta_rad.windows(2).map(of).fold(1e-6, f64::max)
 }

@@ -19,9 +19,9 @@ use crate::model::Camera;
 use crate::statistics::median;
 
 /// A start is read off values this near, in radians of the model's pace: wide enough to even out the noise, short enough for a cubic to follow the second mode.
-pub const STATE_NEAR: f64 = 0.35;
+pub const STATE_WINDOW_RAD: f64 = 0.35;
 /// Standard deviations of the seams (in units of the noise), from loose to tight.
-const SEAMS: [f64; 2] = [100.0, 5.0];
+const DEFECT_SDS: [f64; 2] = [100.0, 5.0];
 /// Steps of the descent for each.
 const STEPS_EACH: usize = 12;
 /// Length of a stretch, in periods of the model's pace.
@@ -61,7 +61,7 @@ impl Stretch {
 
 /// Where multiple shooting ends.
 #[derive(Debug, Clone)]
-pub struct Shot {
+pub struct ShootingResult {
     /// The parameters, then each recording's start.
     pub x: Vec<f64>,
     /// The noise by which it was found.
@@ -74,14 +74,14 @@ pub struct Shot {
 ///
 /// # Errors
 /// [`crate::Error::Simulation`] where the specimen cannot swing.
-pub fn multiple_shooting(problem: &mut Problem<'_>) -> Result<Shot> {
+pub fn multiple_shooting(problem: &mut Problem<'_>) -> Result<ShootingResult> {
     let (model, _) = problem.model(0, &[])?;
-    let pace_rad_s = model.pace_rad_s();
-    let stretches = stretches(problem, PERIODS * std::f64::consts::TAU / pace_rad_s);
+    let characteristic_rad_s = model.characteristic_rad_s();
+    let stretches = stretches(problem, PERIODS * std::f64::consts::TAU / characteristic_rad_s);
     let marks = problem.marks();
     let mut x = problem.start_values()?;
     // wide enough to even out the noise, short enough for a cubic to follow the second mode
-    let reach_s = STATE_NEAR / pace_rad_s;
+    let reach_s = STATE_WINDOW_RAD / characteristic_rad_s;
     let mut left: Vec<Vec<Vec<f64>>> = vec![vec![Vec::new(); marks]; problem.records.len()];
     for stretch in &stretches {
         let near = problem.records[stretch.record].state_near(stretch.rows.start, reach_s);
@@ -95,7 +95,7 @@ pub fn multiple_shooting(problem: &mut Problem<'_>) -> Result<Shot> {
             *noise = median(left).unwrap_or(1e-3).clamp(1e-6, 0.05).max(least_rad);
         }
     }
-    Ok(drawn_together(problem, &stretches, x, pace_rad_s, true))
+    Ok(close_defects(problem, &stretches, x, characteristic_rad_s, true))
 }
 
 /// The same from a motion that follows the recordings already, whatever model it is of: the stretches begin where that motion is, so that no parameters near these
@@ -107,22 +107,22 @@ pub fn shooting_along(
     problem: &mut Problem<'_>,
     parameters: &[f64],
     state: impl Fn(usize, usize) -> Vec<f64>,
-) -> Result<Shot> {
-    let pace_rad_s = problem.model(0, parameters)?.0.pace_rad_s();
-    let stretches = stretches(problem, PERIODS * std::f64::consts::TAU / pace_rad_s);
+) -> Result<ShootingResult> {
+    let characteristic_rad_s = problem.model(0, parameters)?.0.characteristic_rad_s();
+    let stretches = stretches(problem, PERIODS * std::f64::consts::TAU / characteristic_rad_s);
     let mut x = parameters.to_vec();
     stretches.iter().for_each(|stretch| x.extend(state(stretch.record, stretch.rows.start)));
-    Ok(drawn_together(problem, &stretches, x, pace_rad_s, false))
+    Ok(close_defects(problem, &stretches, x, characteristic_rad_s, false))
 }
 
 /// Stretches with starts of their own, their seams ever tighter; `learns` the noise from what the loosest leave.
-fn drawn_together(
+fn close_defects(
     problem: &mut Problem<'_>,
     stretches: &[Stretch],
     mut x: Vec<f64>,
-    pace_rad_s: f64,
+    characteristic_rad_s: f64,
     learns: bool,
-) -> Shot {
+) -> ShootingResult {
     let (free, marks) = (problem.free.len(), problem.marks());
     let mut lower = problem.lower();
     lower.truncate(free);
@@ -131,16 +131,18 @@ fn drawn_together(
         stretches.iter().map(|s| s.until_s - problem.records[s.record].t_s[s.rows.start]).fold(0.0, f64::max);
     problem.accuracy = problem.accuracy_of(longest_s, 3e-6);
     let mut left_by_stretches = Vec::new();
-    for (round, seam) in SEAMS.iter().enumerate() {
+    for (round, seam) in DEFECT_SDS.iter().enumerate() {
         let descent = Descent { huber: 4.0, most_steps: STEPS_EACH, enough: 0.3, ..Descent::default() };
-        let Some(outcome) = descent.run(x.clone(), &lower, |x| blocks(problem, stretches, x, *seam, pace_rad_s)) else {
+        let Some(outcome) =
+            descent.run(x.clone(), &lower, |x| blocks(problem, stretches, x, *seam, characteristic_rad_s))
+        else {
             break;
         };
         x = outcome.x;
         if round == 0 && learns {
             left_by_stretches = residuals(problem, stretches, &x);
             let variables = x.len();
-            problem.learn_noise(&left_by_stretches, variables);
+            problem.update_noise(&left_by_stretches, variables);
         }
     }
     let mut whole = x[..free].to_vec();
@@ -149,11 +151,11 @@ fn drawn_together(
             let start = free + index * 2 * marks;
             for half in x[start..start + 2 * marks].chunks(marks) {
                 whole.extend_from_slice(half);
-                whole.extend(vec![0.0; problem.further_shapes]);
+                whole.extend(vec![0.0; problem.extra_modes]);
             }
         }
     }
-    Shot { x: whole, noise: problem.noise.clone(), residuals: left_by_stretches }
+    ShootingResult { x: whole, noise: problem.noise.clone(), residuals: left_by_stretches }
 }
 
 fn stretches(problem: &Problem<'_>, length_s: f64) -> Vec<Stretch> {
@@ -186,8 +188,14 @@ fn cut(index: usize, record: &Record, length_s: f64, wanted: usize) -> Vec<Stret
         .collect()
 }
 
-fn blocks(problem: &Problem<'_>, stretches: &[Stretch], x: &[f64], seam: f64, pace_rad_s: f64) -> Option<Vec<Block>> {
-    let of = |index: usize| of_stretch(problem, stretches, index, x, seam, pace_rad_s);
+fn blocks(
+    problem: &Problem<'_>,
+    stretches: &[Stretch],
+    x: &[f64],
+    seam: f64,
+    characteristic_rad_s: f64,
+) -> Option<Vec<Block>> {
+    let of = |index: usize| of_stretch(problem, stretches, index, x, seam, characteristic_rad_s);
     let of_stretches: Option<Vec<_>> = (0..stretches.len()).into_par_iter().map(of).collect();
     let seams_beside = of_stretches?.into_iter().flat_map(|(own, seam)| std::iter::once(own).chain(seam));
     Some(problem.belief_block(x).into_iter().chain(seams_beside).collect())
@@ -200,7 +208,7 @@ fn of_stretch(
     index: usize,
     x: &[f64],
     seam: f64,
-    pace_rad_s: f64,
+    characteristic_rad_s: f64,
 ) -> Option<(Block, Option<Block>)> {
     let (free, marks) = (problem.free.len(), problem.marks());
     let stretch = &stretches[index];
@@ -222,7 +230,7 @@ fn of_stretch(
     let mut residual = DVector::zeros(2 * marks);
     for row in 0..2 * marks {
         let noise_rad = problem.noise[stretch.record].sd_rad[row % marks];
-        let weight = 1.0 / (seam * noise_rad * if row < marks { 1.0 } else { pace_rad_s });
+        let weight = 1.0 / (seam * noise_rad * if row < marks { 1.0 } else { characteristic_rad_s });
         residual[row] = weight * (end[row] - x[next + row]);
         slopes[(row, free + 2 * marks + row)] = -1.0;
         slopes.row_mut(row).scale_mut(weight);

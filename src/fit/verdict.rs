@@ -3,23 +3,24 @@
 use super::{Ending, Fit, Residuals};
 use crate::model::Parameter;
 
-/// A window whose mean square exceeds the noise's by chance less often than this, all windows taken together, is a misfit.
+/// A window whose mean square exceeds the noise's by chance less often than this, all windows taken together, is a misfit (statistics: 0.1 %).
 const CHANCE: f64 = 1e-3;
 
-/// The noise itself is known to about this share.
+/// The noise itself is known to about this share (judgement).
 const NOISE_SHARE: f64 = 0.1;
 
-/// A model that reproduces a recording explains this part of each angle's variance; where the noise is more than the rest, nobody can tell.
+/// A model that reproduces a recording explains this part of each angle's variance; where the noise is more than the rest, nobody can tell (judgement).
 const EXPLAINED: f64 = 0.9;
-/// Fewer swings than this are told by their start alone.
+/// Fewer swings than this are told by their start alone (judgement).
 const FEWEST_SWINGS: f64 = 2.0;
-/// A swing is seen where it crosses the middle by this many times the noise to either side.
+/// A swing is seen where it crosses the middle by this many times the noise to either side (statistics: 3 σ).
 const CROSSING: f64 = 3.0;
 
-/// Errors of a clock and of a scale that a camera may have.
+/// Errors of a clock and of a scale that a camera may have (judgement).
 const CLOCK: f64 = 0.05;
 const GAIN: f64 = 0.3;
-/// A camera set up by eye before a swing looks no further askew than half a right angle: a stretch or a shear of about as much as this.
+/// A camera set up by eye before a swing looks no further askew than half a right angle: a stretch or a shear of about as much as this (judgement: half
+/// the square of that angle).
 const VIEW: f64 = 0.3;
 
 /// Why a residual without a misfit is no proof that the model reproduces the recording.

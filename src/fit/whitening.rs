@@ -1,7 +1,7 @@
 //! Residuals in units of their noise: divided by it, less what the noise before and beside foretells, and with errors in step with the swing discounted.
 //!
 //! A value's noise has the standard deviation σ. The share s of its variance goes on from row to row with the correlation ρ, the rest is white; what is
-//! new in it goes with that of the other angles ([`super::across`]). Beside it a tracked angle has errors that come again whenever the
+//! new in it goes with that of the other angles ([`super::angle_correlation`]). Beside it a tracked angle has errors that come again whenever the
 //! specimen is where it was: what a mark stands on shifts it by a hundredth of a pixel, and turns with the strip. They are Φb, b normal of unit variance:
 //!
 //! ```text
@@ -20,13 +20,16 @@ use nalgebra::{DMatrix, DVector};
 use smallvec::SmallVec;
 
 use super::Problem;
-use super::across::{Across, Memo};
+use super::angle_correlation::{Across, ConditionalCache};
 use super::predict::Value;
 use super::record::Record;
 use crate::statistics::median_step_s;
 
-/// Shapes of an error in step with the swing, of each angle.
-pub const IN_STEP_SHAPES: usize = 4;
+/// Shapes of an error in step with the swing, of each angle: those of Φ above.
+pub const SYNCHRONOUS_TERMS: usize = 4;
+/// Correlations from row to row that differ by less than this are one (judgement: less than the uncertainty of one over 1000 values, as of the noise that a
+/// diagnosis learns again).
+const SAME_CORRELATION: f64 = 0.03;
 
 /// How noise goes on from row to row: a part of it as a first-order autoregression, beside white noise.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
@@ -46,7 +49,8 @@ impl Colour {
     /// Whether it makes a difference which of the two it is: in the variance that goes on, or for how long.
     pub fn differs_from(self, other: Self) -> bool {
         let first = |colour: Self| colour.rho * colour.share;
-        (first(self) - first(other)).abs() > 0.03 || first(self) > 0.0 && (self.rho - other.rho).abs() > 0.03
+        (first(self) - first(other)).abs() > SAME_CORRELATION
+            || first(self) > 0.0 && (self.rho - other.rho).abs() > SAME_CORRELATION
     }
 }
 
@@ -60,14 +64,14 @@ pub struct RecordNoise {
     /// Correlations of what is new in the angles' noise at a row.
     pub across: Across,
     /// Errors in step with the swing that each angle may have, as a share of its noise.
-    pub in_step: f64,
+    pub synchronous: f64,
 }
 
 impl RecordNoise {
     /// White and independent.
     pub fn white(sd_rad: Vec<f64>) -> Self {
         let across = Across::none(sd_rad.len());
-        Self { colour: vec![Colour::default(); sd_rad.len()], sd_rad, across, in_step: 0.0 }
+        Self { colour: vec![Colour::default(); sd_rad.len()], sd_rad, across, synchronous: 0.0 }
     }
 
     /// Whether every row is new.
@@ -111,7 +115,7 @@ pub struct Whitening {
     /// What the values of the angles above at the same row say of each; nothing where no angle says anything of another.
     beside: Vec<Beside>,
     /// Ψ and λ.
-    in_step: Option<(DMatrix<f64>, DVector<f64>)>,
+    synchronous: Option<(DMatrix<f64>, DVector<f64>)>,
 }
 
 impl Whitening {
@@ -122,18 +126,18 @@ impl Whitening {
             weights: values.iter().map(|v| 1.0 / problem.sd_rad(record, v.link, v.row)).collect(),
             foretold: foretold(problem, record, values),
             beside: beside(data, &problem.noise[record].across, values),
-            in_step: None,
+            synchronous: None,
         };
-        if problem.noise[record].in_step > 0.0 {
-            let shapes = in_step_shapes(data, &problem.noise[record]);
-            let mut phi = DMatrix::zeros(values.len(), data.links() * IN_STEP_SHAPES);
+        if problem.noise[record].synchronous > 0.0 {
+            let shapes = synchronous_basis(data, &problem.noise[record]);
+            let mut phi = DMatrix::zeros(values.len(), data.links() * SYNCHRONOUS_TERMS);
             for (i, value) in values.iter().enumerate() {
                 let own = shapes[value.link][value.row];
-                (0..IN_STEP_SHAPES).for_each(|k| phi[(i, value.link * IN_STEP_SHAPES + k)] = own[k]);
+                (0..SYNCHRONOUS_TERMS).for_each(|k| phi[(i, value.link * SYNCHRONOUS_TERMS + k)] = own[k]);
             }
             whitening.apply(&mut phi);
             let eigen = phi.tr_mul(&phi).symmetric_eigen();
-            whitening.in_step = Some((phi * &eigen.eigenvectors, eigen.eigenvalues));
+            whitening.synchronous = Some((phi * &eigen.eigenvectors, eigen.eigenvalues));
         }
         whitening
     }
@@ -178,7 +182,7 @@ impl Whitening {
 
     /// (1 + ΦΦᵀ)^power of a column.
     fn stretch(&self, column: &mut [f64], power: f64) {
-        let Some((shapes, lambda)) = &self.in_step else { return };
+        let Some((shapes, lambda)) = &self.synchronous else { return };
         for (shape, lambda) in shapes.column_iter().zip(lambda.iter().map(|l| l.max(1e-12))) {
             let along: f64 = shape.iter().zip(column.iter()).map(|(a, b)| a * b).sum();
             let size = along * ((1.0 + lambda).powf(power) - 1.0) / lambda;
@@ -217,7 +221,7 @@ fn beside(record: &Record, across: &Across, values: &[Value]) -> Vec<Beside> {
     }
     let mut place = vec![vec![None; record.len()]; record.links()];
     values.iter().enumerate().for_each(|(i, value)| place[value.link][value.row] = Some(i));
-    let mut memo = Memo::new(across);
+    let mut memo = ConditionalCache::new(across);
     let of = |value: &Value| {
         let above: SmallVec<[usize; 4]> = (0..value.link).filter(|link| place[*link][value.row].is_some()).collect();
         let places = above.iter().filter_map(|link| place[*link][value.row]);
@@ -228,7 +232,7 @@ fn beside(record: &Record, across: &Across, values: &[Value]) -> Vec<Beside> {
 }
 
 /// Errors in step with the swing that each angle may have (rad), `[link][row]`.
-pub fn in_step_shapes(record: &Record, noise: &RecordNoise) -> Vec<Vec<[f64; IN_STEP_SHAPES]>> {
+pub fn synchronous_basis(record: &Record, noise: &RecordNoise) -> Vec<Vec<[f64; SYNCHRONOUS_TERMS]>> {
     let of_unit_size = |values: Vec<f64>| -> Vec<f64> {
         let rms = (values.iter().map(|v| v * v).sum::<f64>() / values.len().max(1) as f64).sqrt();
         values.iter().map(|v| v / rms.max(1e-300)).collect()
@@ -240,7 +244,7 @@ pub fn in_step_shapes(record: &Record, noise: &RecordNoise) -> Vec<Vec<[f64; IN_
         let cube = of_unit_size(angle.iter().map(|a| a.powi(3)).collect());
         let bend = |row: usize| Some(next?[row]? - angles[row]?);
         let bend = of_unit_size((0..record.len()).map(|row| bend(row).unwrap_or(0.0)).collect());
-        let size = noise.in_step * noise.sd_rad[link];
+        let size = noise.synchronous * noise.sd_rad[link];
         (0..record.len()).map(|row| [1.0, angle[row], cube[row], bend[row]].map(|shape| size * shape)).collect()
     };
     (0..record.links()).map(of).collect()
@@ -258,7 +262,7 @@ mod tests {
             t_s.iter().map(|t| Some(size * (6.0 * t).cos() + other * (17.0 * t).sin())).collect::<Vec<_>>()
         };
         let theta_rad = vec![angle(0.4, 0.02), angle(0.5, -0.05)];
-        Record { in_step: 0.25, ..Record::uniform("made", t_s, theta_rad) }
+        Record { synchronous: 0.25, ..Record::uniform("made", t_s, theta_rad) }
     }
 
     /// The 200 rows of so many angles that are seen.
@@ -290,11 +294,12 @@ mod tests {
         let records = [record()];
         let mut problem = Problem::new(&records, &Experiment::default(), &[]).unwrap();
         let colour = vec![Colour { rho: 0.3, share: 1.0 }, Colour::default()];
-        let noise = RecordNoise { sd_rad: vec![1e-3, 2e-3], colour, across: Across::of(2, |_, _| -0.6), in_step: 0.25 };
+        let noise =
+            RecordNoise { sd_rad: vec![1e-3, 2e-3], colour, across: Across::of(2, |_, _| -0.6), synchronous: 0.25 };
         problem.noise = vec![noise.clone()];
         let values = values(2, |_, _| true);
         // the covariance as it is stated: coloured noise and errors in step
-        let shapes = in_step_shapes(&records[0], &noise);
+        let shapes = synchronous_basis(&records[0], &noise);
         let stationary = (1.0 - 0.3f64.powi(2)).sqrt() * -0.6;
         let covariance = DMatrix::from_fn(400, 400, |i, j| {
             let (a, b) =
@@ -304,8 +309,8 @@ mod tests {
             let sizes = noise.sd_rad[a.link] * noise.sd_rad[b.link];
             if a.link == b.link {
                 let (one, other) = (shapes[a.link][a.row], shapes[b.link][b.row]);
-                let in_step: f64 = one.iter().zip(&other).map(|(x, y)| x * y).sum();
-                return sizes * noise.colour[a.link].rho.powi(steps) + in_step;
+                let synchronous: f64 = one.iter().zip(&other).map(|(x, y)| x * y).sum();
+                return sizes * noise.colour[a.link].rho.powi(steps) + synchronous;
             }
             // the first angle remembers what both had at an earlier row, the second one forgets
             let at_once = if b.row == 0 { -0.6 } else { stationary };

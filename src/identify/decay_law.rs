@@ -7,7 +7,7 @@ use serde::Serialize;
 
 use super::estimate::{Estimate, chi_squared_tail, f_tail};
 use super::numerics::{central_differences, runge_kutta};
-use super::windows::{FEWEST_OF_A_LAW, Moment};
+use super::windows::{FEWEST_OF_A_LAW, WindowAmplitude};
 
 /// dA/dt = −(b₀ + b₁A + b₂A²).
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
@@ -43,7 +43,7 @@ impl Widening {
 
 impl DecayLaw {
     /// The three-term law, with a test against the viscous one.
-    pub(super) fn of(moments: &[Moment], exponential: &DecayFit) -> Option<Self> {
+    pub(super) fn of(moments: &[WindowAmplitude], exponential: &DecayFit) -> Option<Self> {
         if moments.len() < FEWEST_OF_A_LAW {
             return None;
         }
@@ -76,7 +76,7 @@ impl DecayFit {
     }
 
     /// Fits the wanted terms.
-    pub(super) fn of(moments: &[Moment], wanted: [bool; 3]) -> Option<Self> {
+    pub(super) fn of(moments: &[WindowAmplitude], wanted: [bool; 3]) -> Option<Self> {
         let (first, last) = (moments.first()?, moments.last()?);
         let rate = (first.amplitude_rad() / last.amplitude_rad()).ln() / (last.t_s - first.t_s);
         let largest = first.amplitude_rad();
@@ -108,7 +108,7 @@ impl DecayFit {
 
 /// Least squares of the decay law's amplitudes.
 struct DecayProblem<'a> {
-    moments: &'a [Moment],
+    moments: &'a [WindowAmplitude],
     active: Vec<usize>,
     scale: [f64; 4],
     scaled: DVector<f64>,

@@ -24,7 +24,7 @@ use serde::Serialize;
 
 use super::decay_law::{DecayFit, DecayLaw, Widening};
 use super::estimate::{Estimate, chi_squared_tail, f_tail};
-use super::windows::{FEWEST_OF_A_LAW, Moment, Windows};
+use super::windows::{FEWEST_OF_A_LAW, WindowAmplitude, Windows};
 use crate::series::Measured;
 
 /// κ of a pendulum (1/rad²), f = f₀(1 − κA²).
@@ -108,7 +108,7 @@ impl Envelope {
                 windows.window_s
             ));
         }
-        let others: Vec<&[Moment]> =
+        let others: Vec<&[WindowAmplitude]> =
             windows.moments.iter().enumerate().filter(|(m, _)| *m != mode).map(|(_, w)| w.as_slice()).collect();
         let exponential =
             DecayFit::of(moments, [false, true, false]).ok_or("the amplitudes do not converge to a decay")?;
@@ -137,7 +137,7 @@ impl Envelope {
 
 impl Envelope {
     /// With intervals that allow for other modes of these amplitudes, where the windows do not follow them.
-    pub(super) fn beside_unfollowed(mut self, others_rad: impl Iterator<Item = f64>) -> Self {
+    pub(super) fn widened_for_other_modes(mut self, others_rad: impl Iterator<Item = f64>) -> Self {
         let fourth: f64 = others_rad.map(|a| a.powi(4)).sum();
         let squares = fourth.sqrt();
         let [kappa, lambda] = [Bounds::OTHER.kappa[1], Bounds::OTHER.lambda[1]].map(|sd| sd * squares);
@@ -158,20 +158,20 @@ impl Envelope {
     /// A frequency with an interval that holds those of the steps.
     pub(super) fn over_steps(&self, frequency_hz: Estimate) -> Estimate {
         let steps = self.steps.iter().map(|s| s.frequency_hz.value);
-        steps.fold(frequency_hz, |range, f_hz| range.covering(f_hz, f_hz))
+        steps.fold(frequency_hz, |range, f_hz| range.widened_to_cover(f_hz, f_hz))
     }
 
     /// ξ as if there were a linear damper, stretched to what the steps show that tell it to a tenth.
     pub fn damping_over_the_record(&self) -> Estimate {
         let certain = |s: &&Step| s.damping_ratio.sd < 0.1 * s.damping_ratio.value;
         let steps = self.steps.iter().filter(certain).map(|s| s.damping_ratio.value);
-        steps.fold(self.damping_ratio, |range, xi| range.covering(xi, xi))
+        steps.fold(self.damping_ratio, |range, xi| range.widened_to_cover(xi, xi))
     }
 }
 
 /// Phases without jumps. Neighbours are joined by the frequency found within their windows; where the mode has become weak, by that of the step
 /// before, which is sharper.
-fn unwrapped(moments: &[Moment]) -> Vec<f64> {
+fn unwrapped(moments: &[WindowAmplitude]) -> Vec<f64> {
     let mut phases: Vec<f64> = moments.first().map(|m| m.amplitude_rad.arg()).into_iter().collect();
     let mut before: Option<f64> = None;
     for pair in moments.windows(2) {
@@ -187,7 +187,7 @@ fn unwrapped(moments: &[Moment]) -> Vec<f64> {
     phases
 }
 
-fn steps(moments: &[Moment], phases: &[f64]) -> Vec<Step> {
+fn steps(moments: &[WindowAmplitude], phases: &[f64]) -> Vec<Step> {
     let pair = |k: usize| {
         let (a, b) = (&moments[k], &moments[k + 1]);
         let (from, to) = (a.amplitude_rad(), b.amplitude_rad());
@@ -248,7 +248,7 @@ struct Term {
 
 /// Windows against time and amplitudes.
 struct Regression<'a> {
-    moments: &'a [Moment],
+    moments: &'a [WindowAmplitude],
     terms: Vec<Term>,
     quartic: Term,
 }
@@ -264,7 +264,7 @@ struct Slope {
 }
 
 impl<'a> Regression<'a> {
-    fn of(moments: &'a [Moment], others: &[&[Moment]], bounds: Bounds) -> Self {
+    fn of(moments: &'a [WindowAmplitude], others: &[&[WindowAmplitude]], bounds: Bounds) -> Self {
         let Bounds { kappa, lambda, .. } = bounds;
         let mut terms = vec![Term { integral: powers(moments, moments, 2), kappa, lambda }];
         terms.extend(others.iter().map(|other| Term {
@@ -356,8 +356,9 @@ impl<'a> Regression<'a> {
 }
 
 /// ∫Aᵖ dt from the first of `moments` to each of them, A taken from `source`; zero where `source` has died away.
-fn powers(moments: &[Moment], source: &[Moment], power: i32) -> Vec<f64> {
-    let amplitude = |t: f64| source.iter().find(|m| (m.t_s - t).abs() < 1e-9).map_or(0.0, Moment::amplitude_rad);
+fn powers(moments: &[WindowAmplitude], source: &[WindowAmplitude], power: i32) -> Vec<f64> {
+    let amplitude =
+        |t: f64| source.iter().find(|m| (m.t_s - t).abs() < 1e-9).map_or(0.0, WindowAmplitude::amplitude_rad);
     let mut sum = 0.0;
     let mut integral = vec![0.0];
     for pair in moments.windows(2) {

@@ -51,7 +51,7 @@ impl Estimate {
 
     /// The interval stretched to hold these values, too.
     #[must_use]
-    pub fn covering(self, low: f64, high: f64) -> Self {
+    pub fn widened_to_cover(self, low: f64, high: f64) -> Self {
         let (low, high) = (self.low.min(low), self.high.max(high));
         Self { value: self.value, sd: self.sd.max((high - low) / 4.0), low, high }
     }
@@ -120,7 +120,7 @@ mod tests {
     fn an_interval_can_be_scaled_and_stretched() {
         let e = Estimate::new(2.0, 0.1, 1e9).times(-10.0);
         assert!((e.value + 20.0).abs() < 1e-12 && (e.low + 21.96).abs() < 1e-2 && (e.high + 18.04).abs() < 1e-2);
-        let wide = e.covering(-30.0, -19.0);
+        let wide = e.widened_to_cover(-30.0, -19.0);
         assert!(wide.low == -30.0 && wide.high == e.high && wide.holds(-29.0) && !wide.holds(0.0));
     }
 }

@@ -136,9 +136,9 @@ impl Estimators {
             return [f_hz, xi];
         }
         let Some([f_ends, xi_ends]) = over_stretches(whole.signal, whole.fit) else { return [f_hz, xi] };
-        let covering = |own: Estimate, [low, high]: [f64; 2]| own.covering(low, high);
+        let widened_to_cover = |own: Estimate, [low, high]: [f64; 2]| own.widened_to_cover(low, high);
         let uneven = self.residual_excess > 1.0;
-        [covering(f_hz, f_ends), if uneven { covering(xi, xi_ends) } else { xi }]
+        [widened_to_cover(f_hz, f_ends), if uneven { widened_to_cover(xi, xi_ends) } else { xi }]
     }
 
     /// The laws at small amplitude; the damped sinusoids where the amplitude does not matter or its effect cannot be followed.
@@ -261,7 +261,7 @@ pub(super) fn harmonic_share(fit: &SinusoidFit, mode: usize) -> f64 {
 impl Choice {
     /// The slowest mode's, with intervals that allow for one that swings three times as fast, which gives energy to it and takes it back: its torque on the slowest goes with
     /// A₀²A₁, and what it holds is A₁²(3ω)² of A₀²ω². Of both only the order is known.
-    pub fn beside_resonance(self, whole: &Whole, mode: usize) -> Self {
+    pub fn widened_for_resonance(self, whole: &Whole, mode: usize) -> Self {
         let (slowest_rad, third_rad) = (whole.fit.amplitude_rad(0), whole.third_rad);
         // of one link alone the harmonic is gravity's
         if mode > 0 || third_rad == 0.0 || whole.signal.links.len() < 2 || whole.measured == Measured::Displacement {
@@ -279,7 +279,7 @@ impl Choice {
     }
 
     /// With intervals that allow for the third harmonic of the slowest mode.
-    pub fn beside_harmonic(self, fit: &SinusoidFit, mode: usize) -> Self {
+    pub fn widened_for_harmonic(self, fit: &SinusoidFit, mode: usize) -> Self {
         let share = harmonic_share(fit, mode);
         if share < 0.01 {
             return self;
@@ -392,7 +392,7 @@ fn sinusoids([f, xi]: [Estimate; 2], excess: f64, envelope: Option<&Envelope>) -
     if let Some(envelope) = envelope.filter(|_| misfits) {
         f = envelope.over_steps(f);
         for step in &envelope.steps {
-            xi = xi.covering(step.damping_ratio.value, step.damping_ratio.value);
+            xi = xi.widened_to_cover(step.damping_ratio.value, step.damping_ratio.value);
         }
     }
     let note = misfits.then(|| {

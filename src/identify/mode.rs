@@ -101,8 +101,8 @@ impl Mode {
         };
         let choice = estimators
             .choose(whole, envelope.as_ref(), damping_trend, &amplitudes_rad, mode)
-            .beside_harmonic(whole.fit, mode)
-            .beside_resonance(whole, mode);
+            .widened_for_harmonic(whole.fit, mode)
+            .widened_for_resonance(whole, mode);
         let raw = estimators.raw;
         Self {
             number: mode + 1,
@@ -156,7 +156,7 @@ impl Mode {
             None => {
                 let amplitude_rad = self.amplitude_rad();
                 let highest = self.frequency_hz.high / (1.0 - kappa_per_rad2 * amplitude_rad * amplitude_rad).max(0.5);
-                self.frequency_hz.covering(self.frequency_hz.low, highest)
+                self.frequency_hz.widened_to_cover(self.frequency_hz.low, highest)
             }
         }
     }
@@ -310,7 +310,7 @@ fn envelope_of(whole: &Whole, mode: usize) -> Result<Envelope, String> {
     }
     let own = Windows::of_mode(whole.signal, whole.fit, mode)?;
     let others = (0..whole.fit.poles.len()).filter(|m| *m != mode).map(|m| whole.fit.amplitude_rad(m));
-    Ok(Envelope::of(&own, 0, bounds)?.beside_unfollowed(others))
+    Ok(Envelope::of(&own, 0, bounds)?.widened_for_other_modes(others))
 }
 
 /// Whether a mode is on the third harmonic of the slowest one throughout, and in the end no larger than that harmonic may be; where there are no windows, by the whole

@@ -189,7 +189,7 @@ impl Improvement<'_> {
 
 /// Whether one oscillation whose frequency and damping go with its amplitude, with its harmonics, describes the record as well as two modes do. Of a chain
 /// that tells nothing: one of its modes may lie at the multiple, and a harmonic drives it.
-fn one_has_it(signal: &Signal, one: &SinusoidFit, two: &SinusoidFit, measured: Measured) -> bool {
+fn single_oscillation_suffices(signal: &Signal, one: &SinusoidFit, two: &SinusoidFit, measured: Measured) -> bool {
     if signal.links.len() > 1 {
         return false;
     }
@@ -219,7 +219,7 @@ fn decide(signal: &Signal, spectrum: &Spectrum, measured: Measured, one: Sinusoi
     };
     let is_small = small < noise_rad.max(of_swing);
     let is_multiple = (times - times.round()).abs() < 0.03 && times.round() >= 2.0;
-    let harmonic = is_multiple && (is_small || one_has_it(signal, &one, &two, measured));
+    let harmonic = is_multiple && (is_small || single_oscillation_suffices(signal, &one, &two, measured));
     let is_seen = p_value < LEAST_P && bic_gain > 10.0;
     let modes = if is_seen && !harmonic { 2 } else { 1 };
     let statement = if harmonic {

@@ -55,7 +55,7 @@ impl Modulated {
         best.is_weakly_nonlinear().then_some(())?;
         let Some(until_s) = best.sticks_from_s() else { return Told::of(&best)?.modulated() };
         let swing = recorded.between(recorded.span_s[0], until_s);
-        sinusoids.poles[0].is_seen_to_swing(swing.duration_s()).then_some(())?;
+        sinusoids.poles[0].is_resolved_oscillation(swing.duration_s()).then_some(())?;
         Told::of(&best.over(&swing)?)?.modulated()
     }
 
@@ -131,7 +131,7 @@ impl<'f, 'a> Told<'f, 'a> {
         let is_link = flow.measured == Measured::Angles && flow.signal.links.len() == 1;
         if is_link && !flow.is_beyond_hung_bodies(ANY_K) {
             let priors = [flow.prior, pendulum::by_gravity(amplitude_rad)];
-            pendulum::under_both(&mut values, &mut covariance, beside.power, priors);
+            pendulum::average_over_models(&mut values, &mut covariance, beside.power, priors);
         } else {
             covariance *= beside.power;
         }
@@ -247,9 +247,9 @@ impl<'f, 'a> Told<'f, 'a> {
                 None => small.blurred(self.of_linear_damper()),
                 Some(Trend::LeastBetween) => {
                     let least = self.damping_ratio(self.least_at());
-                    large.covering(small.low, small.high).covering(least.low, least.high)
+                    large.widened_to_cover(small.low, small.high).widened_to_cover(least.low, least.high)
                 }
-                Some(_) => large.covering(small.low, small.high),
+                Some(_) => large.widened_to_cover(small.low, small.high),
             },
             trend,
             noise_rad: self.flow.noise_rad.clone(),

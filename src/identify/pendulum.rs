@@ -42,7 +42,12 @@ fn mixture(k: f64, variance: f64, power: f64, [spring, gravity]: [[f64; 2]; 2]) 
 
 /// Values and their covariance under both assumptions, from those under the first; the second value is k. `power`: of the noise, over what the covariance takes it for; `spring`: the prior of k
 /// with which the values were found.
-pub fn under_both(values: &mut [f64], covariance: &mut DMatrix<f64>, power: f64, [spring, gravity]: [[f64; 2]; 2]) {
+pub fn average_over_models(
+    values: &mut [f64],
+    covariance: &mut DMatrix<f64>,
+    power: f64,
+    [spring, gravity]: [[f64; 2]; 2],
+) {
     let own = covariance[(1, 1)];
     if !(own > 0.0) {
         return;
@@ -98,7 +103,7 @@ mod tests {
     fn what_goes_with_k_goes_with_it() {
         let mut values = [5.0, 0.9];
         let mut covariance = DMatrix::from_row_slice(2, 2, &[0.05, 0.02, 0.02, 0.01]);
-        under_both(&mut values, &mut covariance, 1.0, [SPRING, GRAVITY]);
+        average_over_models(&mut values, &mut covariance, 1.0, [SPRING, GRAVITY]);
         assert!((values[0] - 5.0 - 2.0 * (values[1] - 0.9)).abs() < 1e-12);
         // what is left of the first where k is known
         assert!((covariance[(0, 0)] - (0.01 + 4.0 * covariance[(1, 1)])).abs() < 1e-12);

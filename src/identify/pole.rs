@@ -41,7 +41,7 @@ impl Pole {
     }
 
     /// Whether a record shows it to and fro often enough that it is no drift.
-    pub fn is_seen_to_swing(&self, duration_s: f64) -> bool {
+    pub fn is_resolved_oscillation(&self, duration_s: f64) -> bool {
         self.cycles_seen(duration_s) >= FEWEST_CYCLES
     }
 

@@ -10,7 +10,7 @@
 //! Missing samples are simply absent. Each link is weighted by the noise found in its own residual.
 //!
 //! The search may end anywhere: on a drift (ω → 0, ξ → 1), on two columns that cancel each other, on a pole that the record does not resolve. Its end
-//! is a damped oscillation only if [`Pole::is_seen_to_swing`], if no amplitude exceeds what was recorded, and if the linearisation behind the
+//! is a damped oscillation only if [`Pole::is_resolved_oscillation`], if no amplitude exceeds what was recorded, and if the linearisation behind the
 //! intervals reaches as far as they do; otherwise there is no result.
 
 use levenberg_marquardt::{LeastSquaresProblem as _, LevenbergMarquardt};
@@ -84,7 +84,7 @@ impl SinusoidFit {
         }
         let nyquist_rad_s = std::f64::consts::PI / signal.step_s;
         let poles = problem.poles();
-        let sane = |p: &Pole| p.omega_rad_s < 1.05 * nyquist_rad_s && p.is_seen_to_swing(signal.duration_s());
+        let sane = |p: &Pole| p.omega_rad_s < 1.05 * nyquist_rad_s && p.is_resolved_oscillation(signal.duration_s());
         if !poles.iter().all(sane) {
             return None;
         }

@@ -25,7 +25,7 @@ const CLEAR_OF_NOISE: f64 = 5.0;
 
 /// One mode in one window.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Moment {
+pub struct WindowAmplitude {
     /// The window's middle.
     pub t_s: f64,
     /// Complex amplitude of the mode, scaled to the link that moves most.
@@ -36,7 +36,7 @@ pub struct Moment {
     pub omega_rad_s: f64,
 }
 
-impl Moment {
+impl WindowAmplitude {
     /// A, with the noise's share of its square removed.
     pub fn amplitude_rad(&self) -> f64 {
         (self.amplitude_rad.norm_sqr() - self.sd_rad * self.sd_rad).max(0.0).sqrt()
@@ -49,7 +49,7 @@ pub struct Windows {
     /// Length of each.
     pub window_s: f64,
     /// `[mode][window]`, those clear of the noise.
-    pub moments: Vec<Vec<Moment>>,
+    pub moments: Vec<Vec<WindowAmplitude>>,
     /// Noise of each link, from what the windows' fits leave over.
     pub noise_rad: Vec<f64>,
     /// θᵢ/θ₁ of each mode, all windows together: `[mode][link]`.
@@ -236,7 +236,7 @@ fn shape(local: &[&SinusoidFit], whole: &SinusoidFit, mode: usize) -> (Vec<Compl
 }
 
 /// The mode's amplitude in each window, projected on its shape, scaled to the link that moves most.
-fn moments(local: &[&SinusoidFit], mode: usize, shape: &[Complex<f64>]) -> Vec<Moment> {
+fn moments(local: &[&SinusoidFit], mode: usize, shape: &[Complex<f64>]) -> Vec<WindowAmplitude> {
     let largest = shape.iter().map(|s| s.norm()).fold(0.0, f64::max);
     let each = local.iter().map(|fit| {
         let (mut sum, mut weight) = (Complex::new(0.0, 0.0), 0.0);
@@ -245,13 +245,13 @@ fn moments(local: &[&SinusoidFit], mode: usize, shape: &[Complex<f64>]) -> Vec<M
             sum += certainty * s.conj() * link.amplitudes_rad[mode];
             weight += certainty * s.norm_sqr();
         }
-        Moment {
+        WindowAmplitude {
             t_s: fit.origin_s,
             amplitude_rad: sum / weight,
             sd_rad: weight.recip().sqrt(),
             omega_rad_s: fit.poles[mode].omega_rad_s,
         }
     });
-    let sound = |m: &Moment| m.sd_rad > 0.0 && m.sd_rad.is_finite();
+    let sound = |m: &WindowAmplitude| m.sd_rad > 0.0 && m.sd_rad.is_finite();
     each.filter(sound).take_while(|m| m.amplitude_rad.norm() > CLEAR_OF_NOISE * m.sd_rad).collect()
 }

@@ -6,7 +6,7 @@ use super::Finding;
 use crate::caution::MOST_LENGTH_SPREAD;
 use crate::experiment::Rig;
 use crate::statistics::median;
-use crate::track::Thing;
+use crate::track::TrackedObject;
 
 /// Standard deviation of the pivot, over the radius, beyond which it is only a remark.
 const MOST_PIVOT_SD: f64 = 0.15;
@@ -122,7 +122,7 @@ fn rig(text: &mut String, finding: &Finding) {
 }
 
 /// Where the first of some things are; `None` of none.
-fn places(things: &[Thing]) -> Option<String> {
+fn places(things: &[TrackedObject]) -> Option<String> {
     let places: Vec<String> =
         things.iter().take(4).map(|thing| thing.place_px()).map(|[x, y]| format!("({x:.0}, {y:.0})")).collect();
     (!places.is_empty()).then(|| places.join(", "))

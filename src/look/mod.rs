@@ -16,11 +16,11 @@ use std::path::Path;
 use crate::detect::{Album, COUNTS, Hue, Trial};
 use crate::error::{Error, Result};
 use crate::experiment::MarkColour;
-use crate::held::released_of;
+use crate::hand_hold::released_of;
 use crate::measure::{Camera, Options, Session};
 use crate::progress::Progress;
-use crate::track::hanging::{self, MOST_MARKS};
-use crate::track::{Arc, FrameBlobs, Thing, things};
+use crate::track::chain_detection::{self, MOST_MARKS};
+use crate::track::{Arc, FrameBlobs, TrackedObject, things};
 use crate::video::{StreamInfo, Timing};
 
 /// Hues that are followed, strongest first.
@@ -39,7 +39,7 @@ pub struct Mark {
     /// What to call its colour: `#rrggbb`, `dark` or `light`.
     pub colour: String,
     /// What it does.
-    pub thing: Thing,
+    pub thing: TrackedObject,
 }
 
 /// What a recording shows.
@@ -54,9 +54,9 @@ pub struct Finding {
     /// Lengths of the links between marks.
     pub links_px: Vec<f64>,
     /// Things of the marks' look that stand still and are none.
-    pub still: Vec<Thing>,
+    pub still: Vec<TrackedObject>,
     /// Things of the marks' look that swing by themselves.
-    pub apart: Vec<Thing>,
+    pub apart: Vec<TrackedObject>,
     /// Until when it is held still at first, as by a hand: that is left out.
     pub held_until_s: Option<f64>,
     /// Turns a second of the first mark that swings.
@@ -100,7 +100,7 @@ pub fn look(path: &Path, options: &Options, folder: &Path, progress: &dyn Progre
             rest = further_stretches(&session, &frames);
         }
         let all = things(&frames);
-        for chain in hanging::chains(&all, &names).into_iter().take(CHAINS) {
+        for chain in chain_detection::chains(&all, &names).into_iter().take(CHAINS) {
             let mut worn: Vec<u8> = chain.marks.iter().map(|i| all[*i].hue).collect();
             worn.sort_unstable();
             worn.dedup();
@@ -188,10 +188,10 @@ fn measured(
     let aspect = session.stream().pixel_aspect;
     let mut frames = square(session.gather(hues, progress)?, aspect);
     let mut all = things(&frames);
-    let found = |frames: &[FrameBlobs], all: &[Thing]| {
+    let found = |frames: &[FrameBlobs], all: &[TrackedObject]| {
         let t_s: Vec<f64> = frames.iter().map(|frame| frame.t_s).collect();
         let is_there = |i: &usize| session.makes_a_difference(&t_s, &all[*i]) != Some(false);
-        let chain = hanging::longest(all, &names)?;
+        let chain = chain_detection::longest(all, &names)?;
         ((!steady || chain.is_steady(all)) && chain.marks.iter().all(is_there)).then_some(chain)
     };
     let Some(mut chain) = found(&frames, &all) else { return Ok(None) };
@@ -213,20 +213,21 @@ fn measured(
         .collect();
     let links_px = marks.windows(2).filter_map(|w| w[0].thing.distance_px(&w[1].thing)).collect();
     let swinging = usize::from(chain.hinge_marked);
-    let beside = |t: &Thing, m: &Mark| {
+    let beside = |t: &TrackedObject, m: &Mark| {
         m.thing.distance_px(t).is_some_and(|d| d > m.thing.area_px2.sqrt().max(t.area_px2.sqrt()))
     };
-    let alike = |t: &&Thing| marks.iter().any(|m| m.thing.hue == t.hue) && marks.iter().all(|m| beside(t, m));
+    let alike = |t: &&TrackedObject| marks.iter().any(|m| m.thing.hue == t.hue) && marks.iter().all(|m| beside(t, m));
     let still = all.iter().filter(|t| !t.moves).filter(alike);
-    let swings_apart =
-        |t: &&Thing| t.moves && hanging::hangs_alone(t) && marks.iter().all(|m| m.thing.is_seen_beside(t));
+    let swings_apart = |t: &&TrackedObject| {
+        t.moves && chain_detection::hangs_alone(t) && marks.iter().all(|m| m.thing.is_seen_beside(t))
+    };
     let apart = all.iter().filter(swings_apart).filter(alike);
     let first = &marks[swinging.min(marks.len() - 1)].thing;
     let stream = session.stream();
     let (width, height) = stream.orientation.size(stream.stored_size_px);
     let size_px = [aspect * width as f64, height as f64];
     let arc = chain.arc.map(|arc| arc.through_a_lens(&first.places_px(), first.radius_px(), size_px));
-    let in_file = |thing: &Thing| thing.clone().widened(aspect.recip());
+    let in_file = |thing: &TrackedObject| thing.clone().widened(aspect.recip());
     Ok(Some(Finding {
         held_until_s,
         frequency_hz: marks.get(swinging).and_then(|m| turns_per_second(&m.thing, &t_s)),
@@ -249,7 +250,7 @@ fn square(frames: Vec<FrameBlobs>, aspect: f64) -> Vec<FrameBlobs> {
 }
 
 /// When what moves farthest is let go, if it is held at first.
-fn held_until_s(frames: &[FrameBlobs], marks: &[&Thing]) -> Option<f64> {
+fn held_until_s(frames: &[FrameBlobs], marks: &[&TrackedObject]) -> Option<f64> {
     let farthest = marks.iter().max_by(|a, b| a.travel_px.total_cmp(&b.travel_px))?;
     let along = |axis: usize| -> (Vec<f64>, Vec<f64>) {
         let seen = frames.iter().zip(&farthest.path);
@@ -292,11 +293,16 @@ fn looks(album: &Album) -> Result<Vec<(Hue, String)>> {
 }
 
 /// `seen`: frames and things of every stretch. The stretch with most of them speaks.
-fn nothing_swings(path: &Path, seen: &[(usize, Vec<Thing>)], names: &[String], stated_frames: Option<u64>) -> Error {
+fn nothing_swings(
+    path: &Path,
+    seen: &[(usize, Vec<TrackedObject>)],
+    names: &[String],
+    stated_frames: Option<u64>,
+) -> Error {
     // stretches may overlap
     let most = stated_frames.map_or(usize::MAX, |frames| frames as usize);
     let frames = seen.iter().map(|(frames, _)| frames).sum::<usize>().min(most);
-    let count = |all: &[Thing]| (all.iter().filter(|t| t.moves).count(), all.len());
+    let count = |all: &[TrackedObject]| (all.iter().filter(|t| t.moves).count(), all.len());
     let (moving, lasting) = seen.iter().map(|(_, all)| count(all)).max().unwrap_or_default();
     let still = lasting - moving;
     let found = if names.is_empty() {
@@ -312,7 +318,7 @@ fn nothing_swings(path: &Path, seen: &[(usize, Vec<Thing>)], names: &[String], s
 }
 
 /// Full turns a second of a thing's motion along its longer axis.
-fn turns_per_second(thing: &Thing, t_s: &[f64]) -> Option<f64> {
+fn turns_per_second(thing: &TrackedObject, t_s: &[f64]) -> Option<f64> {
     let middle = thing.place_px();
     let range = |axis: usize| {
         let values = thing.path.iter().flatten().map(|p| p[axis]);

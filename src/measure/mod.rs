@@ -16,7 +16,7 @@ use crate::experiment::{MarkColour, Rig};
 use crate::progress::Progress;
 use crate::rejected::Rejected;
 use crate::steady::Background;
-use crate::track::{FrameBlobs, MarkSlot, Thing, Tracker, Tracks};
+use crate::track::{FrameBlobs, MarkSlot, TrackedObject, Tracker, Tracks};
 use crate::video::{DamageSpread, Decoded, Outcome, OwnedPicture, Recording, StillTimes, StreamInfo, Timing};
 use survey::SurveyedCamera;
 use view::{Seen, View, frame_blobs};
@@ -234,7 +234,7 @@ impl<'a> Session<'a> {
 
     /// Whether a thing, whose path goes through frames of these stamps, makes a difference where it is: in most of the pictures spread over the recording, against those
     /// that show it elsewhere. What is still there, and only covered now and then, does not. `None` where no pictures tell.
-    pub fn makes_a_difference(&self, t_s: &[f64], thing: &Thing) -> Option<bool> {
+    pub fn makes_a_difference(&self, t_s: &[f64], thing: &TrackedObject) -> Option<bool> {
         let stream = &self.stream;
         let of_picture = |stamp_s: &f64| thing.path[t_s.iter().position(|t| t == stamp_s)?];
         let places: Vec<Option<[f64; 2]>> = self.sampled_s.iter().map(of_picture).collect();

@@ -9,7 +9,7 @@ use super::{Session, survey};
 use crate::detect::{Hue, Trial};
 use crate::error::Result;
 use crate::progress::Progress;
-use crate::track::hanging::{self, Chain};
+use crate::track::chain_detection::{self, Chain};
 use crate::track::{MarkSlot, things};
 
 /// One way to look for a hue, and what hangs together of what it sees.
@@ -75,7 +75,7 @@ impl Session<'_> {
         let things = things(&self.glance(&hues, None, progress)?);
         let way = |way: usize| {
             let belongs = |hue: usize| hue == way || hue < known && hue != index;
-            let chain = hanging::of_hues(&things, &|thing| belongs(usize::from(thing.hue)));
+            let chain = chain_detection::of_hues(&things, &|thing| belongs(usize::from(thing.hue)));
             Way { hue: hues[way].clone(), chain }
         };
         Ok([index].into_iter().chain(known..hues.len()).map(way).collect())
@@ -92,5 +92,5 @@ impl Session<'_> {
 fn best(ways: Vec<Way>, worth: impl Fn(&Chain) -> f64) -> Option<Way> {
     let worth = |way: &Way| way.chain.as_ref().map(&worth);
     let most = ways.iter().filter_map(worth).fold(f64::NEG_INFINITY, f64::max);
-    ways.into_iter().find(|way| worth(way).is_some_and(|worth| worth > most - hanging::CHANCE))
+    ways.into_iter().find(|way| worth(way).is_some_and(|worth| worth > most - chain_detection::CHANCE))
 }

@@ -141,8 +141,8 @@ impl<'a> Balance<'a> {
     }
 
     /// What friction has to bear while the hinge is held: the sum of all other torques on the first coordinate (N·m).
-    pub fn hold_n_m(&mut self) -> f64 {
-        let Some(shapes) = self.shapes else { return self.model.hold_n_m(&self.motion) };
+    pub fn sticking_torque_n_m(&mut self) -> f64 {
+        let Some(shapes) = self.shapes else { return self.model.sticking_torque_n_m(&self.motion) };
         self.model.torque_while_held(&self.motion, &mut self.torque);
         let mut along = vec![0.0; self.rates()];
         shapes.reduce(&self.torque, &mut along);

@@ -4,7 +4,7 @@ use std::ops::Range;
 
 use nalgebra::DMatrix;
 
-use super::{Motion, OfLink, Parameter, Partials};
+use super::{LinkProperty, Motion, Parameter, Partials};
 use crate::error::{Error, Result};
 use crate::experiment::{Inertia, Link, Specimen};
 
@@ -153,9 +153,9 @@ impl Chain {
         let last = self.count() - 1;
         let of_link = |link: usize| {
             let number = u8::try_from(link).ok();
-            let of = [OfLink::Inertia, OfLink::Com, OfLink::Length]
+            let of = [LinkProperty::Inertia, LinkProperty::Com, LinkProperty::Length]
                 .into_iter()
-                .filter(move |of| *of != OfLink::Length || link < last);
+                .filter(move |of| *of != LinkProperty::Length || link < last);
             of.filter_map(move |of| number.map(|number| Parameter::Link(number, of)))
         };
         (0..=last).flat_map(of_link).collect()
@@ -166,9 +166,9 @@ impl Chain {
         let Parameter::Link(link, of) = parameter else { return None };
         let link = usize::from(link);
         self.links.get(link).map(|own| match of {
-            OfLink::Inertia => own.inertia_kg_m2,
-            OfLink::Com => own.com_m,
-            OfLink::Length => self.next_pivot_m[link],
+            LinkProperty::Inertia => own.inertia_kg_m2,
+            LinkProperty::Com => own.com_m,
+            LinkProperty::Length => self.next_pivot_m[link],
         })
     }
 
@@ -178,9 +178,9 @@ impl Chain {
         let link = usize::from(link);
         let Some(own) = self.links.get_mut(link) else { return };
         match of {
-            OfLink::Inertia => own.inertia_kg_m2 = value,
-            OfLink::Com => own.com_m = value,
-            OfLink::Length => self.next_pivot_m[link] = value,
+            LinkProperty::Inertia => own.inertia_kg_m2 = value,
+            LinkProperty::Com => own.com_m = value,
+            LinkProperty::Length => self.next_pivot_m[link] = value,
         }
         (self.inertia_kg_m2, self.static_moment_kg_m) = coefficients(&self.links, &self.next_pivot_m);
     }
@@ -200,19 +200,19 @@ impl Chain {
         let Some(own) = self.links.get(i) else { return };
         // a mass at an arm that becomes longer
         let (mass_kg, arm_m) = match of {
-            OfLink::Inertia => {
+            LinkProperty::Inertia => {
                 q[i] -= motion.acceleration[i];
                 return;
             }
-            OfLink::Com => (own.mass_kg, own.com_m),
-            OfLink::Length => (mass_below_kg(&self.links, i), self.next_pivot_m[i]),
+            LinkProperty::Com => (own.mass_kg, own.com_m),
+            LinkProperty::Length => (mass_below_kg(&self.links, i), self.next_pivot_m[i]),
         };
         let pull_m_s2 = field_m_s2[0] * motion.cos[i] - field_m_s2[1] * motion.sin[i];
         q[i] += mass_kg * (pull_m_s2 - 2.0 * arm_m * motion.acceleration[i]);
         for j in 0..i {
             add_pair(self.next_pivot_m[j] * mass_kg, (i, j), motion, q);
         }
-        if of == OfLink::Length {
+        if of == LinkProperty::Length {
             for j in i + 1..self.count() {
                 add_pair(self.static_moment_kg_m[j], (i, j), motion, q);
             }

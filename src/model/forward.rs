@@ -60,7 +60,7 @@ impl ForwardModel {
 
     /// The same with every link's angle sought for itself: what the shapes of a strip are held against.
     #[must_use]
-    pub fn link_by_link(mut self) -> Self {
+    pub fn without_reduction(mut self) -> Self {
         self.shapes = None;
         self
     }
@@ -130,7 +130,7 @@ impl ForwardModel {
     }
 
     /// √(g Σhᵢ / Σaᵢᵢ): the pace of the swing, for tolerances on rates.
-    pub fn pace_rad_s(&self) -> f64 {
+    pub fn characteristic_rad_s(&self) -> f64 {
         let n = self.chain.count();
         let moment: f64 = (0..n).map(|i| self.chain.static_moment_kg_m(i)).sum();
         (self.gravity_m_s2.abs() * moment / self.chain.inertia_kg_m2().trace()).sqrt().max(1.0)
@@ -142,16 +142,16 @@ impl ForwardModel {
     }
 
     /// Sorted instants at which the forces change suddenly.
-    pub fn breaks_s(&self) -> Vec<f64> {
-        let mut breaks_s: Vec<f64> = self.effects.iter().flat_map(|e| e.breaks_s()).collect();
-        breaks_s.sort_by(f64::total_cmp);
-        breaks_s
+    pub fn discontinuities_s(&self) -> Vec<f64> {
+        let mut discontinuities_s: Vec<f64> = self.effects.iter().flat_map(|e| e.discontinuities_s()).collect();
+        discontinuities_s.sort_by(f64::total_cmp);
+        discontinuities_s
     }
 
     /// Quantities at whose zeros a law has a corner.
     pub fn corners(&self, motion: &Motion) -> Vec<f64> {
         let mut corners = Vec::new();
-        self.effects.iter().for_each(|e| e.add_corners(&self.chain, motion, &mut corners));
+        self.effects.iter().for_each(|e| e.add_switching_functions(&self.chain, motion, &mut corners));
         corners
     }
 
@@ -226,7 +226,7 @@ impl ForwardModel {
     }
 
     /// What friction has to bear on the first link while it is held: the sum of all other torques on it (N·m).
-    pub fn hold_n_m(&self, motion: &Motion) -> f64 {
+    pub fn sticking_torque_n_m(&self, motion: &Motion) -> f64 {
         let mut q = vec![0.0; self.rates()];
         self.torque_while_held(motion, &mut q);
         q[0]

@@ -72,7 +72,7 @@ struct Run<'a> {
     stages: Stages<'a>,
     /// At whatever instant is looked at.
     balance: Balance<'a>,
-    breaks_s: Vec<f64>,
+    discontinuities_s: Vec<f64>,
     place: Place,
     /// Whether the hinge has dry friction.
     is_dry: bool,
@@ -127,7 +127,7 @@ impl<'a> Run<'a> {
             accuracy,
             stages: Stages::new(model),
             balance,
-            breaks_s: model.breaks_s(),
+            discontinuities_s: model.discontinuities_s(),
             place,
             is_dry: model.is_dry(),
             hinge: Hinge::SlidesForward,
@@ -165,7 +165,8 @@ impl<'a> Run<'a> {
 
     /// One attempt at a step; `None` where it was too long and is to be tried again.
     fn advance(&mut self, until_s: f64) -> Result<Option<Step>> {
-        let target_s = self.breaks_s.iter().copied().find(|b| *b > self.place.t_s).map_or(until_s, |b| b.min(until_s));
+        let target_s =
+            self.discontinuities_s.iter().copied().find(|b| *b > self.place.t_s).map_or(until_s, |b| b.min(until_s));
         let left_s = target_s - self.place.t_s;
         let mut h = self.length_s.min(self.accuracy.longest_step_s);
         if left_s < 2.0 * h {
@@ -277,15 +278,15 @@ impl<'a> Run<'a> {
     }
 
     /// What friction bears while the hinge is held at the place (N·m).
-    fn hold_n_m(&mut self) -> Result<f64> {
+    fn sticking_torque_n_m(&mut self) -> Result<f64> {
         let held = self.accelerations(Hinge::Sticks)?;
         self.balance.go_to(self.place.t_s, &self.place.theta, (&self.place.rate, &held), Hinge::Sticks, &[]);
-        Ok(self.balance.hold_n_m())
+        Ok(self.balance.sticking_torque_n_m())
     }
 
     /// Whether friction can bear that where the balance was looked at last.
-    fn holds(&self, hold_n_m: f64) -> bool {
-        self.balance.friction_n_m().is_some_and(|friction_n_m| hold_n_m.abs() <= friction_n_m)
+    fn holds(&self, sticking_torque_n_m: f64) -> bool {
+        self.balance.friction_n_m().is_some_and(|friction_n_m| sticking_torque_n_m.abs() <= friction_n_m)
     }
 
     fn hinge_at_start(&mut self) -> Result<Hinge> {
@@ -295,8 +296,8 @@ impl<'a> Run<'a> {
         if self.place.rate[0] != 0.0 {
             return Ok(Hinge::sliding(self.place.rate[0]));
         }
-        let hold_n_m = self.hold_n_m()?;
-        Ok(if self.holds(hold_n_m) { Hinge::Sticks } else { Hinge::sliding(hold_n_m) })
+        let sticking_torque_n_m = self.sticking_torque_n_m()?;
+        Ok(if self.holds(sticking_torque_n_m) { Hinge::Sticks } else { Hinge::sliding(sticking_torque_n_m) })
     }
 
     /// Where in the step the hinge first reverses or is let go, or a law comes to a corner.
@@ -335,7 +336,7 @@ impl<'a> Run<'a> {
         let (rate, acceleration) = (step.rate(tau), step.acceleration(tau));
         let t_s = step.from_s + tau * step.length_s;
         self.balance.go_to(t_s, &step.theta_rad(tau), (&rate, &acceleration), Hinge::Sticks, &[]);
-        self.balance.friction_n_m().unwrap_or(0.0) - self.balance.hold_n_m().abs()
+        self.balance.friction_n_m().unwrap_or(0.0) - self.balance.sticking_torque_n_m().abs()
     }
 
     /// Of every corner a quantity that is positive up to there.
@@ -400,7 +401,7 @@ impl<'a> Run<'a> {
         match turn {
             Turn::Corner(which) => self.sides[which] = -self.sides[which],
             Turn::Lets => {
-                self.hinge = Hinge::sliding(self.hold_n_m()?);
+                self.hinge = Hinge::sliding(self.sticking_torque_n_m()?);
                 self.first = self.accelerations(self.hinge)?;
             }
             Turn::Reverses => {
@@ -408,13 +409,13 @@ impl<'a> Run<'a> {
                 let back = Hinge::sliding(-self.hinge.sign());
                 self.place.rate[0] = 0.0;
                 let slid = self.accelerations(back)?;
-                let hold_n_m = self.hold_n_m()?;
+                let sticking_torque_n_m = self.sticking_torque_n_m()?;
                 self.hinge = if slid[0] * back.sign() > 0.0 {
                     back
-                } else if self.holds(hold_n_m) {
+                } else if self.holds(sticking_torque_n_m) {
                     Hinge::Sticks
                 } else {
-                    Hinge::sliding(hold_n_m)
+                    Hinge::sliding(sticking_torque_n_m)
                 };
                 self.first = if self.hinge == back { slid } else { self.accelerations(self.hinge)? };
                 self.jump_slopes(&before);
@@ -426,7 +427,7 @@ impl<'a> Run<'a> {
     /// The instant of the reversal depends on the parameters: ∂rate⁺ = ∂rate⁻ + (α⁻ − α⁺) ∂t, with ∂t = −∂ω₁/α₁⁻.
     fn jump_slopes(&mut self, before: &[f64]) {
         let Some((_, rate)) = &mut self.slopes else { return };
-        if before[0].abs() < 1e-9 * self.model.pace_rad_s().powi(2) {
+        if before[0].abs() < 1e-9 * self.model.characteristic_rad_s().powi(2) {
             return;
         }
         for mut column in rate.column_iter_mut() {

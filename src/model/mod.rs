@@ -58,7 +58,7 @@ pub use expression::Expression;
 pub use forward::ForwardModel;
 pub use integrate::Accuracy;
 pub use motion::{Hinge, Motion};
-pub use parameter::{LawCoefficient, OfLink, Parameter};
+pub use parameter::{LawCoefficient, LinkProperty, Parameter};
 pub use partials::Partials;
 pub use trajectory::{State, Trajectory};
 pub use work::Work;

@@ -32,7 +32,7 @@ fn kept(text: &str) -> &'static str {
 
 /// What of a general link was measured before it swung.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
-pub enum OfLink {
+pub enum LinkProperty {
     /// Inertia about the centre of mass.
     Inertia,
     /// Distance of the centre of mass from the pivot.
@@ -79,7 +79,7 @@ pub enum Parameter {
     /// Frequency of the pivot's motion.
     SupportFrequency,
     /// Of a link, the uppermost being 0.
-    Link(u8, OfLink),
+    Link(u8, LinkProperty),
     /// ε of the camera's clock.
     TimeBase,
     /// Time of the frames missing at one instant.
@@ -119,9 +119,9 @@ impl Parameter {
             Self::SupportSine => "support_motion.sine_m",
             Self::SupportCosine => "support_motion.cosine_m",
             Self::SupportFrequency => "support_motion.frequency_hz",
-            Self::Link(link, OfLink::Inertia) => kept(&format!("links.{}.inertia_kg_m2", link + 1)),
-            Self::Link(link, OfLink::Com) => kept(&format!("links.{}.com_m", link + 1)),
-            Self::Link(link, OfLink::Length) => kept(&format!("links.{}.length_m", link + 1)),
+            Self::Link(link, LinkProperty::Inertia) => kept(&format!("links.{}.inertia_kg_m2", link + 1)),
+            Self::Link(link, LinkProperty::Com) => kept(&format!("links.{}.com_m", link + 1)),
+            Self::Link(link, LinkProperty::Length) => kept(&format!("links.{}.length_m", link + 1)),
             Self::TimeBase => "time_base",
             Self::DroppedFrames => "dropped_frames",
             Self::CameraTilt => "camera_tilt",
@@ -146,8 +146,8 @@ impl Parameter {
             Self::AirQuadratic => "kg/m2",
             Self::AddedMass => "kg/m",
             Self::SideForce => "m/s2",
-            Self::SupportSine | Self::SupportCosine | Self::Link(_, OfLink::Com | OfLink::Length) => "m",
-            Self::Link(_, OfLink::Inertia) => "kg m2",
+            Self::SupportSine | Self::SupportCosine | Self::Link(_, LinkProperty::Com | LinkProperty::Length) => "m",
+            Self::Link(_, LinkProperty::Inertia) => "kg m2",
             Self::SupportFrequency => "Hz",
             Self::TimeBase | Self::AngleGain | Self::ViewStretch | Self::ViewShear => "1",
             Self::DroppedFrames | Self::DifferentialLag => "s",

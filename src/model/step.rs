@@ -246,10 +246,11 @@ impl<'a> Stages<'a> {
         corner += with_theta * (gamma * gamma);
         let right = inertia * &rate - with_theta * &angle * gamma;
         let Some(rate) = matrix.lu().solve(&right) else { return f64::INFINITY };
-        let pace_rad_s = self.balance.model().pace_rad_s();
+        let characteristic_rad_s = self.balance.model().characteristic_rad_s();
         let hidden = rate.rows(n, m - n).amax();
-        let of_coordinate =
-            |i: usize| self.balance.seen(i) * (angle[i] + gamma * rate[i]).abs().max(rate[i].abs() / pace_rad_s);
+        let of_coordinate = |i: usize| {
+            self.balance.seen(i) * (angle[i] + gamma * rate[i]).abs().max(rate[i].abs() / characteristic_rad_s)
+        };
         (0..n).map(of_coordinate).fold(hidden, f64::max)
     }
 

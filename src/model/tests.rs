@@ -430,7 +430,7 @@ fn a_bending_strip_hangs_together_like_its_two_rods() {
 /// Largest difference of the angles between marks from the first to the fifth second.
 fn shapes_differ_by_rad(strip: &Experiment) -> f64 {
     let model = ForwardModel::of(strip).unwrap();
-    let whole = ForwardModel::of(strip).unwrap().link_by_link();
+    let whole = ForwardModel::of(strip).unwrap().without_reduction();
     let start = State::released(&model, &strip.model.release_rad).unwrap();
     let accuracy = Accuracy { step_error_rad: 1e-8, ..Accuracy::default() };
     let swing = |model: &ForwardModel| Trajectory::with(model, &start, (0.0, 5.0), None, &accuracy).unwrap();

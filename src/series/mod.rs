@@ -12,7 +12,7 @@ use std::ops::Range;
 use std::path::{Path, PathBuf};
 
 use crate::error::{Error, Result};
-use crate::held::{caught_of, released_of};
+use crate::hand_hold::{caught_of, released_of};
 use crate::statistics::{median, median_step_s};
 use columns::{Columns, Row, Table, not_a_table};
 

@@ -8,10 +8,10 @@ use pathfinding::matrix::Matrix;
 /// What it costs to leave a mark unseen: more than any sighting within its gate.
 const MISS: f64 = GATE + MOST_AREA_COST;
 /// What it costs to leave a newcomer that is no mark unseen.
-const YOUNG_MISS: f64 = 6.0;
+const NEWCOMER_MISS: f64 = 6.0;
 /// Frames beside all marks of its hue after which something that is no mark counts as furniture. Beside them, for a
 /// newcomer that appears while a mark is missed may be that mark.
-const YOUNG_FRAMES: u32 = 30;
+const NEWCOMER_FRAMES: u32 = 30;
 /// Marks are in doubt where an exchange would cost less than this.
 const CLEAR_MARGIN: f64 = 6.0;
 /// Cost units in an integer of the assignment.
@@ -54,7 +54,7 @@ pub fn assign_frame(rows: &mut [&mut Follower], marks: usize, sightings: &[Sight
     for row in rows.iter_mut() {
         row.predict(t_s);
     }
-    let young = |i: usize| i >= marks && rows[i].age < YOUNG_FRAMES;
+    let young = |i: usize| i >= marks && rows[i].age < NEWCOMER_FRAMES;
     let in_sight = |hue: u8| rows[..marks].iter().any(|row| row.hue == hue && !row.was_lost());
     let lost = |i: usize| i < marks && rows[i].was_lost() && in_sight(rows[i].hue);
     let any_lost = (0..marks).any(lost);
@@ -67,7 +67,7 @@ pub fn assign_frame(rows: &mut [&mut Follower], marks: usize, sightings: &[Sight
         let free: Vec<bool> = (0..sightings.len()).map(|column| !columns.contains(&Some(column))).collect();
         // a newcomer that is no mark gives way, which is written as a dearer sighting: the sum decides
         let cost = |i: usize, column: usize| {
-            let handicap = if young(i) { MISS - YOUNG_MISS } else { 0.0 };
+            let handicap = if young(i) { MISS - NEWCOMER_MISS } else { 0.0 };
             before[i][column].filter(|_| free[column]).map(|cost| cost + handicap)
         };
         let costs: Vec<Vec<Option<f64>>> =

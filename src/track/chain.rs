@@ -17,13 +17,13 @@ const LEAST_SPREAD_PX: f64 = 1.0;
 
 /// Mean and variance of a quantity, value by value (Welford, Technometrics 4 (1962) 419).
 #[derive(Debug, Clone, Copy, Default)]
-struct Usual {
+struct RunningStatistics {
     count: u32,
     mean: f64,
     squares: f64,
 }
 
-impl Usual {
+impl RunningStatistics {
     fn add(&mut self, value: f64) {
         self.count += 1;
         let before = value - self.mean;
@@ -43,16 +43,16 @@ impl Usual {
 pub struct Chain {
     pivot_px: Option<[f64; 2]>,
     /// For each mark, its distances from the marks before it, and last from the pivot.
-    distances_px: Vec<Vec<Usual>>,
+    distances_px: Vec<Vec<RunningStatistics>>,
     /// For each mark, x and y.
-    places_px: Vec<[Usual; 2]>,
+    places_px: Vec<[RunningStatistics; 2]>,
 }
 
 impl Chain {
     /// Of `marks` marks of which nothing is known yet.
     pub fn new(marks: usize, pivot_px: Option<[f64; 2]>) -> Self {
-        let distances_px = (0..marks).map(|mark| vec![Usual::default(); mark + 1]).collect();
-        Self { pivot_px, distances_px, places_px: vec![[Usual::default(); 2]; marks] }
+        let distances_px = (0..marks).map(|mark| vec![RunningStatistics::default(); mark + 1]).collect();
+        Self { pivot_px, distances_px, places_px: vec![[RunningStatistics::default(); 2]; marks] }
     }
 
     /// Learns from a frame in which every mark seen is known to be that mark.

@@ -16,14 +16,14 @@ use crate::statistics::median;
 pub(super) struct Choice {
     pub chosen: Vec<Option<usize>>,
     /// Other lasting things of a mark's hue.
-    pub spares: Vec<Spare>,
+    pub spares: Vec<UnusedObject>,
     /// Something that was chosen swings.
     pub moves: bool,
 }
 
 /// A lasting thing of a mark's hue that was not taken for a mark.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Spare {
+pub struct UnusedObject {
     /// Index of its hue.
     pub hue: u8,
     /// Where it usually is.
@@ -33,7 +33,7 @@ pub struct Spare {
     /// It swings.
     pub moves: bool,
     /// It keeps its distance from a mark, as the marks of a chain do.
-    pub hangs_on: bool,
+    pub keeps_distance: bool,
 }
 
 /// Half a range of motion below which a thing stands still, px, beyond its own scatter.
@@ -183,14 +183,14 @@ fn candidates_but<'a>(candidates: &'a [Candidate], taken: &[usize]) -> Vec<&'a C
     candidates.iter().filter(beside).collect()
 }
 
-fn spares(candidates: &[Candidate], taken: &[usize]) -> Vec<Spare> {
+fn spares(candidates: &[Candidate], taken: &[usize]) -> Vec<UnusedObject> {
     let marks: Vec<&Candidate> = candidates.iter().filter(|c| taken.contains(&c.tracklet)).collect();
-    let spare = |c: &Candidate| Spare {
+    let spare = |c: &Candidate| UnusedObject {
         hue: c.hue,
         position_px: middle_px(&c.path).unwrap_or_default(),
         travel_px: c.travel_px,
         moves: c.moves,
-        hangs_on: marks.iter().any(|mark| stretch(c, mark) < MOST_STRETCH),
+        keeps_distance: marks.iter().any(|mark| stretch(c, mark) < MOST_STRETCH),
     };
     candidates_but(candidates, taken).into_iter().map(spare).collect()
 }

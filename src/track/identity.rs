@@ -34,7 +34,7 @@ struct Name {
     /// The frame since which what bears it may be another mark.
     doubted_since: Option<usize>,
     /// The last frame in which something bore it.
-    borne: Option<usize>,
+    last_assigned: Option<usize>,
     /// The last frame in which what bore it was that mark without doubt.
     certain: Option<usize>,
 }
@@ -77,7 +77,7 @@ impl Identity {
         self.share_doubt(frame, seen_px);
         let in_doubt: Vec<usize> = (0..self.names.len()).filter(|m| self.names[*m].doubted_since.is_some()).collect();
         for (name, _) in self.names.iter_mut().zip(seen_px).filter(|(_, at)| at.is_some()) {
-            name.borne = Some(frame);
+            name.last_assigned = Some(frame);
             if name.doubted_since.is_none() {
                 name.certain = Some(frame);
             }
@@ -97,8 +97,8 @@ impl Identity {
     /// A mark that comes back while its name, or that of another one of its hue, is in doubt may be any of them.
     fn share_doubt(&mut self, frame: usize, seen_px: &[Option<[f64; 2]>]) {
         for mark in (0..seen_px.len()).filter(|m| seen_px[*m].is_some()) {
-            let Name { hue, borne, .. } = self.names[mark];
-            let is_back = borne.is_some_and(|last| last + 1 < frame);
+            let Name { hue, last_assigned, .. } = self.names[mark];
+            let is_back = last_assigned.is_some_and(|last| last + 1 < frame);
             if is_back && self.names.iter().any(|name| name.hue == hue && name.doubted_since.is_some()) {
                 self.doubt(mark, frame);
             }
@@ -173,7 +173,7 @@ impl Identity {
             }
         }
         for name in answer {
-            (self.names[*name].borne, self.names[*name].certain) = (Some(frame), Some(frame));
+            (self.names[*name].last_assigned, self.names[*name].certain) = (Some(frame), Some(frame));
         }
         renamings
     }

@@ -3,9 +3,9 @@
 mod arc;
 mod assign;
 mod chain;
+pub mod chain_detection;
 mod choose;
 mod follower;
-pub mod hanging;
 mod identity;
 mod kalman;
 mod noise;
@@ -18,11 +18,11 @@ mod tracklet;
 mod tracks;
 
 pub use arc::Arc;
-pub use choose::Spare;
+pub use choose::UnusedObject;
 pub use kalman::{Belief, Measurement, Motion};
 pub use noise::Scatter;
 pub use sighting::{FrameBlobs, Sighting};
-pub use thing::{Thing, things};
+pub use thing::{TrackedObject, things};
 pub use tracker::{MarkFound, MarkSlot, Tracker};
 pub use tracks::Tracks;
 

@@ -7,7 +7,7 @@ use crate::statistics::{median, median_step_s};
 
 /// A lasting thing in a recording, whatever it is.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Thing {
+pub struct TrackedObject {
     /// Index of its hue.
     pub hue: u8,
     /// Share of the frames that show it.
@@ -24,7 +24,7 @@ pub struct Thing {
     pub path: Vec<Option<[f64; 2]>>,
 }
 
-impl Thing {
+impl TrackedObject {
     /// How much its distance from another changes, as a share of how they move against each other; 1 where they do
     /// not, or are never seen together.
     pub fn stretch(&self, other: &Self) -> f64 {
@@ -103,13 +103,13 @@ impl Thing {
 }
 
 /// Everything that lasts in these frames.
-pub fn things(window: &[FrameBlobs]) -> Vec<Thing> {
+pub fn things(window: &[FrameBlobs]) -> Vec<TrackedObject> {
     let stamps: Vec<f64> = window.iter().map(|frame| frame.t_s).collect();
     let Some(step_s) = median_step_s(&stamps) else { return Vec::new() };
     let tracklets = link(window, step_s);
     candidates(&tracklets, window, None)
         .into_iter()
-        .map(|c| Thing {
+        .map(|c| TrackedObject {
             hue: c.hue,
             presence: c.presence,
             area_px2: c.ln_area.exp(),

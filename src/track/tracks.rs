@@ -1,7 +1,7 @@
 //! The marks' tracks: measured positions with the variances that their own scatter shows, and the paper's filter over
 //! them, with the true time steps.
 
-use super::choose::Spare;
+use super::choose::UnusedObject;
 use super::follower::measurement;
 use super::kalman::{Belief, Motion};
 use super::noise::{Scatter, speeds_along, variance_factor};
@@ -29,7 +29,7 @@ pub struct Tracks {
     /// Frames that the decoder reported as damaged.
     pub damaged_frames: Vec<usize>,
     /// Lasting things of a mark's colour that were seen beside the marks when they were chosen.
-    pub spares: Vec<Spare>,
+    pub spares: Vec<UnusedObject>,
     /// Something that was chosen swings.
     pub moves: bool,
 }
@@ -50,7 +50,7 @@ impl Tracks {
                 m.covariance_px2[0] *= x;
                 m.covariance_px2[1] *= y;
                 m.covariance_px2[2] *= (x * y).sqrt();
-                mind_area(m, f, usual_px2(speed));
+                flag_area_change(m, f, usual_px2(speed));
             }
         }
         let motion = Motion { acceleration_psd_px2_s3: acceleration_psd(&measured, &self.t_s, step_s) };
@@ -117,7 +117,7 @@ fn usual_area(measured: &[Option<Measured>], speeds_px: &[f64], median_px2: f64)
 
 /// A mark that is partly hidden has its centroid off by up to the hidden share of its radius; one that has grown
 /// holds something else as well. Both are flagged and their variance grows accordingly.
-fn mind_area(m: &mut Measured, flags: &mut Flags, usual_px2: f64) {
+fn flag_area_change(m: &mut Measured, flags: &mut Flags, usual_px2: f64) {
     let ratio = f64::from(m.area_px2) / usual_px2.max(1e-9);
     let deficit = if ratio < 0.85 {
         flags.insert(Flags::PARTIAL);

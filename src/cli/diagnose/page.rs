@@ -4,8 +4,8 @@ use std::fmt::Write;
 
 use crate::cli::table::{Table, number, paragraph};
 use crate::diagnose::report::Pieces;
-use crate::diagnose::words::names;
-use crate::diagnose::{Detectable, Diagnosis, Status};
+use crate::diagnose::statements::names;
+use crate::diagnose::{Detectable, Diagnosis, Effect, Status};
 
 /// Candidates listed.
 const LISTED: usize = 6;
@@ -42,9 +42,13 @@ pub(super) fn page(diagnosis: &Diagnosis) -> String {
     for candidate in diagnosis.candidates.iter().take(LISTED) {
         let left = candidate.rmse_rad.iter().map(|r| number(1e3 * r, 3)).collect::<Vec<_>>().join(" ");
         let probability = if among { candidate.probability_if_named } else { candidate.probability };
-        let at = candidate.dropped_at_s.map_or(String::new(), |at_s| format!(" at {at_s:.2} s"));
         let mark = if candidate.fit.certified { "" } else { " *" };
-        let mut first = [names(&candidate.effects, "nothing else") + &at + mark, of_one(probability), left];
+        let mut effects = names(&candidate.effects, "nothing else");
+        if let Some(at_s) = candidate.dropped_at_s {
+            let id = Effect::DroppedFrames.id();
+            effects = effects.replacen(id, &format!("{id} at {at_s:.2} s"), 1);
+        }
+        let mut first = [effects + mark, of_one(probability), left];
         for (parameter, quantity) in &candidate.coefficients {
             let [name, probability, left] = std::mem::take(&mut first);
             let value = number(quantity.value.unwrap_or(0.0), 4);

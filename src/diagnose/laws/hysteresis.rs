@@ -1,4 +1,4 @@
-//! The joint's hysteresis needs starts of its own, beside variables of its own ([`crate::fit::straight`]).
+//! The joint's hysteresis needs starts of its own, beside variables of its own ([`crate::fit::transformed`]).
 
 use rayon::prelude::*;
 
@@ -7,21 +7,22 @@ use super::super::effect::Effect;
 use super::super::refit::Refit;
 use super::super::screen::{Score, Screen};
 use super::super::settings::PriorSettings;
-use super::{Coefficients, Law, Sought};
+use super::{Coefficients, FitRequest, Law};
 use crate::model::Parameter;
 
-/// Yield angles at which it is scored, as parts of the largest bend.
+/// Yield angles at which it is scored, as parts of the largest bend (start values).
 const SCORED: [f64; 3] = [0.03, 0.15, 0.6];
-/// Starts: yield angles as parts of the largest bend, and the hysteresis' part of the spring.
+/// Starts: yield angles as parts of the largest bend, and the hysteresis' part of the spring (start values).
 const YIELD_SHARES: [f64; 3] = [0.05, 0.2, 0.6];
 const SPRING_SHARES: [f64; 2] = [0.4, 0.9];
-/// The same where everything else has failed, and how much stiffer the joint may then be; how many of them begin a descent, and how many end it.
+/// The same where everything else has failed, and how much stiffer the joint may then be (start values); how many of them begin a descent, and how many end it
+/// (cost).
 const EVERY_YIELD: [f64; 5] = [0.03, 0.1, 0.25, 0.5, 0.9];
 const EVERY_SHARE: [f64; 4] = [0.1, 0.4, 0.7, 0.95];
 const STIFFER: [f64; 3] = [1.0, 2.0, 8.0];
 const BEGUN: usize = 12;
 const ENDED: usize = 3;
-/// Parts of the recordings that are followed before the whole is.
+/// Parts of the recordings that are followed before the whole is (numerics: of so short a beginning false minima are few).
 const PARTS: [f64; 2] = [0.15, 0.5];
 
 /// The law.
@@ -30,27 +31,27 @@ pub struct Hysteresis;
 impl Law for Hysteresis {
     /// From every start that may lead to its minimum: where the score points, as a part of the spring where there is something to explain, and from short
     /// stretches, which do not know what the base model has given up, where nothing else explains it.
-    fn beside<'a>(&self, sought: &Sought<'_, 'a>) -> Option<Refit<'a>> {
-        let Sought { context, base, effect, score, misfit } = *sought;
+    fn beside<'a>(&self, sought: &FitRequest<'_, 'a>) -> Option<Refit<'a>> {
+        let FitRequest { context, base, effect, score, misfit } = *sought;
         let hypothesis = base.hypothesis.and(effect, None);
         let near = || score.and_then(|score| context.refit_below(misfit.leads, &hypothesis, base, &score.start));
         let softened = || (misfit.unexplained || misfit.seen).then(|| softened(context, base, misfit.leads)).flatten();
         // in every joint of a strip, and from no memory in each stretch, it is too dear
-        let is_worth_it = misfit.unsolved && !context.is_strip();
-        let anew = || is_worth_it.then(|| context.refit_anew(&hypothesis, &[], base)).flatten();
+        let is_worth_it = misfit.unexplained_by_any && !context.is_strip();
+        let anew = || is_worth_it.then(|| context.refit_by_shooting(&hypothesis, &[], base)).flatten();
         let (near, (softened, anew)) = rayon::join(near, || rayon::join(softened, anew));
         context.best_of([near, softened, anew])
     }
 
-    fn anywhere<'a>(&self, context: &FitContext<'a>, base: &Refit<'a>) -> Option<Refit<'a>> {
-        anywhere(context, base)
+    fn fit_from_many_starts<'a>(&self, context: &FitContext<'a>, base: &Refit<'a>) -> Option<Refit<'a>> {
+        fit_from_many_starts(context, base)
     }
 
     /// The best of several yield angles.
     fn scan(&self, screen: &Screen<'_, '_>) -> Option<Score> {
         let context = screen.context;
         let yields_rad = if context.has_spring() {
-            SCORED.map(|share| share * context.largest_bend_rad()).to_vec()
+            SCORED.map(|share| share * context.common_bend_rad()).to_vec()
         } else {
             vec![context.yield_rad().0]
         };
@@ -64,7 +65,13 @@ impl Law for Hysteresis {
     }
 
     /// Any yield angle that the recording does not tell from its own.
-    fn ln_kinds(&self, _fit: &Refit<'_>, _effect: Effect, of: &Coefficients<'_>, settings: &PriorSettings) -> f64 {
+    fn ln_multiplicity(
+        &self,
+        _fit: &Refit<'_>,
+        _effect: Effect,
+        of: &Coefficients<'_>,
+        settings: &PriorSettings,
+    ) -> f64 {
         let (yield_rad, sd) = of(Parameter::HysteresisYield);
         (yield_rad * settings.yields).ln().max(sd.ln())
     }
@@ -78,7 +85,7 @@ fn softened<'a>(context: &FitContext<'a>, null: &Refit<'a>, bound: f64) -> Optio
     let (cost, best) = costed.min_by(|a, b| a.0.total_cmp(&b.0))?;
     if context.is_strip() {
         // in every joint of it: a step is as dear as ten of another effect's
-        let is_hopeful = cost < context.settings.descent.beyond_hope * null.chi2;
+        let is_hopeful = cost < context.settings.descent.hopeless_ratio * null.chi2;
         return is_hopeful.then(|| context.begin(&hypothesis, null, &best)).flatten();
     }
     context.refit_below(bound, &hypothesis, null, &best)
@@ -98,7 +105,7 @@ fn starts(
     // a base model that has locked its joint is no guide to the damper
     let damping = fit.value(Parameter::JointDamping).unwrap_or(0.0).min(context.experiment.model.c_eq_n_m_s_per_rad);
     let mut starts = Vec::new();
-    for yield_rad in yield_shares.iter().map(|share| share * context.largest_bend_rad()) {
+    for yield_rad in yield_shares.iter().map(|share| share * context.common_bend_rad()) {
         for (share, scale) in spring_shares.iter().flat_map(|share| stiffer.iter().map(move |scale| (share, scale))) {
             starts.push(vec![
                 (spring, (1.0 - share) * scale * fit.value(spring).unwrap_or(0.0)),
@@ -113,10 +120,10 @@ fn starts(
 }
 
 /// The hysteresis beside a fit from wherever it may be: its sum of squares has many false minima, of a whole recording far more than of its beginning.
-fn anywhere<'a>(context: &FitContext<'a>, fit: &Refit<'a>) -> Option<Refit<'a>> {
+fn fit_from_many_starts<'a>(context: &FitContext<'a>, fit: &Refit<'a>) -> Option<Refit<'a>> {
     let hypothesis = fit.hypothesis.and(Effect::JointHysteretic, None);
     let starts = starts(context, fit, &EVERY_YIELD, &EVERY_SHARE, &STIFFER)?;
-    let fit = &context.seen_to_start(fit);
+    let fit = &context.with_observed_starts(fit);
     let (settings, noise) = (&context.settings.descent, &fit.problem.noise);
     let [beginning, first_half] = PARTS.map(|part| first_part(context.records, part));
     let (beginning, first_half) = (context.on(&beginning), context.on(&first_half));

@@ -17,28 +17,30 @@ use super::super::hypothesis::Hypothesis;
 use super::super::refit::Refit;
 use super::super::screen::{Score, Screen};
 use super::super::settings::{PriorSettings, Settings};
-use super::{Coefficients, Law, Sought};
+use super::{Coefficients, FitRequest, Law};
 use crate::fit::whitening::Whitening;
 use crate::fit::{Problem, Record};
 use crate::model::Parameter;
 use crate::statistics::median_step_s;
 
-/// Frames that may be missing at once.
+/// Frames that may be missing at once (judgement).
 const MOST_FRAMES: usize = 5;
-/// Instants are looked for anew this many times.
+/// Instants are looked for anew this many times (cost).
 const ROUNDS: usize = 4;
-/// A jump is of whole frames if it is by so many standard deviations, or by this part of a frame.
+/// A jump is of whole frames if it is by so many standard deviations (statistics: 3 σ), or by this part of a frame (judgement).
 const WHOLE_SD: f64 = 3.0;
 const WHOLE: f64 = 0.05;
-/// Values on each side of an instant without which nothing is said about it.
+/// Values on each side of an instant without which nothing is said about it (judgement).
 const FEWEST: usize = 8;
+/// Of the square of what a jump does less than this part is left by the projection: nothing can be said about it (numerics).
+const NOTHING_LEFT: f64 = 1e-4;
 
 /// The law.
 pub struct MissingFrames;
 
 impl Law for MissingFrames {
-    fn beside<'a>(&self, sought: &Sought<'_, 'a>) -> Option<Refit<'a>> {
-        let Sought { context, base, score, .. } = *sought;
+    fn beside<'a>(&self, sought: &FitRequest<'_, 'a>) -> Option<Refit<'a>> {
+        let FitRequest { context, base, score, .. } = *sought;
         let scored = score.and_then(|s| context.refit(&s.hypothesis(&base.hypothesis), base, &s.start));
         context.best_of([alone(context, base), scored.map(|fit| settled(context, fit))])
     }
@@ -52,7 +54,13 @@ impl Law for MissingFrames {
     }
 
     /// Any instant.
-    fn ln_kinds(&self, fit: &Refit<'_>, _effect: Effect, _of: &Coefficients<'_>, _settings: &PriorSettings) -> f64 {
+    fn ln_multiplicity(
+        &self,
+        fit: &Refit<'_>,
+        _effect: Effect,
+        _of: &Coefficients<'_>,
+        _settings: &PriorSettings,
+    ) -> f64 {
         let rows: usize = fit.problem.records.iter().map(Record::len).sum();
         (rows as f64).ln()
     }
@@ -204,7 +212,7 @@ fn scanned(screen: &Screen<'_, '_>) -> Option<Score> {
                 k += 1;
             }
             let left = square - along.iter().map(|a| a * a).sum::<f64>();
-            if left > 1e-4 * square && k > FEWEST && k + FEWEST < order.len() {
+            if left > NOTHING_LEFT * square && k > FEWEST && k + FEWEST < order.len() {
                 let gain = pull * pull / left;
                 if best.is_none_or(|(most, _, _)| gain > most) {
                     // between the two rows

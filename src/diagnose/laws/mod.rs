@@ -16,6 +16,7 @@ pub mod moving_support;
 mod oblique_view;
 mod ordinary;
 
+use nalgebra::DMatrix;
 use rayon::prelude::*;
 
 use super::context::FitContext;
@@ -28,7 +29,7 @@ use crate::model::Parameter;
 
 /// One effect to be sought beside a fit.
 #[derive(Debug, Clone, Copy)]
-pub struct Sought<'q, 'a> {
+pub struct FitRequest<'q, 'a> {
     /// What all fits share.
     pub context: &'q FitContext<'a>,
     /// The fit beside which it is sought.
@@ -47,10 +48,10 @@ pub type Coefficients<'c> = dyn Fn(Parameter) -> (f64, f64) + 'c;
 /// What is particular to a law.
 pub trait Law: Sync {
     /// The best fit of it beside another one, from every start that may lead to its minimum.
-    fn beside<'a>(&self, sought: &Sought<'_, 'a>) -> Option<Refit<'a>>;
+    fn beside<'a>(&self, sought: &FitRequest<'_, 'a>) -> Option<Refit<'a>>;
 
     /// The best fit of it beside another one from wherever it may be, where all else has failed: of a law with more false minima than its starts come by.
-    fn anywhere<'a>(&self, _context: &FitContext<'a>, _base: &Refit<'a>) -> Option<Refit<'a>> {
+    fn fit_from_many_starts<'a>(&self, _context: &FitContext<'a>, _base: &Refit<'a>) -> Option<Refit<'a>> {
         None
     }
 
@@ -81,7 +82,7 @@ pub trait Law: Sync {
     }
 
     /// ln of how many kinds of it there are beyond its strength: signs, phases, frequencies, instants.
-    fn ln_kinds(&self, fit: &Refit<'_>, effect: Effect, of: &Coefficients<'_>, settings: &PriorSettings) -> f64;
+    fn ln_multiplicity(&self, fit: &Refit<'_>, effect: Effect, of: &Coefficients<'_>, settings: &PriorSettings) -> f64;
 
     /// The odds that it is what it seems to be, in a fit among others, and stands for nothing else.
     fn odds(&self, _fit: &Refit<'_>, _others: &[&Refit<'_>], _settings: &Settings) -> f64 {
@@ -102,6 +103,39 @@ pub fn law_of(effect: Effect) -> &'static dyn Law {
     }
 }
 
+/// The coefficients of a fit's effects, each with its standard deviation.
+pub struct Estimates<'f> {
+    fit: &'f Refit<'f>,
+    /// The effects that have a strength.
+    pub effects: Vec<Effect>,
+    added: Vec<Parameter>,
+    /// Of the coefficients of these effects, everything else being free.
+    pub covariance: DMatrix<f64>,
+}
+
+impl<'f> Estimates<'f> {
+    /// Of a fit; `variance` scales that of the noise.
+    pub fn of(fit: &'f Refit<'f>, variance: f64) -> Self {
+        let has_strength = |effect: &&Effect| law_of(**effect).strength(**effect, &|_| (0.0, 0.0)).is_some();
+        let effects: Vec<Effect> = fit.hypothesis.effects.iter().filter(has_strength).copied().collect();
+        let added: Vec<Parameter> = effects.iter().flat_map(|effect| effect.parameters()).copied().collect();
+        let covariance = fit.covariance(&added) * variance;
+        Self { fit, effects, added, covariance }
+    }
+
+    /// A coefficient and its standard deviation.
+    pub fn value(&self, parameter: Parameter) -> (f64, f64) {
+        let i = self.added.iter().position(|p| *p == parameter).unwrap_or(0);
+        (self.fit.value(parameter).unwrap_or(0.0), self.covariance[(i, i)].sqrt())
+    }
+
+    /// Whether an effect's strength is told from zero.
+    pub fn tells(&self, effect: Effect, settings: &PriorSettings) -> bool {
+        let strength = law_of(effect).strength(effect, &|parameter| self.value(parameter));
+        strength.is_none_or(|(value, sd)| value.abs() > settings.min_significance * sd)
+    }
+}
+
 /// A fit, each of its laws settled.
 pub fn settled<'a>(context: &FitContext<'a>, fit: Refit<'a>) -> Refit<'a> {
     let effects = fit.hypothesis.effects.clone();
@@ -113,7 +147,7 @@ pub fn scores(screen: &Screen<'_, '_>, effects: &[Effect]) -> Vec<Score> {
     let further: Vec<Effect> = effects.iter().copied().filter(|e| !screen.fit.hypothesis.has(*e)).collect();
     // what is scanned for, or has corners that the others need not suffer, has a motion of its own
     let (alone, together): (Vec<Effect>, Vec<Effect>) =
-        further.into_iter().partition(|effect| effect.is_scanned() || effect.is_dear());
+        further.into_iter().partition(|effect| effect.is_scanned() || effect.is_expensive());
     let (together, alone) = rayon::join(
         || screen.of_coefficients(&together, None).unwrap_or_default(),
         || alone.par_iter().with_max_len(1).filter_map(|effect| law_of(*effect).scan(screen)).collect::<Vec<_>>(),
@@ -130,5 +164,5 @@ pub fn cheap_to_score(context: &FitContext<'_>, effects: &[Effect]) -> Vec<Effec
 
 /// Whether an effect has corners in every joint of a strip.
 pub fn has_corners_in_every_joint(context: &FitContext<'_>, effect: Effect) -> bool {
-    context.is_strip() && effect.has_corners()
+    context.is_strip() && effect.has_switching()
 }

@@ -13,27 +13,30 @@ use super::super::refit::Refit;
 use super::super::screen::{Score, Screen};
 use super::super::settings::{PriorSettings, Settings};
 use super::ordinary::Ordinary;
-use super::{Coefficients, Law, Sought};
+use super::{Coefficients, FitRequest, Law};
 use crate::model::Parameter;
 use crate::model::observe::chord_angles_rad;
 
-/// Frequencies: this fine for the length of the recording.
+/// Frequencies: this fine for the length of the recording (start values: as many as that tells apart).
 const PER_RESOLUTION: f64 = 1.0;
-/// Frequencies that are followed side by side.
+/// Frequencies that are followed side by side (cost: no answer depends on it).
 const AT_ONCE: usize = 8;
-/// Peaks over the frequency that are kept beside the highest.
+/// Peaks over the frequency that are kept beside the highest (cost).
 const FURTHER_PEAKS: usize = 4;
-/// Lowest and highest frequency, in units of the swing's. A slower one only leans, and has to move by metres to do so.
+/// Lowest and highest frequency, in units of the swing's. A slower one only leans, and has to move by metres to do so (physics); a faster one is not looked for
+/// (judgement).
 const LOWEST: f64 = 0.1;
 const HIGHEST: f64 = 8.0;
-/// Power of the motion at a frequency, over its largest, from which on a torque of that frequency is in step with it.
+/// The highest also as a part of half the rate (judgement).
+const OF_NYQUIST: f64 = 0.9;
+/// Power of the motion at a frequency, over its largest, from which on a torque of that frequency is in step with it (judgement: any line of the motion).
 const POWER_IN_STEP: f64 = 1e-5;
 
 /// The law.
 pub struct MovingSupport;
 
 impl Law for MovingSupport {
-    fn beside<'a>(&self, sought: &Sought<'_, 'a>) -> Option<Refit<'a>> {
+    fn beside<'a>(&self, sought: &FitRequest<'_, 'a>) -> Option<Refit<'a>> {
         Ordinary.beside(sought)
     }
 
@@ -47,17 +50,24 @@ impl Law for MovingSupport {
     }
 
     fn is_possible(&self, fit: &Refit<'_>, _prior: &PriorSettings) -> bool {
-        !only_leans(fit)
+        !is_quasi_static(fit)
     }
 
     /// A codec lets a tracked mark wander over seconds, by no more than its errors in step with the swing; an encoder rounds in step with it.
     fn is_seen(&self, fit: &Refit<'_>, without: &Refit<'_>) -> bool {
-        let share = fit.problem.records.iter().map(|record| record.in_step.max(record.rounding)).fold(0.0, f64::max);
+        let share =
+            fit.problem.records.iter().map(|record| record.synchronous.max(record.rounding)).fold(0.0, f64::max);
         without.chi2 - fit.chi2 >= share * share * fit.values() as f64
     }
 
     /// Any direction of the phase, and any frequency up to a multiple of the swing's.
-    fn ln_kinds(&self, _fit: &Refit<'_>, effect: Effect, of: &Coefficients<'_>, settings: &PriorSettings) -> f64 {
+    fn ln_multiplicity(
+        &self,
+        _fit: &Refit<'_>,
+        effect: Effect,
+        of: &Coefficients<'_>,
+        settings: &PriorSettings,
+    ) -> f64 {
         let amplitude_m = self.strength(effect, of).map_or(0.0, |strength| strength.0);
         (std::f64::consts::TAU * amplitude_m.abs()).ln() + settings.frequencies.ln()
     }
@@ -70,12 +80,12 @@ impl Law for MovingSupport {
         let rest = fit.hypothesis.without(Effect::SupportMotion);
         let is_slight = fit_of(&rest).is_some_and(|without| without.chi2 - fit.chi2 < prior.slight * prior.slight);
         if is_slight && rest.effects.iter().any(|e| e.place() != Place::Camera) {
-            return prior.completes_a_law;
+            return prior.within_law_error;
         }
         let Some(base) = fit_of(&Hypothesis::default()) else { return 1.0 };
         let powers = chord_powers(base);
-        let in_step = if is_in_step(&powers, hz) { prior.support_in_step } else { 1.0 };
-        in_step * chance_of_multiple(&powers, hz).map_or(1.0, |chance| chance / (1.0 + chance))
+        let synchronous = if is_in_step(&powers, hz) { prior.support_in_step } else { 1.0 };
+        synchronous * chance_of_multiple(&powers, hz).map_or(1.0, |chance| chance / (1.0 + chance))
     }
 }
 
@@ -91,12 +101,12 @@ fn scanned(screen: &Screen<'_, '_>) -> Option<Score> {
             let theta_rad = &linearisation.rows[k].theta_rad;
             DMatrix::from_fn(theta_rad.len(), 1, |i, _| -linearisation.chain.static_moment_kg_m(i) * theta_rad[i].cos())
         });
-        around.push((linearisation, transitions, model.pace_rad_s()));
+        around.push((linearisation, transitions, model.characteristic_rad_s()));
     }
     let span_s = around.iter().map(|(a, _, _)| a.t_s[a.t_s.len() - 1] - a.t_s[0]).fold(0.0, f64::max);
     let swing_hz = around[0].2 / std::f64::consts::TAU;
     let nyquist_hz = 0.5 * around.iter().map(|(a, _, _)| a.t_s.len() as f64).fold(0.0, f64::max) / span_s;
-    let count = (PER_RESOLUTION * span_s * (HIGHEST * swing_hz).min(0.9 * nyquist_hz)) as usize;
+    let count = (PER_RESOLUTION * span_s * (HIGHEST * swing_hz).min(OF_NYQUIST * nyquist_hz)) as usize;
     let hz = |k: usize| (k as f64 + 0.5) / (PER_RESOLUTION * span_s);
     let first = ((PER_RESOLUTION * span_s * LOWEST * swing_hz) as usize).max(1);
     let frequencies_hz: Vec<f64> = (first..count).map(hz).collect();
@@ -153,9 +163,9 @@ fn at_frequencies(
 }
 
 /// Whether the support of a fit moves so slowly beside the swing that nothing moves but the angles' zero.
-fn only_leans(fit: &Refit<'_>) -> bool {
+fn is_quasi_static(fit: &Refit<'_>) -> bool {
     let Ok((model, _)) = fit.problem.model(0, &fit.x[..fit.problem.free.len()]) else { return false };
-    let swing_hz = model.pace_rad_s() / std::f64::consts::TAU;
+    let swing_hz = model.characteristic_rad_s() / std::f64::consts::TAU;
     fit.value(Parameter::SupportFrequency).is_some_and(|hz| hz < LOWEST * swing_hz)
 }
 

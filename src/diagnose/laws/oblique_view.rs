@@ -7,7 +7,7 @@ use super::super::effect::Effect;
 use super::super::refit::Refit;
 use super::super::settings::PriorSettings;
 use super::ordinary::Ordinary;
-use super::{Coefficients, Law, Sought};
+use super::{Coefficients, FitRequest, Law};
 use crate::model::Parameter;
 
 /// Standard deviations of what a set-up errs beyond which it is none of its errors (statistics): a torque that changes the frequency with the amplitude looks like one.
@@ -19,7 +19,7 @@ pub struct ObliqueView;
 pub struct WrongScale;
 
 impl Law for ObliqueView {
-    fn beside<'a>(&self, sought: &Sought<'_, 'a>) -> Option<Refit<'a>> {
+    fn beside<'a>(&self, sought: &FitRequest<'_, 'a>) -> Option<Refit<'a>> {
         Ordinary.beside(sought)
     }
 
@@ -32,7 +32,13 @@ impl Law for ObliqueView {
     }
 
     /// Any direction.
-    fn ln_kinds(&self, _fit: &Refit<'_>, effect: Effect, of: &Coefficients<'_>, _settings: &PriorSettings) -> f64 {
+    fn ln_multiplicity(
+        &self,
+        _fit: &Refit<'_>,
+        effect: Effect,
+        of: &Coefficients<'_>,
+        _settings: &PriorSettings,
+    ) -> f64 {
         let size = self.strength(effect, of).map_or(0.0, |strength| strength.0);
         (std::f64::consts::TAU * size).ln()
     }
@@ -44,12 +50,12 @@ impl Law for ObliqueView {
 }
 
 impl Law for WrongScale {
-    fn beside<'a>(&self, sought: &Sought<'_, 'a>) -> Option<Refit<'a>> {
+    fn beside<'a>(&self, sought: &FitRequest<'_, 'a>) -> Option<Refit<'a>> {
         Ordinary.beside(sought)
     }
 
-    fn ln_kinds(&self, fit: &Refit<'_>, effect: Effect, of: &Coefficients<'_>, settings: &PriorSettings) -> f64 {
-        Ordinary.ln_kinds(fit, effect, of, settings)
+    fn ln_multiplicity(&self, fit: &Refit<'_>, effect: Effect, of: &Coefficients<'_>, settings: &PriorSettings) -> f64 {
+        Ordinary.ln_multiplicity(fit, effect, of, settings)
     }
 
     fn is_possible(&self, fit: &Refit<'_>, prior: &PriorSettings) -> bool {

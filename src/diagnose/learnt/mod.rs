@@ -1,4 +1,4 @@
-//! The law that no table holds: sought where the names leave more than noise, fitted in full simulation, proven on what was not fitted.
+//! A law that is not in the table: sought in a grammar of formulas where the known effects leave more than noise, and validated on what was held out.
 //!
 //! 1. Along the motion of the likeliest fit, which follows the recordings, every term of the [`grammar`](super::grammar) is a torque, and the linearised motion
 //!    says what it adds to the angles. With everything else that is free projected out, its fall of χ² is that of Rao's score test.
@@ -26,28 +26,28 @@
 //!
 //! | file | holds |
 //! |---|---|
-//! | `sought` | 1 and 2: what promises most |
-//! | `in_place` | 2: what exerts nearly the torque of a name |
-//! | `fitted` | 3: what is fitted, within a budget |
-//! | `described` | 4: how long each description is |
-//! | `along` | which effects a term stands for, and whether it gives energy |
-//! | `proven` | 5: what they predict, and the law that stands |
+//! | `term_screening` | 1 and 2: what promises most |
+//! | `substitutes` | 2: what exerts nearly the torque of a name |
+//! | `term_fitting` | 3: what is fitted, within a budget |
+//! | `description_length` | 4: how long each description is |
+//! | `term_torques` | which effects a term stands for, and whether it gives energy |
+//! | `validation` | 5: what they predict, and the law that stands |
 
-mod along;
-mod described;
-mod fitted;
-mod in_place;
-mod proven;
-mod sought;
+mod description_length;
+mod substitutes;
+mod term_fitting;
+mod term_screening;
+mod term_torques;
+mod validation;
 
 use super::context::FitContext;
 use super::effect::Effect;
 use super::heldout::HeldOut;
 use super::posterior::{Needed, Posterior};
-use described::{Described, descriptions, needed};
-use proven::{foretold, proven};
+use description_length::{Description, descriptions, needed};
+use validation::{foretold, proven};
 
-pub use proven::Learnt;
+pub use validation::Learnt;
 
 /// Learns what the likeliest fit leaves, where that is more than noise, where one of its names often stands for something else, or where it takes so many names that one
 /// law may do as well; the effects are those that may be at work. A strip's fits are too dear for it.
@@ -60,15 +60,15 @@ pub fn beside<'a>(
 ) -> (Vec<Needed>, Option<Learnt<'a>>) {
     let settings = context.settings;
     let many = posterior.best().hypothesis.effects.len() > settings.search.main_effects;
-    let remains = posterior.remains > settings.verdict.even || posterior.may_stand_in(settings) || many;
+    let remains = posterior.remains > settings.verdict.even || posterior.may_be_imitation(settings) || many;
     let is_worth = remains && !context.is_strip();
     let found = if is_worth { descriptions(context, posterior, effects) } else { None };
     let Some((order, along)) = found else { return (Vec::new(), None) };
-    let needed = |order: &[Described<'_>]| needed(context, order, posterior, effects, &along);
+    let needed = |order: &[Description<'_>]| needed(context, order, posterior, effects, &along);
     let Some(proof) = proof else { return (needed(&order), None) };
     let foretold = foretold(context, order, from_s);
     let learnt = proven(context, &foretold, proof, &along);
-    let order: Vec<Described<'a>> = foretold.into_iter().map(|own| own.0).collect();
+    let order: Vec<Description<'a>> = foretold.into_iter().map(|own| own.0).collect();
     // where no motion could be integrated, that says nothing of any effect
     let needed = if order.is_empty() { Vec::new() } else { needed(&order) };
     (needed, learnt)

@@ -1,4 +1,4 @@
-//! Horizon continuation: fits that begin with the beginning of each recording and follow it as it grows, where the best leave far more than noise.
+//! Horizon continuation: fits of growing first parts of the recordings, each begun where the last one ended, where the best leave far more than noise.
 //!
 //! The sum of squares of a long recording has many false minima, that of its beginning few. Where each part leads is where the next begins, so that no
 //! motion has to lose step. What two effects leave there may be a third one's: a real rig has several.
@@ -8,10 +8,10 @@ use rayon::prelude::*;
 use super::super::context::{FitContext, first_part};
 use super::super::effect::Effect;
 use super::super::hypothesis::Hypothesis;
-use super::super::misfit::{is_out_of_step, needs};
+use super::super::misfit::needs;
 use super::super::refit::{self, Refit, best_of_each_count, least, merged};
 use super::super::settings::SearchSettings;
-use super::beside::with_one_more;
+use super::one_more::with_one_more;
 use crate::fit::recordings;
 use crate::fit::search::PARTS;
 use crate::fit::whitening::RecordNoise;
@@ -31,8 +31,8 @@ pub fn continued<'a>(context: &FitContext<'a>, fits: &[Refit<'a>], effects: &[Ef
         let records = first_part(context.records, part);
         let early = context.on(&records);
         let there: Vec<Refit<'_>> = if followed.is_empty() {
-            let chosen = best_and_base(fits, settings.begun, Refit::left_share);
-            let begun = |place: &usize| on_the_beginning(context, &early, &fits[*place]);
+            let chosen = best_and_base(fits, settings.begun, Refit::relative_residual);
+            let begun = |place: &usize| refit_on_first_part(context, &early, &fits[*place]);
             chosen.par_iter().with_max_len(1).filter_map(begun).collect()
         } else {
             descended(&early, &noise, followed, steps.few_steps)
@@ -57,7 +57,7 @@ pub fn carried<'a>(context: &FitContext<'a>, fits: Vec<Refit<'_>>, part: f64, no
     };
     let keeps_step = |(hypothesis, x): &(Hypothesis, Vec<f64>)| {
         let there = context.descend_from(hypothesis, noise, x.clone(), 0);
-        there.is_some_and(|fit| !is_out_of_step(&fit, &context.settings.misfit))
+        there.is_some_and(|fit| !fit.has_lost_step(&context.settings.misfit))
     };
     let (mut at_the_end, mut followed): (Vec<_>, Vec<_>) =
         few(foremost(fits, settings)).into_iter().partition(keeps_step);
@@ -85,7 +85,7 @@ pub fn whole<'a>(context: &FitContext<'a>, of_pieces: &[Refit<'a>], noise: &[Rec
         let hypothesis =
             Hypothesis { dropped: fit.hypothesis.dropped.and_then(of_recording), ..fit.hypothesis.clone() };
         let whole = context.descend_from(&hypothesis, noise, x, few)?;
-        let grown = is_out_of_step(&whole, &settings.misfit).then(|| continued_alone(context, &whole)).flatten();
+        let grown = whole.has_lost_step(&settings.misfit).then(|| continue_one(context, &whole)).flatten();
         grown.into_iter().chain([whole]).min_by(|a, b| a.chi2.total_cmp(&b.chi2))
     };
     chosen.par_iter().with_max_len(1).filter_map(on_whole).collect()
@@ -105,7 +105,7 @@ fn to_follow(fits: Vec<Refit<'_>>) -> Vec<(Hypothesis, Vec<f64>)> {
 }
 
 /// A hypothesis by itself from the beginning of the recordings on.
-pub fn continued_alone<'a>(context: &FitContext<'a>, fit: &Refit<'a>) -> Option<Refit<'a>> {
+pub fn continue_one<'a>(context: &FitContext<'a>, fit: &Refit<'a>) -> Option<Refit<'a>> {
     continued(context, std::slice::from_ref(fit), &[]).pop()
 }
 
@@ -113,7 +113,7 @@ pub fn continued_alone<'a>(context: &FitContext<'a>, fit: &Refit<'a>) -> Option<
 pub fn swings(fits: &[Refit<'_>]) -> f64 {
     let of = |fit: &Refit<'_>| {
         let (model, _) = fit.problem.model(0, &[]).ok()?;
-        Some(fit.problem.longest_s() * model.pace_rad_s() / std::f64::consts::TAU)
+        Some(fit.problem.longest_s() * model.characteristic_rad_s() / std::f64::consts::TAU)
     };
     fits.first().and_then(of).unwrap_or(0.0)
 }
@@ -122,8 +122,8 @@ pub fn swings(fits: &[Refit<'_>]) -> f64 {
 fn foremost<'b>(fits: Vec<Refit<'b>>, settings: &SearchSettings) -> Vec<Refit<'b>> {
     let of_count = |count: usize| {
         let mut best = refit::best(&fits, settings.followed, |fit| fit.coefficients() == count, |fit| fit.chi2);
-        let most = settings.keeps_up * best.first().map_or(0.0, |place| fits[*place].left_share());
-        best.retain(|place| fits[*place].left_share() <= most);
+        let most = settings.keeps_up * best.first().map_or(0.0, |place| fits[*place].relative_residual());
+        best.retain(|place| fits[*place].relative_residual() <= most);
         best
     };
     let kept: Vec<usize> = (0..=settings.most_coefficients).flat_map(of_count).collect();
@@ -141,8 +141,8 @@ fn descended<'b>(
 }
 
 /// A fit's hypothesis on the beginning, from its own parameters or from those that short stretches led to, whichever leads further.
-pub fn on_the_beginning<'b>(context: &FitContext<'_>, early: &FitContext<'b>, fit: &Refit<'_>) -> Option<Refit<'b>> {
-    let fit = context.seen_to_start(fit);
+pub fn refit_on_first_part<'b>(context: &FitContext<'_>, early: &FitContext<'b>, fit: &Refit<'_>) -> Option<Refit<'b>> {
+    let fit = context.with_observed_starts(fit);
     let stretches: Vec<(Parameter, f64)> = context.base.iter().copied().zip(context.begun.iter().copied()).collect();
     let from = |start: &[(Parameter, f64)]| early.refit(&fit.hypothesis, &fit, start);
     [from(&[]), from(&stretches)].into_iter().flatten().min_by(|a, b| a.chi2.total_cmp(&b.chi2))

@@ -7,30 +7,33 @@
 //! |---|---|
 //! | [`rounds`] | the rounds, in order, and what each proposes |
 //! | [`proposal`] | what can be proposed, and how it is fitted |
-//! | [`beside`] | an effect beside a fit |
-//! | `count` | the number of a strip's rods |
-//! | `early` | the search of the first part, where the whole is dear |
+//! | [`one_more`] | an effect beside a fit |
+//! | `rod_count` | the number of a strip's rods |
+//! | `partial` | the search of the first part, where the whole takes too much work |
 //! | [`horizon`] | horizon continuation: fits that follow a recording from its beginning |
-//! | `judged` | the noise by which all fits are judged |
-//! | `pace` | a base model that swings at another pace than the recordings |
+//! | `reweighting` | the noise by which all fits are judged |
+//! | `frequency_match` | a base model whose frequency is not that of the recordings |
 //! | `strip` | a strip that is found to bend everywhere |
+//! | `superfluous` | effects that a set of several does not need |
 
-pub mod beside;
-mod count;
-mod early;
+mod frequency_match;
 pub mod horizon;
-mod judged;
-mod pace;
+pub mod one_more;
+mod partial;
 pub mod proposal;
+mod reweighting;
+mod rod_count;
 pub mod rounds;
 mod strip;
+mod superfluous;
 
 use std::sync::OnceLock;
 
 use rayon::prelude::*;
 
 use super::base;
-use super::context::{FitContext, without_errors_in_step};
+use super::base_priors::{DampingAssumption, lacks_a_damper};
+use super::context::{FitContext, without_synchronous_errors};
 use super::effect::Effect;
 use super::hypothesis::{Compared, Hypothesis};
 use super::laws;
@@ -39,16 +42,17 @@ use super::preparation::Prepared;
 use super::refit::{Refit, least, least_chi2, merged};
 use super::screen::{Score, Screen};
 use super::settings::Settings;
-use super::taken::{Taken, lacks_a_damper};
 use crate::error::Result;
 use crate::experiment::Experiment;
 use crate::progress::Progress;
-use pace::Paced;
+use frequency_match::FrequencyMatched;
 use proposal::Proposal;
-use rounds::{Learns, Round, Tried};
+use rounds::{NoiseUpdate, Round, Tried};
 
 /// Proposals fitted together, between two looks at the budget.
 const TOGETHER: usize = 4;
+/// A fit of the same hypothesis is better where its χ² is lower by more than this (statistics: half of an ln-likelihood).
+const BETTER_BY: f64 = 1.0;
 
 /// A hypothesis and the variables that its fit is to begin with.
 type Begun = (Hypothesis, Vec<f64>);
@@ -84,17 +88,17 @@ pub struct Search<'a, 'p> {
     /// What the effects promise at the base model.
     scores: Vec<Score>,
     /// Where they are sought from, if a clock takes its pace.
-    paced: Option<Paced<'a>>,
+    frequency_matched: Option<FrequencyMatched<'a>>,
     /// Single effects that a search of the first part did not tell from its best.
-    tied: Vec<Effect>,
+    indistinguishable: Vec<Effect>,
     /// Whether the file is taken loosely.
-    is_loose: bool,
+    has_added_damper: bool,
     /// How stiff the strip is if it bends everywhere, where that explains most of what the base model's joint leaves.
     bending_n_m2: Option<f64>,
     /// What another base model's best fit leaves of the swing: where the single effects leave more, this search is not worth its cost.
     rival: Option<f64>,
     /// It ended there, or where a strip was found to bend, or to be made of another number of rods.
-    is_cut_short: bool,
+    stopped_early: bool,
     /// That number.
     count: Option<usize>,
     /// What led with another number.
@@ -102,7 +106,7 @@ pub struct Search<'a, 'p> {
     /// What searches that it goes on from have held against every other effect, and the hypotheses of which each effect was exchanged.
     compared: Compared,
     /// The work that had been done when it began, the base model's fit with it.
-    begun_at: u64,
+    work_at_start: u64,
     /// The work up to which the present phase may go.
     until: u64,
     /// The part of the recordings that its first rounds fitted.
@@ -118,15 +122,15 @@ impl<'a, 'p> Search<'a, 'p> {
     pub fn of_base_model(
         prepared: &'a Prepared,
         experiment: &'a Experiment,
-        taken: Taken,
+        taken: DampingAssumption,
         settings: &'a Settings,
         progress: &'p dyn Progress,
     ) -> Result<Self> {
         let context = base::context(prepared, experiment, taken, settings)?;
         let fit = base::fitted(&context, prepared)?;
-        let begun_at = context.work.done();
-        let is_loose = taken == Taken::Loosely;
-        Ok(Self { is_loose, ..Self::begun(prepared, context, fit, begun_at, progress) })
+        let work_at_start = context.work.done();
+        let has_added_damper = taken == DampingAssumption::WithDamper;
+        Ok(Self { has_added_damper, ..Self::begun(prepared, context, fit, work_at_start, progress) })
     }
 
     /// Of the whole recordings, the file taken at its word: there is the base model's fit, and no work is allowed yet.
@@ -134,7 +138,7 @@ impl<'a, 'p> Search<'a, 'p> {
         prepared: &'a Prepared,
         context: FitContext<'a>,
         base: Refit<'a>,
-        begun_at: u64,
+        work_at_start: u64,
         progress: &'p dyn Progress,
     ) -> Self {
         let effects = base::candidates(&context);
@@ -148,51 +152,52 @@ impl<'a, 'p> Search<'a, 'p> {
             rounds: Vec::new(),
             undecided: Vec::new(),
             scores,
-            paced: None,
-            tied: Vec::new(),
-            is_loose: false,
+            frequency_matched: None,
+            indistinguishable: Vec::new(),
+            has_added_damper: false,
             bending_n_m2: None,
             rival: None,
-            is_cut_short: false,
+            stopped_early: false,
             count: None,
             led: Vec::new(),
             compared: Compared::default(),
-            begun_at,
-            until: begun_at,
+            work_at_start,
+            until: work_at_start,
             part: 1.0,
             progress,
         }
     }
 
     /// Searches for what the base model lacks, the file taken at its word. Whole recordings of a rig that are dear and far from the model are left to their pieces:
-    /// of bearings and castings no model is right to the noise. It is cut short where a strip is found to bend everywhere, see [`Self::of_bending_strip`], or to
-    /// be made of another number of rods, see [`Self::recounted`].
+    /// of bearings and castings no model is right to the noise. It is cut short where a strip is found to bend everywhere, see [`Self::bending_strip_search`], or to
+    /// be made of another number of rods, see [`Self::searched_with_preferred_rods`].
     pub fn run(&mut self) {
         let is_rig = !self.context.experiment.specimen.links.is_empty();
         if is_rig && self.prepared.part < 1.0 && self.leaves_more_than_noise() && self.pieces().is_some() {
             return;
         }
         self.begin();
-        if !self.is_cut_short {
+        if !self.stopped_early {
             self.end();
         }
     }
 
     fn end(&mut self) {
-        self.allow_errors_in_step();
+        self.drop_superfluous();
+        self.add_synchronous_errors();
         self.allow(self.context.settings.search.shares.certified);
         self.certify();
     }
 
     /// Allows the search a share of the budget that was left when it began.
     fn allow(&mut self, share: f64) {
-        self.until = self.up_to(share);
+        self.until = self.work_limit_at(share);
     }
 
     /// The work at which a share is spent of the budget that was left when the search began.
-    fn up_to(&self, share: f64) -> u64 {
-        let left = self.context.settings.search.budget.saturating_sub(self.begun_at);
-        self.begun_at + (share * left as f64) as u64
+    fn work_limit_at(&self, share: f64) -> u64 {
+        let left = self.context.settings.search.budget.saturating_sub(self.work_at_start);
+        self.work_at_start + (share * left as f64) as u64
     }
 
     /// The same with what another search has spent before, or in vain.
@@ -209,8 +214,8 @@ impl<'a, 'p> Search<'a, 'p> {
     /// The recordings in pieces; `None` of a strip, whose marks do not show where its rods begin, and where they are too short.
     fn pieces(&self) -> Option<Prepared> {
         let (model, _) = self.base().problem.model(0, &[]).ok()?;
-        let cut = || self.prepared.in_pieces(self.context.settings, model.pace_rad_s());
-        let bends = self.context.is_strip() || self.context.fine_strip.is_some();
+        let cut = || self.prepared.in_pieces(self.context.settings, model.characteristic_rad_s());
+        let bends = self.context.is_strip() || self.context.identified_strip.is_some();
         (!bends && !self.context.is_in_pieces()).then(cut).flatten()
     }
 
@@ -220,13 +225,13 @@ impl<'a, 'p> Search<'a, 'p> {
         let pieces = self.leaves_more_than_noise().then(|| self.pieces()).flatten()?;
         let (experiment, settings) = (self.context.experiment, self.context.settings);
         // there is no time for both
-        let taken = Taken::at_first(experiment, self.context.marks(), true);
+        let taken = DampingAssumption::at_first(experiment, self.context.marks(), true);
         let mut search =
             Self::of_base_model(kept.get_or_init(|| pieces), experiment, taken, settings, self.progress).ok()?;
         // what the stretches ask for is where the search for more and fewer effects begins
         search.allow(settings.search.shares.usual);
         search.round(Round::Asked, &mut Tried::default());
-        search.learn_noise();
+        search.update_noise();
         if search.fits.len() == 1 {
             search.begin();
         }
@@ -237,29 +242,31 @@ impl<'a, 'p> Search<'a, 'p> {
     /// loosely if it may be doubted, and from the beginning of the recordings on.
     #[must_use]
     pub fn doubted(self, pieces: &'a OnceLock<Prepared>) -> Self {
-        let enough = self.up_to(self.context.settings.search.shares.certified);
-        let loosened = || {
+        let enough = self.work_limit_at(self.context.settings.search.shares.certified);
+        let with_damper = || {
             (self.context.work.done() < enough).then_some(())?;
             let lacks_a_damper = lacks_a_damper(self.context.experiment, self.context.marks());
-            (!self.is_loose && lacks_a_damper && self.leaves_more_than_noise()).then_some(())?;
+            (!self.has_added_damper && lacks_a_damper && self.leaves_more_than_noise()).then_some(())?;
             let (experiment, settings) = (self.context.experiment, self.context.settings);
-            let mut loosened =
-                Self::of_base_model(self.prepared, experiment, Taken::Loosely, settings, self.progress).ok()?;
-            loosened.begin();
-            Some(loosened)
+            let mut with_damper =
+                Self::of_base_model(self.prepared, experiment, DampingAssumption::WithDamper, settings, self.progress)
+                    .ok()?;
+            with_damper.begin();
+            Some(with_damper)
         };
         let mut search = match self.in_pieces(pieces) {
             Some(of_pieces) if of_pieces.leaves_more_than_noise() => of_pieces.after(self),
             // where a model is right to the noise the whole tells more than its pieces
             Some(of_pieces) => self.led_by(of_pieces),
-            None => match loosened() {
+            None => match with_damper() {
                 Some(other) => other.after(self),
                 None => self,
             },
         };
         search.allow(search.context.settings.search.shares.further);
         search.further();
-        search.allow_errors_in_step();
+        search.drop_superfluous();
+        search.add_synchronous_errors();
         search.allow(1.0);
         search.certify();
         search
@@ -269,7 +276,7 @@ impl<'a, 'p> Search<'a, 'p> {
     fn led_by(mut self, of_pieces: Self) -> Self {
         let found: Vec<Refit<'a>> = horizon::whole(&self.context, &of_pieces.fits, &self.base().problem.noise);
         self.keep(found);
-        self.learn_noise();
+        self.update_noise();
         self.after(of_pieces)
     }
 
@@ -305,22 +312,23 @@ impl<'a, 'p> Search<'a, 'p> {
     /// Singles and pairs, until a strip is found to bend everywhere, or to be made of another number of rods: pairs would make up for a wrong one.
     fn usual(&mut self) {
         self.allow(self.context.settings.search.shares.usual);
-        self.take_up();
-        self.seek_pace();
+        self.fit_warm_starts();
+        self.match_frequency();
         for round in Round::USUAL {
             self.round(round, &mut Tried::default());
-            if round == Round::DearSingles && (self.bends() || self.is_behind() || self.is_miscounted()) {
-                self.is_cut_short = true;
+            if round == Round::ExpensiveSingles && (self.bends() || self.is_behind() || self.prefers_other_rod_count())
+            {
+                self.stopped_early = true;
                 return;
             }
         }
-        self.seek_bending();
+        self.try_bending();
     }
 
     /// Restarts where the best fit leaves more than noise. A strip's fits are too dear for it.
     fn restarts(&mut self) {
         self.allow(self.context.settings.search.shares.restarts);
-        if !self.is_cut_short && !self.context.is_strip() && self.misfit().is_some_and(|misfit| misfit.unexplained) {
+        if !self.stopped_early && !self.context.is_strip() && self.misfit().is_some_and(|misfit| misfit.unexplained) {
             Round::RESTARTS.into_iter().for_each(|round| self.round(round, &mut Tried::default()));
         }
     }
@@ -336,7 +344,7 @@ impl<'a, 'p> Search<'a, 'p> {
     /// More effects and fewer, by turns, until nothing new leads the way; first, where far more than noise is left, from the beginning of whole recordings, or of pieces
     /// with fewer.
     fn further(&mut self) {
-        self.judge_by(&without_errors_in_step(&self.base().problem.noise), 0);
+        self.reweight(&without_synchronous_errors(&self.base().problem.noise), 0);
         let mut tried = Tried::default();
         if self.context.is_in_pieces() {
             // the stretches have asked for as many laws as are worth it
@@ -390,12 +398,12 @@ impl<'a, 'p> Search<'a, 'p> {
             bettered,
         });
         self.keep(found);
-        if round == Round::DearSingles {
+        if round == Round::ExpensiveSingles {
             self.fits[1..].sort_by(|a, b| a.hypothesis.effects.cmp(&b.hypothesis.effects));
         }
         match round.learns() {
-            Learns::Always => self.learn_noise(),
-            Learns::IfLower if least_chi2(&self.fits) < before => self.learn_noise(),
+            NoiseUpdate::Always => self.update_noise(),
+            NoiseUpdate::IfLower if least_chi2(&self.fits) < before => self.update_noise(),
             _ => {}
         }
     }
@@ -427,7 +435,7 @@ impl<'a, 'p> Search<'a, 'p> {
     /// How many hypotheses some fits are new to, or do better.
     fn bettered_by(&self, found: &[Refit<'a>]) -> usize {
         let known = |fit: &Refit<'a>| self.fits.iter().find(|own| own.hypothesis.effects == fit.hypothesis.effects);
-        found.iter().filter(|fit| known(fit).is_none_or(|known| fit.chi2 < known.chi2 - 1.0)).count()
+        found.iter().filter(|fit| known(fit).is_none_or(|known| fit.chi2 < known.chi2 - BETTER_BY)).count()
     }
 
     /// How much the base model lacks.

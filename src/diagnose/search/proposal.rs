@@ -8,14 +8,15 @@ use super::super::laws::{self, law_of};
 use super::super::refit::{Certificate, Refit};
 use super::super::screen::{Score, Screen};
 use super::super::stretches::Asked;
-use super::beside::Beside;
+use super::BETTER_BY;
 use super::horizon;
+use super::one_more::Beside;
 use crate::fit::Record;
 use crate::model::Parameter;
 
-/// Two losses that together imitate a viscous damper, one growing as the swing becomes small, the other falling.
-pub const TRADED: [Effect; 2] = [Effect::HingeCoulomb, Effect::AirQuadratic];
-/// What is left of the base model's dampers where they take its place.
+/// Two losses that together imitate a viscous damper, one growing as the swing becomes small, the other falling (physics).
+pub const DAMPER_IMITATION: [Effect; 2] = [Effect::HingeCoulomb, Effect::AirQuadratic];
+/// What is left of the base model's dampers where they take its place (start values).
 const LEFT_OF_DAMPERS: f64 = 0.1;
 
 /// One thing to fit.
@@ -25,10 +26,10 @@ pub enum Proposal<'f, 'a> {
     Beside(Beside<'f, 'a>),
     /// An effect beside a fit, from where its score points.
     Scored(&'f Refit<'a>, Score),
-    /// [`TRADED`] in the place of the base model's dampers: beside them each of the two promises nothing.
-    Traded(&'f Refit<'a>),
+    /// [`DAMPER_IMITATION`] in the place of the base model's dampers: beside them each of the two promises nothing.
+    ReplaceDampers(&'f Refit<'a>),
     /// An effect beside a fit from wherever it may be.
-    Anywhere(&'f Refit<'a>, Effect),
+    ManyStarts(&'f Refit<'a>, Effect),
     /// A hypothesis that has a fit, from where another one stands.
     FromLeader {
         /// The fit that it has.
@@ -50,9 +51,9 @@ pub enum Proposal<'f, 'a> {
     /// A hypothesis from the base model's fit, followed from the beginning of the recordings on.
     FromTheBeginning(Hypothesis, &'f Refit<'a>),
     /// A fit without one of its effects, and with another one of these in its place.
-    Instead(&'f Refit<'a>, Effect, &'f [Effect]),
+    Exchange(&'f Refit<'a>, Effect, &'f [Effect]),
     /// A hypothesis anew from short stretches, beside what is left without.
-    Anew(Hypothesis, &'f Refit<'a>),
+    ByShooting(Hypothesis, &'f Refit<'a>),
     /// The hypotheses of these fits from the beginning of the recordings on, and beside the best of each part other effects.
     Continued(&'f [Refit<'a>], &'f [Effect]),
 }
@@ -61,7 +62,7 @@ impl<'a> Proposal<'_, 'a> {
     /// The effects of a fit of which one is held against every other.
     fn exchanges(&self) -> Option<&[Effect]> {
         match self {
-            Self::Instead(fit, _, others) if !others.is_empty() => Some(&fit.hypothesis.effects),
+            Self::Exchange(fit, _, others) if !others.is_empty() => Some(&fit.hypothesis.effects),
             _ => None,
         }
     }
@@ -74,14 +75,14 @@ impl<'a> Proposal<'_, 'a> {
                 let fit = context.refit(&score.hypothesis(&base.hypothesis), base, &score.start);
                 fit.map(|fit| laws::settled(context, fit)).into_iter().collect()
             }
-            Self::Traded(base) => traded(context, base).into_iter().collect(),
-            Self::Anywhere(base, effect) => law_of(*effect).anywhere(context, base).into_iter().collect(),
+            Self::ReplaceDampers(base) => replace_dampers(context, base).into_iter().collect(),
+            Self::ManyStarts(base, effect) => law_of(*effect).fit_from_many_starts(context, base).into_iter().collect(),
             Self::FromLeader { fit, hypothesis, leader } => {
                 from_leader(context, fit, hypothesis, leader).into_iter().collect()
             }
             Self::Restart(fit) => restarted(context, fit).into_iter().collect(),
             Self::Along(hypothesis, leader, bound) => {
-                context.refit_along(hypothesis, leader, *bound).into_iter().collect()
+                context.refit_along_fit(hypothesis, leader, *bound).into_iter().collect()
             }
             Self::Asked(asked, base) => {
                 context.refit_along_recording(&asked.hypothesis, base, &asked.start).into_iter().collect()
@@ -89,12 +90,12 @@ impl<'a> Proposal<'_, 'a> {
             Self::Nested(hypothesis, within) => context.refit(hypothesis, within, &[]).into_iter().collect(),
             Self::FromTheBeginning(hypothesis, base) => {
                 let begun = Refit { hypothesis: hypothesis.clone(), ..(*base).clone() };
-                horizon::continued_alone(context, &begun).into_iter().collect()
+                horizon::continue_one(context, &begun).into_iter().collect()
             }
-            Self::Instead(fit, effect, others) => instead(context, fit, *effect, others),
-            Self::Anew(hypothesis, without) => {
-                let anew = context.refit_anew(hypothesis, &[], without);
-                let ended = |fit: Refit<'a>| match fit.converged || hypothesis.is_dear() {
+            Self::Exchange(fit, effect, others) => instead(context, fit, *effect, others),
+            Self::ByShooting(hypothesis, without) => {
+                let anew = context.refit_by_shooting(hypothesis, &[], without);
+                let ended = |fit: Refit<'a>| match fit.converged || hypothesis.is_expensive() {
                     true => Some(fit),
                     false => context.go_on(&fit, context.settings.descent.most_steps),
                 };
@@ -115,8 +116,9 @@ pub fn exchanged(proposals: &[Proposal<'_, '_>]) -> Vec<Vec<Effect>> {
 }
 
 /// A fit of two losses that take half of the energy each that the base model's dampers took.
-fn traded<'a>(context: &FitContext<'a>, base: &Refit<'a>) -> Option<Refit<'a>> {
-    let hypothesis = TRADED.iter().fold(base.hypothesis.clone(), |hypothesis, effect| hypothesis.and(*effect, None));
+fn replace_dampers<'a>(context: &FitContext<'a>, base: &Refit<'a>) -> Option<Refit<'a>> {
+    let hypothesis =
+        DAMPER_IMITATION.iter().fold(base.hypothesis.clone(), |hypothesis, effect| hypothesis.and(*effect, None));
     let dampers: Vec<(Parameter, f64)> = Effect::losses()
         .into_iter()
         .filter_map(|(parameter, _)| Some((parameter, base.value(parameter)?)))
@@ -124,7 +126,9 @@ fn traded<'a>(context: &FitContext<'a>, base: &Refit<'a>) -> Option<Refit<'a>> {
         .collect();
     let of = |parameter: Parameter| work_of_unit_j(base, parameter);
     let taken_j: f64 = dampers.iter().map(|(parameter, value)| value * of(*parameter)).sum();
-    let new = TRADED.map(|effect| effect.parameters()[0]).map(|parameter| (parameter, 0.5 * taken_j / of(parameter)));
+    let new = DAMPER_IMITATION
+        .map(|effect| effect.parameters()[0])
+        .map(|parameter| (parameter, 0.5 * taken_j / of(parameter)));
     let less = dampers.iter().map(|(parameter, value)| (*parameter, LEFT_OF_DAMPERS * value));
     let start: Vec<(Parameter, f64)> = new.into_iter().chain(less).collect();
     start.iter().all(|(_, value)| value.is_finite() && *value > 0.0).then_some(())?;
@@ -144,7 +148,7 @@ fn from_leader<'a>(
     if !(context.cost_at(hypothesis, leader, &own) < fit.chi2) {
         return None;
     }
-    context.refit(hypothesis, leader, &own).filter(|again| again.chi2 < fit.chi2 - 1.0)
+    context.refit(hypothesis, leader, &own).filter(|again| again.chi2 < fit.chi2 - BETTER_BY)
 }
 
 fn restarted<'a>(context: &FitContext<'a>, fit: &Refit<'a>) -> Option<Refit<'a>> {
@@ -189,10 +193,10 @@ fn without<'a>(context: &FitContext<'a>, fit: &Refit<'a>, effect: Effect) -> Opt
     let fewer = Refit { hypothesis: fit.hypothesis.without(effect), ..fit.clone() };
     let near = context.refit(&fewer.hypothesis, &fewer, &[]);
     // pieces are too short to fall out of step
-    let continued = (!context.is_in_pieces()).then(|| horizon::continued_alone(context, &fewer)).flatten();
+    let continued = (!context.is_in_pieces()).then(|| horizon::continue_one(context, &fewer)).flatten();
     let best = near.into_iter().chain(continued).min_by(|a, b| a.chi2.total_cmp(&b.chi2))?;
-    let is_dear = context.is_in_pieces() && best.hypothesis.has_corners();
-    if best.converged || is_dear { Some(best) } else { context.go_on(&best, context.settings.descent.most_steps) }
+    let is_expensive = context.is_in_pieces() && best.hypothesis.has_switching();
+    if best.converged || is_expensive { Some(best) } else { context.go_on(&best, context.settings.descent.most_steps) }
 }
 
 /// A fit with fewer effects and another one instead, where that promises most of what the one left out would from there.
@@ -203,7 +207,7 @@ fn in_its_place<'a>(
     effects: &[Effect],
 ) -> Vec<Refit<'a>> {
     let cheap: Vec<Effect> =
-        effects.iter().copied().filter(|own| !context.is_in_pieces() || !own.has_corners()).collect();
+        effects.iter().copied().filter(|own| !context.is_in_pieces() || !own.has_switching()).collect();
     let scores = Screen::at(context, fewer).map(|screen| laws::scores(&screen, &cheap)).unwrap_or_default();
     let (own, others): (Vec<Score>, Vec<Score>) =
         scores.into_iter().partition(|score| fit.hypothesis.has(score.effect));

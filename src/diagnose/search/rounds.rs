@@ -10,9 +10,14 @@ use super::super::refit::{Refit, best, best_of_each_count, least, least_chi2};
 use super::super::screen::{Score, Screen};
 use super::super::stretches::asked_for;
 use super::Search;
-use super::beside::Beside;
-use super::pace::Paced;
-use super::proposal::{Proposal, TRADED, comes_to_rest};
+use super::frequency_match::FrequencyMatched;
+use super::one_more::Beside;
+use super::proposal::{DAMPER_IMITATION, Proposal, comes_to_rest};
+
+/// A fall of χ² by this much is worth a pair: of its first effect below the base model, and promised for the second (statistics: 2 σ of one number).
+const WORTH_A_PAIR: f64 = 4.0;
+/// A pair is still promising where it promises this much more than the multiple of the least χ² that is stated for it (cost).
+const PAIR_MARGIN: f64 = 100.0;
 
 /// One round.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -22,27 +27,27 @@ pub enum Round {
     /// Every effect alone, beside the base model.
     Singles,
     /// Those that are dear to fit: sought the longer the less the others explain.
-    DearSingles,
+    ExpensiveSingles,
     /// What has corners in every joint of a strip: a step of it is as dear as ten of another effect's.
     StripCorners,
     /// After a search of the first part of recordings, the single effects that it does not tell from its best: the whole of them may.
-    Tied,
+    Indistinguishable,
     /// The others from where one effect stands that explains most of what the base model leaves, with another spring or damper.
-    FromTheLeader,
+    FromBest,
     /// Pairs that promise most, each from the better of its two singles.
     Pairs,
-    /// Simpler hypotheses from where a richer one has found a better minimum.
-    Stragglers,
+    /// Simpler hypotheses from a fit with more effects that has found a lower minimum.
+    FromRicherFits,
     /// Single effects, and none, along the motion of the best fit, where they leave more.
-    AlongTheLeader,
+    AlongBest,
     /// Hypotheses that leave more than one with fewer of their effects, which proves a failed fit: from that one.
     Nested,
     /// The likeliest hypotheses from further starts, until enough of them agree.
     Certify,
     /// The best single effects anew from the first part of the recordings.
-    RestartedLeaders,
+    RestartedSingles,
     /// Every effect beside the best single ones, from all its starts.
-    BesideLeaders,
+    BesideSingles,
     /// The best fits anew from the first part of the recordings.
     RestartedBest,
     /// The best fits from the beginning of the recordings on.
@@ -55,7 +60,7 @@ pub enum Round {
 
 /// When the noise is learnt anew after a round.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Learns {
+pub enum NoiseUpdate {
     /// Not.
     Never,
     /// Where the best fit leaves less than before.
@@ -69,33 +74,33 @@ impl Round {
     pub const USUAL: [Self; 8] = [
         Self::Asked,
         Self::Singles,
-        Self::DearSingles,
-        Self::FromTheLeader,
-        Self::AlongTheLeader,
+        Self::ExpensiveSingles,
+        Self::FromBest,
+        Self::AlongBest,
         Self::Pairs,
-        Self::Stragglers,
+        Self::FromRicherFits,
         Self::StripCorners,
     ];
     /// Those where the best of the usual ones leaves more than noise: it may stand in a false minimum, or its partner have been sought from the wrong place.
-    pub const RESTARTS: [Self; 3] = [Self::RestartedLeaders, Self::BesideLeaders, Self::RestartedBest];
+    pub const RESTARTS: [Self; 3] = [Self::RestartedSingles, Self::BesideSingles, Self::RestartedBest];
 
     /// The name, of which progress tells.
     pub fn name(self) -> &'static str {
         match self {
             Self::Asked => "sets from short stretches",
             Self::Singles => "single effects",
-            Self::DearSingles => "slow single effects",
+            Self::ExpensiveSingles => "slow single effects",
             Self::StripCorners => "hysteresis in all joints",
-            Self::Tied => "undecided single effects",
-            Self::FromTheLeader => "second effects beside the best",
+            Self::Indistinguishable => "undecided single effects",
+            Self::FromBest => "second effects beside the best",
             Self::Pairs => "pairs of effects",
-            Self::Stragglers => "restarts from better fits",
-            Self::AlongTheLeader => "restarts along the best fit",
+            Self::FromRicherFits => "restarts from better fits",
+            Self::AlongBest => "restarts along the best fit",
             Self::Nested => "restarts from smaller sets",
             Self::Certify => "further starts",
-            Self::RestartedLeaders => "restarts of the best single effects",
+            Self::RestartedSingles => "restarts of the best single effects",
             Self::RestartedBest => "restarts of the best fits",
-            Self::BesideLeaders => "second effects from further starts",
+            Self::BesideSingles => "second effects from further starts",
             Self::FromTheBeginning => "extension from the beginning",
             Self::OneMore => "one effect more",
             Self::OneFewer => "one effect less",
@@ -103,11 +108,11 @@ impl Round {
     }
 
     /// When the noise is learnt anew.
-    pub fn learns(self) -> Learns {
+    pub fn learns(self) -> NoiseUpdate {
         match self {
-            Self::AlongTheLeader | Self::Pairs | Self::RestartedBest | Self::OneFewer => Learns::Always,
-            Self::Stragglers => Learns::IfLower,
-            _ => Learns::Never,
+            Self::AlongBest | Self::Pairs | Self::RestartedBest | Self::OneFewer => NoiseUpdate::Always,
+            Self::FromRicherFits => NoiseUpdate::IfLower,
+            _ => NoiseUpdate::Never,
         }
     }
 
@@ -116,17 +121,17 @@ impl Round {
         match self {
             Self::Asked => search.asked(),
             Self::Singles => search.singles(),
-            Self::DearSingles => search.dear_singles(false),
+            Self::ExpensiveSingles => search.dear_singles(false),
             Self::StripCorners => search.dear_singles(true),
-            Self::Tied => search.tied(),
-            Self::FromTheLeader => search.begun_at_the_leader(),
+            Self::Indistinguishable => search.indistinguishable(),
+            Self::FromBest => search.begun_at_the_leader(),
             Self::Pairs => search.pairs(),
-            Self::Stragglers => search.stragglers(),
-            Self::AlongTheLeader => search.along_the_leader(),
+            Self::FromRicherFits => search.started_from_richer_fits(),
+            Self::AlongBest => search.along_the_leader(),
             Self::Nested => search.nested(),
             Self::Certify => search.further_starts(),
-            Self::RestartedLeaders => search.leaders().into_iter().map(Proposal::Restart).collect(),
-            Self::BesideLeaders => search.beside_leaders(),
+            Self::RestartedSingles => search.leaders().into_iter().map(Proposal::Restart).collect(),
+            Self::BesideSingles => search.beside_leaders(),
             Self::RestartedBest => search.restarted_best(),
             Self::FromTheBeginning => vec![Proposal::Continued(&search.fits, &search.effects)],
             Self::OneMore => search.one_more(tried),
@@ -169,28 +174,28 @@ impl<'a> Search<'a, '_> {
     }
 
     /// Along the motion of the best fit of the whole; where that has no effect, beside it, those first that the whole promises.
-    fn tied(&self) -> Vec<Proposal<'_, 'a>> {
+    fn indistinguishable(&self) -> Vec<Proposal<'_, 'a>> {
         let settings = self.context.settings;
         let Some(best) = least(&self.fits) else { return Vec::new() };
         let needs = |fit: &Refit<'a>| needs(fit, best, &settings.misfit);
         let leader = self.fits.iter().min_by(|a, b| needs(a).total_cmp(&needs(b))).unwrap_or(best);
         let is_new = |effect: &Effect| !self.fits.iter().any(|fit| fit.hypothesis.effects == [*effect]);
-        let mut tied: Vec<Effect> = self.tied.iter().copied().filter(is_new).collect();
+        let mut indistinguishable: Vec<Effect> = self.indistinguishable.iter().copied().filter(is_new).collect();
         if !leader.hypothesis.effects.is_empty() {
-            tied.truncate(settings.search.tried);
+            indistinguishable.truncate(settings.search.tried);
             let along =
                 |effect| Proposal::Along(Hypothesis { effects: vec![effect], dropped: None }, leader, f64::INFINITY);
-            return tied.into_iter().map(along).collect();
+            return indistinguishable.into_iter().map(along).collect();
         }
         let promised = |effect: Effect| self.scores.iter().find(|s| s.effect == effect).map_or(0.0, |s| s.gain);
-        tied.retain(|effect| promised(*effect) > settings.misfit.counts);
-        tied.sort_by(|a, b| promised(*b).total_cmp(&promised(*a)));
-        tied.truncate(settings.search.tried);
-        self.beside_base(self.lacking(), |effect| tied.contains(&effect))
+        indistinguishable.retain(|effect| promised(*effect) > settings.misfit.counts);
+        indistinguishable.sort_by(|a, b| promised(*b).total_cmp(&promised(*a)));
+        indistinguishable.truncate(settings.search.tried);
+        self.beside_base(self.lacking(), |effect| indistinguishable.contains(&effect))
     }
 
     fn beside_base(&self, misfit: Misfit, is_of_kind: impl Fn(Effect) -> bool) -> Vec<Proposal<'_, 'a>> {
-        if let Some(Paced { base, scores }) = &self.paced {
+        if let Some(FrequencyMatched { base, scores }) = &self.frequency_matched {
             let of_kind = scores.iter().filter(|score| is_of_kind(score.effect));
             return of_kind.map(|score| Proposal::Scored(base, score.clone())).collect();
         }
@@ -210,7 +215,7 @@ impl<'a> Search<'a, '_> {
         if !self.context.base.iter().any(moved) {
             return Vec::new();
         }
-        let others = self.fits.iter().filter(|fit| !fit.hypothesis.is_dear() && !std::ptr::eq(*fit, leader));
+        let others = self.fits.iter().filter(|fit| !fit.hypothesis.is_expensive() && !std::ptr::eq(*fit, leader));
         others.map(|fit| Proposal::FromLeader { fit, hypothesis: fit.hypothesis.clone(), leader }).collect()
     }
 
@@ -221,7 +226,7 @@ impl<'a> Search<'a, '_> {
             return Vec::new();
         };
         let behind = leader.chi2 + self.context.settings.misfit.counts;
-        let is_behind = |fit: &&Refit<'a>| !fit.hypothesis.is_dear() && fit.chi2 > behind;
+        let is_behind = |fit: &&Refit<'a>| !fit.hypothesis.is_expensive() && fit.chi2 > behind;
         self.fits
             .iter()
             .filter(is_behind)
@@ -260,7 +265,7 @@ impl<'a> Search<'a, '_> {
             let hypothesis = &fit.hypothesis;
             let leader = order.iter().map(|place| &self.fits[*place]).find(|other| other.hypothesis != *hypothesis);
             let along = leader.map(|leader| Proposal::Along(hypothesis.clone(), leader, f64::INFINITY));
-            let anew = Proposal::Anew(hypothesis.clone(), base);
+            let anew = Proposal::ByShooting(hypothesis.clone(), base);
             let begun = Proposal::FromTheBeginning(hypothesis.clone(), base);
             along.into_iter().chain([anew, begun]).collect::<Vec<_>>()
         };
@@ -273,19 +278,19 @@ impl<'a> Search<'a, '_> {
         let further = laws::cheap_to_score(&self.context, &self.effects);
         let is_single = |s: &&Refit<'a>| s.hypothesis.effects.len() == 1;
         let mut seeds: Vec<&Refit<'a>> =
-            self.fits[1..].iter().filter(is_single).filter(|s| s.chi2 < base.chi2 - 4.0).collect();
+            self.fits[1..].iter().filter(is_single).filter(|s| s.chi2 < base.chi2 - WORTH_A_PAIR).collect();
         seeds.sort_by(|a, b| a.chi2.total_cmp(&b.chi2));
         seeds.truncate(settings.pair_seeds);
         let least = seeds.first().map_or(0.0, |s| s.chi2);
         seeds.retain(|s| s.chi2 < settings.far * least);
         let scored = |(rank, seed): (usize, &&'_ Refit<'a>)| {
-            let few = further.iter().copied().filter(|e| rank < settings.dear_seeds || !e.is_dear_to_score());
+            let few = further.iter().copied().filter(|e| rank < settings.expensive_seeds || !e.is_expensive_to_score());
             Some(laws::scores(&Screen::at(&self.context, seed)?, &few.collect::<Vec<_>>()))
         };
         let scored: Vec<Option<Vec<Score>>> = seeds.par_iter().with_max_len(1).enumerate().map(scored).collect();
         let mut pairs: Vec<(f64, &Refit<'a>, Hypothesis, Score)> = Vec::new();
         for (seed, score) in seeds.into_iter().zip(scored).flat_map(|(seed, all)| {
-            all.unwrap_or_default().into_iter().filter(|s| s.gain > 4.0).map(move |score| (seed, score))
+            all.unwrap_or_default().into_iter().filter(|s| s.gain > WORTH_A_PAIR).map(move |score| (seed, score))
         }) {
             // a promise from afar is worth little
             let promised = (seed.chi2 - score.gain).max(settings.afar * seed.chi2);
@@ -298,21 +303,24 @@ impl<'a> Search<'a, '_> {
         }
         // what has corners is dear: only where it promises what a further effect must gain
         let alone = least_chi2(&self.fits);
-        pairs.retain(|(promised, _, hypothesis, _)| !hypothesis.has_corners() || *promised < alone - counts);
+        pairs.retain(|(promised, _, hypothesis, _)| !hypothesis.has_switching() || *promised < alone - counts);
         pairs.sort_by(|a, b| a.0.total_cmp(&b.0));
         pairs.truncate(settings.most_pairs);
         let least = pairs.first().map_or(0.0, |p| p.0);
         let is_kept = |(rank, pair): &(usize, (f64, _, _, _))| {
-            *rank < settings.fewest_pairs || pair.0 < settings.promising * least + 100.0
+            *rank < settings.fewest_pairs || pair.0 < settings.promising * least + PAIR_MARGIN
         };
         let kept = pairs.into_iter().enumerate().filter(is_kept);
         let scored = kept.map(|(_, (_, seed, _, score))| Proposal::Scored(seed, score));
-        let traded = TRADED.iter().all(|effect| self.effects.contains(effect)).then_some(Proposal::Traded(base));
-        scored.chain(traded).collect()
+        let replace_dampers = DAMPER_IMITATION
+            .iter()
+            .all(|effect| self.effects.contains(effect))
+            .then_some(Proposal::ReplaceDampers(base));
+        scored.chain(replace_dampers).collect()
     }
 
     /// Where a pair has found a better minimum of a simpler hypothesis, one of its effects being next to nothing, that hypothesis starts anew from it.
-    fn stragglers(&self) -> Vec<Proposal<'_, 'a>> {
+    fn started_from_richer_fits(&self) -> Vec<Proposal<'_, 'a>> {
         let counts = self.context.settings.misfit.counts;
         let of = |fit: &'_ Refit<'a>| {
             let richer = |other: &&Refit<'a>| {
@@ -331,7 +339,7 @@ impl<'a> Search<'a, '_> {
         let settings = self.context.settings;
         let beyond = settings.noise.beyond * settings.noise.beyond * self.context.values() as f64;
         let beyond_noise = least_chi2(&self.fits) > beyond;
-        let left = |fit: &Refit<'_>| if beyond_noise { fit.left_share() } else { fit.chi2 };
+        let left = |fit: &Refit<'_>| if beyond_noise { fit.relative_residual() } else { fit.chi2 };
         let count = settings.search.restart_seeds;
         let chosen = best(&self.fits, count, |fit| fit.hypothesis.effects.len() == 1, left);
         chosen.into_iter().map(|i| &self.fits[i]).collect()
@@ -342,10 +350,10 @@ impl<'a> Search<'a, '_> {
         let beside = leaders.iter().flat_map(|leader| Beside::every(&self.context, leader, &self.effects));
         let mut proposals: Vec<Proposal<'_, 'a>> = beside.map(Proposal::Beside).collect();
         // corners make false minima
-        for effect in self.effects.iter().filter(|effect| effect.has_corners()) {
+        for effect in self.effects.iter().filter(|effect| effect.has_switching()) {
             let lacking = leaders.iter().filter(|leader| !leader.hypothesis.has(*effect));
             let bases = lacking.copied().chain(self.fits.first());
-            proposals.extend(bases.map(|base| Proposal::Anywhere(base, *effect)));
+            proposals.extend(bases.map(|base| Proposal::ManyStarts(base, *effect)));
         }
         proposals
     }
@@ -363,9 +371,9 @@ impl<'a> Search<'a, '_> {
 
     fn one_more(&self, tried: &mut Tried) -> Vec<Proposal<'_, 'a>> {
         let settings = &self.context.settings.search;
-        let best_of_all = least(&self.fits).map_or(0.0, Refit::left_share);
+        let best_of_all = least(&self.fits).map_or(0.0, Refit::relative_residual);
         let mut leading = best_of_each_count(&self.fits, settings.most_coefficients);
-        leading.retain(|fit| fit.left_share() <= settings.leads * best_of_all);
+        leading.retain(|fit| fit.relative_residual() <= settings.leads * best_of_all);
         let seeds = not_yet(leading, &mut tried.more);
         let more = seeds.into_iter().flat_map(|seed| Beside::most_promising(&self.context, seed, &self.effects));
         more.map(Proposal::Beside).collect()
@@ -380,12 +388,12 @@ impl<'a> Search<'a, '_> {
             let many = seed.hypothesis.effects.len() > settings.search.main_effects;
             let near_noise = many && !leaves_more_than_noise(seed, &settings.noise);
             // corners are dear, and what stands beside them has been asked for
-            let of_pieces = self.context.is_in_pieces() && !seed.hypothesis.has_corners();
+            let of_pieces = self.context.is_in_pieces() && !seed.hypothesis.has_switching();
             if near_noise || of_pieces { &self.effects } else { &[] }
         };
         let of = |seed| {
             let others = rivals(seed);
-            seed.hypothesis.effects.iter().map(move |effect| Proposal::Instead(seed, *effect, others))
+            seed.hypothesis.effects.iter().map(move |effect| Proposal::Exchange(seed, *effect, others))
         };
         seeds.into_iter().flat_map(of).collect()
     }

@@ -21,8 +21,8 @@ use crate::model::Parameter;
 impl<'a> Search<'a, '_> {
     /// A search whose base model is a strip that bends everywhere, where this one was led to it, or does not explain the recordings: what else is missing shows beside a
     /// strip that is right, and beside it alone.
-    pub fn of_bending_strip(&mut self, records: &[Record], kept: &'a OnceLock<Prepared>) -> Option<Self> {
-        let is_found = self.is_cut_short || self.bends();
+    pub fn bending_strip_search(&mut self, records: &[Record], kept: &'a OnceLock<Prepared>) -> Option<Self> {
+        let is_found = self.stopped_early || self.bends();
         let as_stiff = || {
             let stiffness = self.base().value(Parameter::JointStiffness).filter(|_| self.may_bend())?;
             Some(bending_n_m2(stiffness, self.context.experiment))
@@ -33,15 +33,15 @@ impl<'a> Search<'a, '_> {
         experiment.model.effects.distributed_flexibility = Some(stated);
         let strip = prepare(records, &experiment, settings).ok().and_then(|prepared| {
             let prepared = kept.get_or_init(|| prepared);
-            let taken = prepared.taken_at_first();
+            let taken = prepared.initial_damping();
             Self::of_base_model(prepared, &prepared.experiment, taken, settings, self.progress).ok()
         });
-        if strip.is_none() && self.is_cut_short {
+        if strip.is_none() && self.stopped_early {
             // no such strip follows the recordings
-            self.is_cut_short = false;
+            self.stopped_early = false;
             self.end();
         }
-        let rival = least(&self.fits).filter(|_| !is_found).map(Refit::left_share);
+        let rival = least(&self.fits).filter(|_| !is_found).map(Refit::relative_residual);
         strip.map(|strip| Self { rival, ..strip })
     }
 
@@ -60,14 +60,14 @@ impl<'a> Search<'a, '_> {
 
     /// Whether another base model does better.
     pub fn is_behind(&self) -> bool {
-        self.rival.is_some_and(|rival| least(&self.fits).is_none_or(|best| best.left_share() > rival))
+        self.rival.is_some_and(|rival| least(&self.fits).is_none_or(|best| best.relative_residual() > rival))
     }
 
     /// Bending where nothing else explains what is left: from the base model's motion its own may not be found.
-    pub(super) fn seek_bending(&mut self) {
+    pub(super) fn try_bending(&mut self) {
         let is_tried = self.fits.iter().any(|fit| fit.hypothesis.has(Effect::DistributedFlexibility));
         if !is_tried && self.may_bend() {
-            let found = self.fitted(&[Proposal::Anew(bending::alone(), self.base())]);
+            let found = self.fitted(&[Proposal::ByShooting(bending::alone(), self.base())]);
             self.keep(found);
         }
         self.bends();
@@ -75,12 +75,12 @@ impl<'a> Search<'a, '_> {
 
     /// The same with what a search beside the bending strip has found.
     #[must_use]
-    pub fn beside_strip(mut self, strip: Self) -> Self {
+    pub fn with_strip_fits(mut self, strip: Self) -> Self {
         let model = &strip.context.experiment.model;
-        self.context.fine_strip =
+        self.context.identified_strip =
             Some(BendingStrip { rods: model.pieces, bending_n_m2: model.effects.distributed_flexibility });
         self.fits.retain(|fit| !fit.hypothesis.has(Effect::DistributedFlexibility));
-        self.judge_by(&strip.base().problem.noise, 0);
+        self.reweight(&strip.base().problem.noise, 0);
         let context = &self.context;
         let of = |fit: &Refit<'a>| {
             let hypothesis = with_bending(&fit.hypothesis);

@@ -7,8 +7,9 @@
 //! r + J (β − β₀) + S (s − s₀) = e        over all stretches
 //! ```
 //!
-//! and least squares, the starts projected out, give the coefficients of any set of laws at once, of the table or of the grammar. No small error of the model adds up over a recording: so it points
-//! to sets of laws that a search beside a poor base model does not come by. What the laws do over many swings is not seen: it proposes, and proves nothing.
+//! and least squares, the starts projected out, give the coefficients of any set of laws at once, of the table or of the grammar. Over short stretches no error
+//! of phase adds up, so that they point to sets of laws that a search beside a poor base model does not come by. What the laws do over many swings is not seen:
+//! it proposes, and proves nothing.
 //!
 //! | file | holds |
 //! |---|---|
@@ -24,7 +25,7 @@ use super::grammar::Term;
 use super::hypothesis::Hypothesis;
 use super::refit::Refit;
 use crate::experiment::Law;
-use crate::fit::shooting::STATE_NEAR;
+use crate::fit::shooting::STATE_WINDOW_RAD;
 use crate::fit::{Problem, Record};
 use crate::model::Parameter;
 use crate::series::FEWEST_ROWS;
@@ -64,12 +65,12 @@ pub fn asked_for(context: &FitContext<'_>, base: &Refit<'_>, effects: &[Effect],
     let known = &context.base;
     let sets = sets(context, base, known, (effects, &laws), &amplitudes, ((MOST_LAWS, each), false));
     // corners are dear, and nothing is lost with the second best of those that have them
-    let has_corners = |set: &Set| set.laws.iter().any(|law| laws[*law].has_corners());
+    let has_switching = |set: &Set| set.laws.iter().any(|law| laws[*law].has_switching());
     let mut with_corners: Vec<usize> = Vec::new();
     let is_kept = |set: &Set| {
         let count = set.laws.len();
-        let is_second = has_corners(set) && with_corners.contains(&count);
-        with_corners.extend(has_corners(set).then_some(count));
+        let is_second = has_switching(set) && with_corners.contains(&count);
+        with_corners.extend(has_switching(set).then_some(count));
         !is_second
     };
     let (sets, beside) = sets.unwrap_or_default();
@@ -77,14 +78,14 @@ pub fn asked_for(context: &FitContext<'_>, base: &Refit<'_>, effects: &[Effect],
 }
 
 /// Terms of the grammar, alone, in pairs and beside one of the table's laws, that leave least: the set's laws of the table, and which terms with what amplitudes.
-pub fn terms_asked_for(
+pub fn best_term_sets(
     context: &FitContext<'_>,
     base: &Refit<'_>,
     effects: &[Effect],
     terms: &[Term],
     each: usize,
 ) -> Vec<(Asked, Vec<(usize, f64)>)> {
-    let is_cheap = |effect: &Effect| is_told(*effect, effects) && !effect.has_corners();
+    let is_cheap = |effect: &Effect| is_told(*effect, effects) && !effect.has_switching();
     let laws: Vec<Effect> = effects.iter().copied().filter(is_cheap).collect();
     let named = |(k, term): (usize, &Term)| Law { name: format!("term {k}"), ..term.law.clone() };
     let of_terms: Vec<Law> = terms.iter().enumerate().map(named).collect();
@@ -139,7 +140,7 @@ fn sets(
     (most_each, follows): ((usize, usize), bool),
 ) -> Option<(Vec<Set>, usize)> {
     let (model, _) = base.problem.model(0, &base.x[..base.problem.free.len()]).ok()?;
-    let stretches = cut(context.records, SWINGS * std::f64::consts::TAU / model.pace_rad_s())?;
+    let stretches = cut(context.records, SWINGS * std::f64::consts::TAU / model.characteristic_rad_s())?;
     let short = context.on(&stretches);
     let of_camera = OF_CAMERA.iter().filter(|own| effects.contains(&own.0));
     let all = of_camera.clone().map(|own| own.0).chain(laws.iter().copied()).collect();
@@ -147,7 +148,7 @@ fn sets(
     let problem = short.problem_near(&hypothesis, base).ok()?;
     let allowed = known.iter().copied().chain(of_camera.map(|own| own.1));
     let columns: Vec<Parameter> = allowed.chain(amplitudes.iter().copied()).collect();
-    let reach_s = STATE_NEAR / model.pace_rad_s();
+    let reach_s = STATE_WINDOW_RAD / model.characteristic_rad_s();
     let mut values: Vec<(Parameter, f64)> = known.iter().map(|p| (*p, base.value(*p).unwrap_or(0.0))).collect();
     let beside = columns.len() - amplitudes.len();
     let mut found = Vec::new();
@@ -251,11 +252,11 @@ mod tests {
     use rand_distr::{Distribution, Normal};
 
     use super::*;
+    use crate::diagnose::base_priors::DampingAssumption;
     use crate::diagnose::settings::Settings;
-    use crate::diagnose::taken::Taken;
     use crate::diagnose::{base, preparation};
     use crate::experiment::Experiment;
-    use crate::model::{ForwardModel, OfLink, State, Trajectory};
+    use crate::model::{ForwardModel, LinkProperty, State, Trajectory};
 
     fn two_arms(length_m: f64, effects: &str) -> Experiment {
         let text = format!(
@@ -280,7 +281,7 @@ mod tests {
         let record = Record::uniform("made", t_s, theta_rad);
         let (settings, stated) = (Settings::default(), two_arms(0.173, ""));
         let prepared = preparation::prepare(&[record], &stated, &settings).unwrap();
-        let context = base::context(&prepared, &prepared.experiment, Taken::AtItsWord, &settings).unwrap();
+        let context = base::context(&prepared, &prepared.experiment, DampingAssumption::AsStated, &settings).unwrap();
         let fit = base::fitted(&context, &prepared).unwrap();
         let asked = asked_for(&context, &fit, &base::candidates(&context), 3);
         let pair = asked.iter().find(|asked| asked.hypothesis.effects.len() == 2).unwrap();
@@ -288,7 +289,7 @@ mod tests {
         let value = |parameter| pair.start.iter().find(|(own, _)| *own == parameter).unwrap().1;
         let [rubs, drags] = [value(Parameter::HingeCoulomb), value(Parameter::AirQuadratic)];
         assert!((rubs / 6e-4 - 1.0).abs() < 0.1 && (drags / 0.017 - 1.0).abs() < 0.1, "{rubs} {drags}");
-        let length_m = value(Parameter::Link(0, OfLink::Length));
+        let length_m = value(Parameter::Link(0, LinkProperty::Length));
         assert!((length_m / 0.1737 - 1.0).abs() < 1e-3, "{length_m}");
     }
 }

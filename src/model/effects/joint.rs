@@ -181,7 +181,7 @@ impl Effect for Hysteresis {
     }
 
     /// Δ̇ and z of every joint.
-    fn add_corners(&self, chain: &Chain, motion: &Motion, corners: &mut Vec<f64>) {
+    fn add_switching_functions(&self, chain: &Chain, motion: &Motion, corners: &mut Vec<f64>) {
         let n = chain.count();
         bends(chain, motion).for_each(|bend| corners.extend([bend.rate_rad_s, motion.rate[n + bend.upper]]));
     }

@@ -62,12 +62,12 @@ pub trait Effect: std::fmt::Debug + Send + Sync {
     }
 
     /// Instants at which it changes suddenly.
-    fn breaks_s(&self) -> Vec<f64> {
+    fn discontinuities_s(&self) -> Vec<f64> {
         Vec::new()
     }
 
     /// Quantities at whose zeros it has corners, of the rates alone: adds them in an order that does not change, in pairs of a rate and what follows it.
-    fn add_corners(&self, _chain: &Chain, _motion: &Motion, _corners: &mut Vec<f64>) {}
+    fn add_switching_functions(&self, _chain: &Chain, _motion: &Motion, _corners: &mut Vec<f64>) {}
 
     /// The pivot's motion, from the law that prescribes it.
     fn pivot(&self) -> Option<&outside::SupportMotion> {

@@ -150,7 +150,7 @@ impl Effect for NodalForces {
         }
     }
 
-    fn breaks_s(&self) -> Vec<f64> {
+    fn discontinuities_s(&self) -> Vec<f64> {
         vec![self.from_s, self.until_s]
     }
 }

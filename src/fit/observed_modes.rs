@@ -21,13 +21,13 @@ const VAGUE: f64 = 0.05;
 
 /// One mode as it was seen.
 #[derive(Debug, Clone, PartialEq)]
-pub struct SeenMode {
+pub struct ObservedMode {
     /// Natural frequency at small amplitude.
     pub frequency_hz: f64,
     /// Half its 95 % interval, which what amplitude may do to it widens.
     pub frequency_half_hz: f64,
     /// Half the interval of the mean frequency, as a share.
-    pub(super) vague: f64,
+    pub(super) relative_half_width: f64,
     /// Of the whole recording, whatever its amplitude.
     pub mean_frequency_hz: f64,
     /// ξ, where the decay is told from none.
@@ -42,9 +42,9 @@ pub struct SeenMode {
 #[derive(Debug, Clone, PartialEq)]
 pub struct Seen {
     /// The slow one.
-    pub slow: SeenMode,
+    pub slow: ObservedMode,
     /// The next, where one is seen.
-    pub fast: Option<SeenMode>,
+    pub fast: Option<ObservedMode>,
     /// Half the rate.
     pub nyquist_hz: f64,
     /// Frequencies of all that stands out.
@@ -69,7 +69,7 @@ impl Seen {
         }
         let largest_rad = modes.iter().map(|m| m.amplitude_rad).fold(0.0, f64::max);
         let slow = modes.iter().find(|m| m.amplitude_rad >= WEAK * largest_rad)?.clone();
-        let second = |modes: Vec<SeenMode>| modes.into_iter().find(|m| m.frequency_hz > FASTER * slow.frequency_hz);
+        let second = |modes: Vec<ObservedMode>| modes.into_iter().find(|m| m.frequency_hz > FASTER * slow.frequency_hz);
         let early = || {
             let until_s = record.t_s[0] + EARLY_PERIODS / slow.frequency_hz;
             let early = series.slice(series.rows(f64::NEG_INFINITY, until_s)).checked().ok()?;
@@ -81,7 +81,7 @@ impl Seen {
 }
 
 /// The modes of angles beyond 90°, taken for degrees, of which they are a small swing; their amplitudes as in the table.
-fn modes_of_degrees(series: &AngleSeries) -> Vec<SeenMode> {
+fn modes_of_degrees(series: &AngleSeries) -> Vec<ObservedMode> {
     let mut series = series.slice(0..series.t_s.len().min(ENOUGH_ROWS));
     let angles = || series.theta_rad.iter().flatten().flatten();
     if !angles().any(|a| a.abs() > FRAC_PI_2) {
@@ -94,14 +94,15 @@ fn modes_of_degrees(series: &AngleSeries) -> Vec<SeenMode> {
 }
 
 /// The modes of a known frequency, slowest first.
-fn clear_modes(found: &Identification) -> Vec<SeenMode> {
-    let mut modes: Vec<SeenMode> = found.modes.iter().chain(&found.may_be_harmonics).map(SeenMode::of).collect();
-    modes.retain(|mode| mode.frequency_hz > 0.0 && mode.vague < VAGUE);
+fn clear_modes(found: &Identification) -> Vec<ObservedMode> {
+    let mut modes: Vec<ObservedMode> =
+        found.modes.iter().chain(&found.may_be_harmonics).map(ObservedMode::of).collect();
+    modes.retain(|mode| mode.frequency_hz > 0.0 && mode.relative_half_width < VAGUE);
     modes.sort_by(|a, b| a.frequency_hz.total_cmp(&b.frequency_hz));
     modes
 }
 
-impl SeenMode {
+impl ObservedMode {
     fn of(mode: &Mode) -> Self {
         let small = mode.small_amplitude_hz(PENDULUM);
         let whole = mode.estimators.iter().find(|e| e.method == Method::Sinusoids).and_then(|e| e.frequency_hz);
@@ -111,7 +112,7 @@ impl SeenMode {
         Self {
             frequency_hz: small.value,
             frequency_half_hz: 0.5 * (small.high - small.low),
-            vague: whole.map_or(f64::INFINITY, |f| 0.5 * (f.high - f.low) / f.value.abs().max(1e-12)),
+            relative_half_width: whole.map_or(f64::INFINITY, |f| 0.5 * (f.high - f.low) / f.value.abs().max(1e-12)),
             mean_frequency_hz: whole.map_or(small.value, |w| w.value),
             damping_ratio: mode.damping.estimate().map(|xi| xi.value),
             amplitude_rad: mode.shape.iter().map(|l| l.amplitude_rad).fold(0.0, f64::max),

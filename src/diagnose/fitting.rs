@@ -9,13 +9,13 @@ use super::refit::Refit;
 use crate::error::Result;
 use crate::experiment::Experiment;
 use crate::fit::descent::Descent;
-use crate::fit::shooting::{STATE_NEAR, multiple_shooting, shooting_along};
+use crate::fit::shooting::{STATE_WINDOW_RAD, multiple_shooting, shooting_along};
 use crate::fit::whitening::RecordNoise;
-use crate::fit::{Problem, Record, straight};
+use crate::fit::{Problem, Record, transformed};
 use crate::model::Parameter;
 use crate::model::observe::{chord_angles_rad, chord_slopes};
 
-/// Losses imitate each other closely: only a weakly damped step goes along the valley between them.
+/// Loss terms are nearly collinear: only with little damping of the steps does a descent move along the valley between them.
 const FIRST_DAMPING: f64 = 1e-8;
 
 /// Values of some coefficients to start from.
@@ -92,7 +92,7 @@ impl<'a> FitContext<'a> {
         let lower = problem.lower();
         x.iter_mut().zip(&lower).for_each(|(x, low)| *x = x.max(*low));
         x.extend(problem.starts_from(&near.problem, &near.x));
-        Some((problem.held_as(&x), x))
+        Some((problem.with_modes_at(&x), x))
     }
 
     /// The problem of a hypothesis near another fit: judged by the same noise, and a strip in the same shapes.
@@ -100,7 +100,7 @@ impl<'a> FitContext<'a> {
     /// # Errors
     /// As [`Problem::new`].
     pub fn problem_near(&self, hypothesis: &Hypothesis, near: &Refit<'_>) -> Result<Problem<'a>> {
-        Ok(self.problem(hypothesis, &self.noise_of(near))?.held_like(&near.problem))
+        Ok(self.problem(hypothesis, &self.noise_of(near))?.with_modes_of(&near.problem))
     }
 
     /// The noise by which a fit was judged, of these recordings.
@@ -116,7 +116,7 @@ impl<'a> FitContext<'a> {
 
     /// Fits a hypothesis from the start values of the experiment, by multiple shooting first: for a base model whose motion is out of step.
     /// It ends after its first steps unless they lead below a multiple of what is left without, by `beside`.
-    pub fn refit_anew(&self, hypothesis: &Hypothesis, start: &Start, beside: &Refit<'_>) -> Option<Refit<'a>> {
+    pub fn refit_by_shooting(&self, hypothesis: &Hypothesis, start: &Start, beside: &Refit<'_>) -> Option<Refit<'a>> {
         let mut problem = self.problem_near(hypothesis, beside).ok()?;
         let noise = problem.noise.clone();
         for (parameter, value) in start {
@@ -126,32 +126,32 @@ impl<'a> FitContext<'a> {
         let x = multiple_shooting(&mut problem).ok()?.x;
         problem.noise = noise;
         problem.accuracy = accuracy;
-        let bound = self.settings.descent.beyond_hope * beside.chi2;
+        let bound = self.settings.descent.hopeless_ratio * beside.chi2;
         self.descend_by(self.descent_below(bound), hypothesis, problem, x)
     }
 
-    /// A restart along another fit's motion, which follows the recordings, whatever hypothesis it is of: stretches begin where that motion is, with its
-    /// parameters, and are drawn together. It ends after its first steps unless they lead below `bound`.
-    pub fn refit_along(&self, hypothesis: &Hypothesis, leader: &Refit<'_>, bound: f64) -> Option<Refit<'a>> {
+    /// Multiple shooting along another fit's motion, whatever hypothesis that is of: the initial states of the stretches are on it. It ends after its first
+    /// steps unless they lead below `bound`.
+    pub fn refit_along_fit(&self, hypothesis: &Hypothesis, leader: &Refit<'_>, bound: f64) -> Option<Refit<'a>> {
         let motions: Vec<Vec<Vec<f64>>> =
             (0..self.records.len()).map(|record| states_along(leader, record)).collect::<Option<_>>()?;
-        self.drawn_along(bound, hypothesis, (leader, &[]), |record, row| motions[record][row].clone())
+        self.shoot_along(bound, hypothesis, (leader, &[]), |record, row| motions[record][row].clone())
     }
 
     /// A fit from given coefficients and the starts that the recordings show; where that motion falls out of step, along the recorded motion.
     pub fn refit_along_recording(&self, hypothesis: &Hypothesis, near: &Refit<'_>, start: &Start) -> Option<Refit<'a>> {
         let (problem, mut x) = self.start(hypothesis, near, start)?;
         x.truncate(problem.free.len());
-        let reach_s = STATE_NEAR / problem.model(0, &x).ok()?.0.pace_rad_s();
+        let reach_s = STATE_WINDOW_RAD / problem.model(0, &x).ok()?.0.characteristic_rad_s();
         let seen = |record: usize, row: usize| self.records[record].start_near(row, reach_s);
         x.extend((0..self.records.len()).flat_map(|record| seen(record, 0)));
         let straight = self.descend(hypothesis, problem, x, self.settings.descent.few_steps);
-        let in_step = straight.filter(|fit| fit.left_share() < self.settings.misfit.out_of_step);
-        in_step.or_else(|| self.drawn_along(f64::INFINITY, hypothesis, (near, start), seen))
+        let in_step = straight.filter(|fit| !fit.has_lost_step(&self.settings.misfit));
+        in_step.or_else(|| self.shoot_along(f64::INFINITY, hypothesis, (near, start), seen))
     }
 
     /// Stretches that begin in the states at given rows of the recordings, drawn together into one motion.
-    fn drawn_along(
+    fn shoot_along(
         &self,
         bound: f64,
         hypothesis: &Hypothesis,
@@ -183,7 +183,7 @@ impl<'a> FitContext<'a> {
     }
 
     /// The same judged by another noise.
-    pub fn judged_by(&self, noise: &[RecordNoise], fit: &Refit<'a>, steps: usize) -> Option<Refit<'a>> {
+    pub fn with_noise(&self, noise: &[RecordNoise], fit: &Refit<'a>, steps: usize) -> Option<Refit<'a>> {
         let mut problem = fit.problem.clone();
         problem.noise = noise.to_vec();
         let again = self.descend(&fit.hypothesis, problem, fit.x.clone(), steps)?;
@@ -219,12 +219,12 @@ impl<'a> FitContext<'a> {
         problem: Problem<'a>,
         x: Vec<f64>,
     ) -> Option<Refit<'a>> {
-        let (problem, outcome) = straight::descend_as_held(problem, &descent, x)?;
+        let (problem, outcome) = transformed::descend_updating_modes(problem, &descent, x)?;
         Some(outcome).filter(|outcome| outcome.cost.is_finite()).map(|end| Refit::of(hypothesis.clone(), problem, end))
     }
 
     /// A fit whose motions start as short stretches show them to, whatever it makes of them.
-    pub fn seen_to_start<'b>(&self, fit: &Refit<'b>) -> Refit<'b> {
+    pub fn with_observed_starts<'b>(&self, fit: &Refit<'b>) -> Refit<'b> {
         let mut fit = fit.clone();
         let starts = fit.x.len() - fit.problem.free.len();
         if let Some(seen) = self.begun.len().checked_sub(starts) {

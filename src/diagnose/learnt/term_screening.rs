@@ -7,13 +7,13 @@ use rayon::prelude::*;
 
 use super::super::basis_law::{Swing, swings};
 use super::super::effect::{Acts, Effect, Place};
-use super::super::grammar::{Largest, Term, terms};
+use super::super::grammar::{StateRange, Term, terms};
 use super::super::hypothesis::Hypothesis;
 use super::super::linearisation::Linearisation;
 use super::super::refit::Refit;
 use super::super::screen::Projection;
 use super::super::settings::LawSettings;
-use super::along::cosine;
+use super::term_torques::cosine;
 use crate::experiment::LawPlace;
 use crate::fit::descent::damped_step;
 use crate::fit::recordings;
@@ -143,8 +143,8 @@ fn effects_of_terms(fit: &Refit<'_>, rows: usize) -> Option<(Vec<Term>, DMatrix<
 }
 
 /// The largest state at a place.
-fn largest(swings: &[Swing<'_>], place: LawPlace, time_s: f64) -> Largest {
-    let mut largest = Largest { angle: 1e-6, rate: 1e-6, time_s };
+fn largest(swings: &[Swing<'_>], place: LawPlace, time_s: f64) -> StateRange {
+    let mut largest = StateRange { angle: 1e-6, rate: 1e-6, time_s };
     for (motion, swing) in swings.iter().flat_map(|swing| swing.motions().map(move |motion| (motion, swing))) {
         let links = motion.links();
         let mut meet = |angle: f64, rate: f64| {

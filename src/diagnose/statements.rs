@@ -12,11 +12,11 @@ use crate::digits::number;
 use crate::experiment::LawPlace;
 use crate::model::Parameter;
 
-/// A change of a probability that is worth a sentence.
+/// A change of a probability that is worth a sentence (judgement: a percent).
 const SLIGHT_CHANGE: f64 = 0.01;
-/// Ratios of frequencies that differ by less are one: the swing is slower at large angles.
+/// Ratios of frequencies that differ by less are one: the swing is slower at large angles (physics: by so much at 80°).
 const SAME_FREQUENCY: f64 = 0.12;
-/// A joint that yields before this part of its largest bend is dry.
+/// A joint that yields before this part of its largest bend is dry (judgement).
 const DRY_SHARE: f64 = 0.01;
 
 impl Findings<'_> {
@@ -202,7 +202,8 @@ impl Findings<'_> {
     /// A frequency, as a multiple of the swing's where it is one.
     fn in_swings(&self, hz: f64) -> String {
         let base = self.posterior.base();
-        let pace = base.problem.model(0, &base.x[..base.problem.free.len()]).map(|(model, _)| model.pace_rad_s());
+        let pace =
+            base.problem.model(0, &base.x[..base.problem.free.len()]).map(|(model, _)| model.characteristic_rad_s());
         let ratio = pace.map_or(0.0, |pace| hz * std::f64::consts::TAU / pace);
         match ratio.round() as usize {
             1 if (ratio - 1.0).abs() < SAME_FREQUENCY => "at the swing's frequency".to_owned(),
@@ -214,7 +215,7 @@ impl Findings<'_> {
 
     /// What a law's coefficients say beside their values.
     fn remark(&self) -> String {
-        let dry_rad = DRY_SHARE * self.context.largest_bend_rad();
+        let dry_rad = DRY_SHARE * self.context.common_bend_rad();
         let mut remark = String::new();
         if self.named().value(Parameter::HysteresisYield).is_some_and(|yield_rad| yield_rad < dry_rad) {
             remark.push_str(
@@ -307,7 +308,7 @@ fn words_of_term(term: &Term) -> String {
         LawPlace::Tip => "a force across the tip",
         LawPlace::Support => "an acceleration of the support",
     };
-    format!("{place} of {} {}", term.with_numbers(), term.law.place.unit())
+    format!("{place} of {} {}", term.formula_with_values(), term.law.place.unit())
 }
 
 /// A share as a percentage, with as many digits as it takes to tell it from all.
@@ -385,12 +386,12 @@ fn words_joined(effects: &[Effect], by: &str) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::diagnose::grammar::{Largest, terms};
+    use crate::diagnose::grammar::{StateRange, terms};
 
     #[test]
     fn each_term_of_a_law_is_said_with_its_own_place_and_unit() {
         let of = |place, formula: &str| {
-            let largest = Largest { angle: 0.5, rate: 4.0, time_s: 30.0 };
+            let largest = StateRange { angle: 0.5, rate: 4.0, time_s: 30.0 };
             let mut term = terms(place, largest).into_iter().find(|term| term.law.formula == formula).unwrap();
             term.law.parameters.get_mut("a").unwrap().start = 0.02;
             words_of_term(&term)

@@ -19,7 +19,7 @@ pub struct Across(DMatrix<f64>);
 
 /// What the angles before one say of it.
 #[derive(Debug, Clone, Default)]
-pub struct Given {
+pub struct Conditional {
     /// β, of each of them.
     pub beta: SmallVec<[f64; 2]>,
     /// What is left of a standard deviation of one.
@@ -70,29 +70,29 @@ impl Across {
     }
 
     /// What those `before` say of an angle.
-    pub fn given(&self, angle: usize, before: &[usize]) -> Given {
+    pub fn given(&self, angle: usize, before: &[usize]) -> Conditional {
         let own = DVector::from_iterator(before.len(), before.iter().map(|i| self.0[(*i, angle)]));
         let among = DMatrix::from_fn(before.len(), before.len(), |i, j| self.0[(before[i], before[j])]);
         let beta = among.cholesky().map_or_else(|| DVector::zeros(before.len()), |c| c.solve(&own));
         let left = (1.0 - beta.dot(&own)).max(LEAST);
-        Given { sd: left.sqrt(), beta: beta.iter().copied().collect() }
+        Conditional { sd: left.sqrt(), beta: beta.iter().copied().collect() }
     }
 }
 
 /// What was found of angles before, of which most rows ask the same.
-pub struct Memo<'a> {
+pub struct ConditionalCache<'a> {
     across: &'a Across,
-    known: Vec<(usize, SmallVec<[usize; 4]>, Given)>,
+    known: Vec<(usize, SmallVec<[usize; 4]>, Conditional)>,
 }
 
-impl<'a> Memo<'a> {
+impl<'a> ConditionalCache<'a> {
     /// Of nothing yet.
     pub fn new(across: &'a Across) -> Self {
         Self { across, known: Vec::new() }
     }
 
     /// What those `before` say of an angle.
-    pub fn given(&mut self, angle: usize, before: &[usize]) -> &Given {
+    pub fn given(&mut self, angle: usize, before: &[usize]) -> &Conditional {
         let place = self.known.iter().position(|own| own.0 == angle && own.1[..] == *before);
         let place = place.unwrap_or_else(|| {
             self.known.push((angle, SmallVec::from_slice(before), self.across.given(angle, before)));

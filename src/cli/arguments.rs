@@ -1,4 +1,4 @@
-//! What the words of every command go through before it runs: a mistake in them is one line, and no output takes the place of an input or of another output.
+//! Arguments before a command runs: errors in one line, and no output that would overwrite an input or another output.
 
 use std::ffi::OsString;
 use std::ops::Deref;
@@ -93,14 +93,14 @@ fn check_files(matches: &ArgMatches) -> Result<()> {
     for (option, path) in outputs.iter().filter(|(option, _)| option.ends_with(FIGURE)) {
         check_figure(option, path)?;
     }
-    keep_apart(&inputs, &outputs, "use another name")
+    refuse_overwriting(&inputs, &outputs, "use another name")
 }
 
 /// No output, with the option that names it, may take the place of an input or of another output.
 ///
 /// # Errors
 /// [`Error::Option`] with the remedy.
-pub fn keep_apart(inputs: &[&Path], outputs: &[(String, &Path)], remedy: &str) -> Result<()> {
+pub fn refuse_overwriting(inputs: &[&Path], outputs: &[(String, &Path)], remedy: &str) -> Result<()> {
     for (index, (option, output)) in outputs.iter().enumerate() {
         let refused = |why: &str| {
             let message = format!("{} is {why}; {remedy}", output.display());

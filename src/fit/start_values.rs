@@ -4,35 +4,35 @@
 //! frequency says what the spring is, near enough to be in step; where no second mode is seen, the shape of the first does: the stiffer the joint, the more the
 //! links turn alike.
 
-use super::seen::SeenMode;
+use super::observed_modes::ObservedMode;
 use super::{Record, Seen};
 use crate::experiment::Experiment;
 use crate::model::modes::{Linearised, Mode, Modes};
 use crate::model::{ForwardModel, Parameter};
 
-/// Stiffness of the softest and the stiffest joint tried, over gravity's torque on the first link.
+/// Stiffness of the softest and the stiffest joint tried, over gravity's torque on the first link (judgement: as good as limp, and as rigid).
 const SOFTEST: f64 = 1e-5;
 const STIFFEST: f64 = 1e4;
-/// Halvings of the ratio of the two.
+/// Halvings of the ratio of the two (numerics: a spring to 3·10⁻⁴ of it).
 const HALVINGS: usize = 16;
-/// A damper from which its damping ratio is read off, over √(stiffness × inertia).
+/// A damper from which its damping ratio is read off, over √(stiffness × inertia) (numerics: the ratio is linear in it).
 const LITTLE: f64 = 1e-3;
 
-/// A frequency beyond this part of half the rate may be that of its mirror image on the other side of it.
-const MIRRORED: f64 = 0.6;
+/// A frequency beyond this part of half the rate may be that of its mirror image on the other side of it (judgement).
+const ALIASED: f64 = 0.6;
 
-/// Damping ratio of a second mode that is not seen.
-const SILENT: f64 = 0.3;
+/// Damping ratio of a second mode that is not seen (start values).
+const UNSEEN_DAMPING_RATIO: f64 = 0.3;
 
-/// A spring that differs from the seen one by more than this factor is not where to begin.
+/// A spring that differs from the seen one by more than this factor is not where to begin (judgement).
 const FAR_OFF: f64 = 1.5;
 
-/// Most beginnings.
+/// Most beginnings: the file's values, those of the modes, and those of a second mode's mirror image.
 pub const MOST: u64 = 3;
 
 /// Where a fit may begin, likeliest first: with the file's values, and with what the modes of the longest recording say. Without a second mode these are vague, and
 /// come last: a stiff joint with little damping ends on a line in the noise. Where the file's spring is far from the seen one, the file's values do.
-pub fn beginnings(records: &[Record], experiment: &Experiment, free: &[Parameter]) -> Vec<Experiment> {
+pub fn start_experiments(records: &[Record], experiment: &Experiment, free: &[Parameter]) -> Vec<Experiment> {
     let begun_with = |p: &Parameter| {
         p.is_spring() || matches!(p, Parameter::JointDamping | Parameter::HingeViscous | Parameter::AirLinear)
     };
@@ -56,8 +56,8 @@ fn is_far_off(seen: f64, stated: f64) -> bool {
 /// The experiment with the free spring and linear dampers set to what the modes say, likeliest first; the same where they say nothing.
 pub fn from_modes(experiment: &Experiment, free: &[Parameter], seen: &Seen) -> Vec<Experiment> {
     let mut begun = vec![with_modes(experiment, free, seen)];
-    if let Some(fast) = seen.fast.as_ref().filter(|fast| fast.frequency_hz > MIRRORED * seen.nyquist_hz) {
-        let mirrored = SeenMode { frequency_hz: 2.0 * seen.nyquist_hz - fast.frequency_hz, ..fast.clone() };
+    if let Some(fast) = seen.fast.as_ref().filter(|fast| fast.frequency_hz > ALIASED * seen.nyquist_hz) {
+        let mirrored = ObservedMode { frequency_hz: 2.0 * seen.nyquist_hz - fast.frequency_hz, ..fast.clone() };
         begun.push(with_modes(experiment, free, &Seen { fast: Some(mirrored), ..seen.clone() }));
     }
     begun
@@ -74,7 +74,7 @@ fn with_modes(experiment: &Experiment, free: &[Parameter], seen: &Seen) -> Exper
     let joint = Some(Parameter::JointDamping).filter(|joint| free.contains(joint));
     let outside = [Parameter::HingeViscous, Parameter::AirLinear].into_iter().find(|damper| free.contains(damper));
     // a second mode that is not seen does not ring: begun with little damping, it would end on a line in the noise
-    let silent = || SeenMode { damping_ratio: Some(SILENT), ..seen.slow.clone() };
+    let silent = || ObservedMode { damping_ratio: Some(UNSEEN_DAMPING_RATIO), ..seen.slow.clone() };
     let fast = seen.fast.clone().unwrap_or_else(silent);
     for (damper, seen, mode) in [(joint, &fast, 1), (outside, &seen.slow, 0)] {
         if let Some(damper) = damper
@@ -111,7 +111,7 @@ fn alike(mode: &Mode) -> Option<f64> {
     Some(first.amplitude * (first.phase_rad - last.phase_rad).cos() / last.amplitude)
 }
 
-fn seen_alike(mode: &SeenMode) -> Option<f64> {
+fn seen_alike(mode: &ObservedMode) -> Option<f64> {
     let last = mode.shape.last().filter(|_| mode.shape.len() > 1)?;
     Some(last.arg().cos() / last.norm())
 }
@@ -125,7 +125,7 @@ fn unit_of(experiment: &Experiment, spring: Parameter) -> Option<f64> {
 }
 
 /// The damper that damps a mode as it was seen: ξ is linear in a small one.
-fn damping_of(experiment: &Experiment, damper: Parameter, seen: &SeenMode, mode: usize) -> Option<f64> {
+fn damping_of(experiment: &Experiment, damper: Parameter, seen: &ObservedMode, mode: usize) -> Option<f64> {
     let ratio = seen.damping_ratio?;
     let model = ForwardModel::of(experiment).ok()?;
     let inertia_kg_m2 = model.chain().inertia_kg_m2()[(0, 0)];
@@ -197,10 +197,10 @@ mod tests {
     /// What a specimen with a spring shows.
     fn seen(experiment: &Experiment) -> Seen {
         let modes = Modes::of(&Linearised::of(experiment).unwrap()).unwrap().modes;
-        let of = |mode: &Mode| SeenMode {
+        let of = |mode: &Mode| ObservedMode {
             frequency_hz: mode.frequency_hz,
             frequency_half_hz: 0.0,
-            vague: 0.0,
+            relative_half_width: 0.0,
             mean_frequency_hz: mode.frequency_hz,
             damping_ratio: Some(mode.damping_ratio),
             amplitude_rad: 0.1,

@@ -1,4 +1,4 @@
-//! Names where something remains beside them: probabilities that do not hang on single stretches of a recording.
+//! The bagged posterior of sets of effects, where something remains beside them.
 //!
 //! Where no model is right, the plain evidence picks one with certainty and another on the next recording. The bagged posterior (BayesBag; Huggins and Miller,
 //! Bayesian Analysis 18 (2023) 79) is the mean of the posteriors of recordings put together from blocks of this one, drawn with replacement:
@@ -15,16 +15,16 @@ use rand::{RngExt, SeedableRng};
 use super::evidence::normalised;
 use super::refit::Refit;
 
-/// Recordings put together.
+/// Recordings put together (cost).
 const DRAWS: usize = 200;
-/// Blocks of a recording, at least and at most.
+/// Blocks of a recording, at least (judgement) and at most (cost).
 const BLOCKS: [usize; 2] = [12, 200];
-/// Fits that leave this many times what the best one does are in no draw.
+/// Fits that leave this many times what the best one does are in no draw (cost).
 const FAR: f64 = 20.0;
 
 /// The bagged posterior of some fits, 0 of those that are far from the best; `ln_weight` is what each has beside its χ². `scatter` is v, and how many
 /// values go together.
-pub fn bagged(fits: &[Refit<'_>], ln_weight: &[f64], scatter: (f64, f64)) -> Vec<f64> {
+pub fn bagged_posterior(fits: &[Refit<'_>], ln_weight: &[f64], scatter: (f64, f64)) -> Vec<f64> {
     let mut probability = vec![0.0; fits.len()];
     let possible = |i: &usize| ln_weight[*i].is_finite();
     let least = (0..fits.len()).filter(possible).map(|i| fits[i].chi2).fold(f64::INFINITY, f64::min);

@@ -10,7 +10,7 @@
 use std::ops::Range;
 
 use super::noise::noise_rad;
-use super::search::seen_starts;
+use super::search::observed_starts;
 use super::{Problem, Record};
 use crate::experiment::Experiment;
 use crate::series::FEWEST_ROWS;
@@ -36,7 +36,7 @@ pub fn foretold(record: &Record, experiment: &Experiment) -> Option<Range<usize>
 /// The first row at which the noise has grown into another motion.
 fn lost_at(record: &Record, experiment: &Experiment, noise_rad: f64) -> Option<usize> {
     let problem = Problem::new(std::slice::from_ref(record), experiment, &[]).ok()?;
-    let prediction = problem.predict(0, &seen_starts(&problem).ok()?, true).ok()?;
+    let prediction = problem.predict(0, &observed_starts(&problem).ok()?, true).ok()?;
     let angles = prediction.slopes.columns(0, problem.shapes());
     let grown = |value: usize| noise_rad * angles.row(value).iter().fold(0.0, |most: f64, slope| most.max(slope.abs()));
     let lost = (0..prediction.values.len()).filter(|value| grown(*value) > ANOTHER_RAD);

@@ -1,34 +1,35 @@
 //! Which of the things that last hang together and swing, and in which order: the marks of a recording of which nothing is
 //! known, or the best of several ways to see those that are known.
 
-use super::Thing;
+use super::TrackedObject;
 use super::arc::Arc;
 
-/// Change of a distance over the motion beyond which two things are not on one link.
+/// Change of a distance over the motion beyond which two things are not on one link (judgement: a plane of swing turned by 45° out of
+/// the picture gives 0.1 at an amplitude of 30°).
 const MOST_STRETCH: f64 = 0.15;
-/// Distance of a path from its circle, over half its range, beyond which it is no arc.
+/// Distance of a path from its circle, over half its range, beyond which it is no arc (judgement).
 const MOST_OFF_ARC: f64 = 0.04;
-/// ln of the ratio of areas beyond which two marks of one look are unlike.
+/// ln of the ratio of areas beyond which two marks of one look are unlike (judgement: a factor e).
 const MOST_UNLIKE: f64 = 1.0;
-/// What a thing of the marks' look that swings, and is none, takes from it.
+/// What a thing of the marks' look that swings, and is none, takes from a chain's worth (judgement).
 const STRAY: f64 = 0.2;
-/// Of two chains whose worths differ by less than half a stray, neither is the better.
+/// Of two chains whose worths differ by less than half a stray, neither is the better (judgement).
 pub const CHANCE: f64 = 0.5 * STRAY;
 /// What a path that is hardly an arc takes from it, against one that is an arc exactly: of two looks that show as many
-/// marks, the clearer one counts.
+/// marks, the clearer one counts (judgement).
 const BLURRED_ARC: f64 = 0.2;
 /// Change of the distance from a still thing, over the motion, up to which it is the hinge though the arc's centre is
 /// elsewhere: the plane of the swing is turned, and the arc an ellipse. And how far it may lie off the line towards
-/// that centre, rad.
+/// that centre, rad (judgement).
 const HINGE_STRETCH: f64 = 0.1;
 const HINGE_OFF_LINE_RAD: f64 = 0.1;
 /// How many times as large as all of its parts together a thing is that they are parts of, and how far from its middle
-/// they lie, in its radii.
+/// they lie, in its radii (judgement).
 const PARTS_TIMES: f64 = 2.0;
 const PARTS_REACH: f64 = 1.1;
-/// By how much of it their travel differs from its own at most.
+/// By how much of it their travel differs from its own at most (judgement).
 const PARTS_TRAVEL: f64 = 0.2;
-/// Motion of one thing against another, as a share of how far both move, below which they do not turn about each other.
+/// Motion of one thing against another, as a share of how far both move, below which they do not turn about each other (judgement).
 pub const LEAST_TURN: f64 = 0.02;
 /// The same in pixels: as much as their own errors, of which a roughly found place has a tenth or two (judgement).
 const LEAST_TURN_PX: f64 = 0.3;
@@ -38,13 +39,13 @@ const KURTOSIS_OF_NOISE: f64 = 3.0;
 const LEAST_TRAVEL: f64 = 0.25;
 /// Correlation of two paths from which on one moves with the other (judgement: half).
 const MOVES_WITH: f64 = 0.5;
-/// What a chain whose first mark swings by less than its own radius is worth less: anything else that swings comes first.
+/// What a chain whose first mark swings by less than its own radius is worth less: anything else that swings comes first (judgement).
 const SLIGHT: f64 = 0.5;
-/// Marks that are looked for at most.
+/// Marks that are looked for at most (cost).
 pub const MOST_MARKS: usize = 12;
-/// Share of the frames in which a mark is seen, at least.
+/// Share of the frames in which a mark is seen, at least (judgement).
 const LEAST_PRESENCE: f64 = 0.4;
-/// How much farther a lower mark swings than an upper one, from which on that decides which is which.
+/// How much farther a lower mark swings than an upper one, from which on that decides which is which (judgement).
 const CLEARLY_FARTHER: f64 = 1.25;
 
 /// The marks, from the hinge down.
@@ -59,14 +60,14 @@ pub struct Chain {
 
 impl Chain {
     /// Its marks go as anything that swings does, more likely than not: spots of a texture that are taken for one thing do not.
-    pub fn is_steady(&self, things: &[Thing]) -> bool {
+    pub fn is_steady(&self, things: &[TrackedObject]) -> bool {
         let moving = || self.marks.iter().map(|i| &things[*i]).filter(|thing| thing.moves);
         moving().map(|thing| thing.steadiness).sum::<f64>() > 0.5 * moving().count() as f64
     }
 }
 
 /// The chains that the looks show, the best one first, and before it that which other looks add to.
-pub fn chains(things: &[Thing], names: &[String]) -> Vec<Chain> {
+pub fn chains(things: &[TrackedObject], names: &[String]) -> Vec<Chain> {
     let hued = |hue: u8| names[usize::from(hue)].starts_with('#');
     // what is darker or lighter on a thing of a hue, or of its own kind, is printed on it or shines on it
     let bears =
@@ -87,18 +88,18 @@ pub fn chains(things: &[Thing], names: &[String]) -> Vec<Chain> {
 }
 
 /// The best of them.
-pub fn longest(things: &[Thing], names: &[String]) -> Option<Chain> {
+pub fn longest(things: &[TrackedObject], names: &[String]) -> Option<Chain> {
     chains(things, names).into_iter().next()
 }
 
 /// The chain that things of the marks' hues form.
-pub fn of_hues(things: &[Thing], belongs: &dyn Fn(&Thing) -> bool) -> Option<Chain> {
+pub fn of_hues(things: &[TrackedObject], belongs: &dyn Fn(&TrackedObject) -> bool) -> Option<Chain> {
     of_look(things, belongs, true, &|_| false)
 }
 
 fn of_look(
-    things: &[Thing],
-    belongs: &dyn Fn(&Thing) -> bool,
+    things: &[TrackedObject],
+    belongs: &dyn Fn(&TrackedObject) -> bool,
     hued: bool,
     is_part: &dyn Fn(&[usize]) -> bool,
 ) -> Option<Chain> {
@@ -142,9 +143,9 @@ fn of_look(
 
 /// All of them lie within the outline of one thing that is much larger, and move as it does: they are its shades, or its
 /// edges.
-fn are_parts(things: &[Thing], marks: &[usize], bears: &dyn Fn(&Thing) -> bool) -> bool {
+fn are_parts(things: &[TrackedObject], marks: &[usize], bears: &dyn Fn(&TrackedObject) -> bool) -> bool {
     let area_px2: f64 = marks.iter().map(|i| things[*i].area_px2).sum();
-    let holds = |whole: &Thing, i: &usize| {
+    let holds = |whole: &TrackedObject, i: &usize| {
         let part = &things[*i];
         let lies_within = whole.distance_px(part).is_some_and(|d| d < PARTS_REACH * whole.radius_px());
         let moves_alike = (part.travel_px / whole.travel_px - 1.0).abs() < PARTS_TRAVEL;
@@ -156,7 +157,7 @@ fn are_parts(things: &[Thing], marks: &[usize], bears: &dyn Fn(&Thing) -> bool) 
 
 /// The circle on which the first mark swings; `Some(None)` where its path is so flat that it shows no centre. What
 /// hangs from a fixed point has no other path.
-fn hangs(things: &[Thing], marks: &[usize]) -> Option<Option<Arc>> {
+fn hangs(things: &[TrackedObject], marks: &[usize]) -> Option<Option<Arc>> {
     let first = &things[*marks.first()?];
     let path = first.places_px();
     let most_px = MOST_OFF_ARC * first.travel_px;
@@ -167,7 +168,7 @@ fn hangs(things: &[Thing], marks: &[usize]) -> Option<Option<Arc>> {
 }
 
 /// The same of marks in the picture's order, of which an upper one swings farther: two links that swing in opposite phase, and so at one frequency.
-fn hangs_against(things: &[Thing], marks: &[usize]) -> Option<Arc> {
+fn hangs_against(things: &[TrackedObject], marks: &[usize]) -> Option<Arc> {
     let first = &things[*marks.first()?];
     let together = |i: &usize| things[*i].correlation(first).abs() > MOVES_WITH;
     hangs(things, marks)?.filter(|arc| shows_centre(arc, first) && marks.iter().all(together))
@@ -175,7 +176,7 @@ fn hangs_against(things: &[Thing], marks: &[usize]) -> Option<Arc> {
 
 /// A still thing that something covers from time to time seems to move as well: by less than a quarter of its radius; or by less than its radius, about no clear
 /// centre or about a point within itself, and mostly in the middle of its way, where what swings seldom is until it has decayed.
-fn is_covered(thing: &Thing) -> bool {
+fn is_covered(thing: &TrackedObject) -> bool {
     if thing.travel_px < LEAST_TRAVEL * thing.radius_px() {
         return true;
     }
@@ -185,13 +186,13 @@ fn is_covered(thing: &Thing) -> bool {
 }
 
 /// A thing's path shows where it hangs, and not within itself.
-fn shows_centre(arc: &Arc, thing: &Thing) -> bool {
+fn shows_centre(arc: &Arc, thing: &TrackedObject) -> bool {
     arc.sd_px[0].max(arc.sd_px[1]) < arc.radius_px && arc.radius_px > thing.radius_px()
 }
 
 /// The things without those that may only be covered now and then: all, where the one that moves farthest may be; otherwise those that do not move as that one does.
 /// The upper mark of a strip moves little, but with the lower one.
-fn without_covered(things: &[Thing], mut marks: Vec<usize>) -> Vec<usize> {
+fn without_covered(things: &[TrackedObject], mut marks: Vec<usize>) -> Vec<usize> {
     let farthest = marks.iter().copied().max_by(|a, b| things[*a].travel_px.total_cmp(&things[*b].travel_px));
     let Some(farthest) = farthest.map(|i| &things[i]).filter(|thing| !is_covered(thing)) else { return Vec::new() };
     marks.retain(|i| !is_covered(&things[*i]) || things[*i].correlation(farthest).abs() > MOVES_WITH);
@@ -199,7 +200,7 @@ fn without_covered(things: &[Thing], mut marks: Vec<usize>) -> Vec<usize> {
 }
 
 /// It moves by less than its own radius.
-fn is_slight(thing: &Thing) -> bool {
+fn is_slight(thing: &TrackedObject) -> bool {
     thing.travel_px <= thing.radius_px()
 }
 
@@ -214,7 +215,7 @@ fn kurtosis(points: &[[f64; 2]]) -> f64 {
 }
 
 /// It swings by itself as a mark does.
-pub fn hangs_alone(thing: &Thing) -> bool {
+pub fn hangs_alone(thing: &TrackedObject) -> bool {
     thing.presence > LEAST_PRESENCE && !is_covered(thing) && hangs(std::slice::from_ref(thing), &[0]).is_some()
 }
 
@@ -228,13 +229,13 @@ fn off_line_px(points: &[[f64; 2]]) -> f64 {
 }
 
 /// More marks are better, seen in every frame, whose past foretells them.
-fn value(things: &[Thing], marks: &[usize]) -> f64 {
+fn value(things: &[TrackedObject], marks: &[usize]) -> f64 {
     marks.iter().map(|i| things[*i].presence * things[*i].steadiness).sum()
 }
 
 /// Of things in one place, such as one mark seen by two looks, the first. And of things that are hardly seen side by
 /// side: one is the other, found again.
-fn distinct(things: &[Thing], movers: &[usize]) -> Vec<usize> {
+fn distinct(things: &[TrackedObject], movers: &[usize]) -> Vec<usize> {
     let mut kept: Vec<usize> = Vec::new();
     for i in movers {
         let width = things[*i].area_px2.sqrt();
@@ -251,7 +252,7 @@ fn distinct(things: &[Thing], movers: &[usize]) -> Vec<usize> {
 }
 
 /// The things that are like one of them, each keeping its distance from another.
-fn rigid_set(things: &[Thing], movers: &[usize], first: usize) -> Vec<usize> {
+fn rigid_set(things: &[TrackedObject], movers: &[usize], first: usize) -> Vec<usize> {
     let mut set = vec![first];
     let like = |i: usize| (things[i].area_px2 / things[first].area_px2).ln().abs() < MOST_UNLIKE;
     loop {
@@ -269,7 +270,7 @@ fn rigid_set(things: &[Thing], movers: &[usize], first: usize) -> Vec<usize> {
 
 /// Of things that move as one and never turn about each other, such as a ball and its shadow, the one whose path is the
 /// clearer: there is no link between them that has an angle.
-fn without_shadows(things: &[Thing], mut marks: Vec<usize>) -> Vec<usize> {
+fn without_shadows(things: &[TrackedObject], mut marks: Vec<usize>) -> Vec<usize> {
     let off_arc_px = |i: &usize| {
         let path = things[*i].places_px();
         Arc::of(&path, things[*i].radius_px()).map_or_else(|| off_line_px(&path), |arc| arc.residual_px)
@@ -291,7 +292,7 @@ fn without_shadows(things: &[Thing], mut marks: Vec<usize>) -> Vec<usize> {
 
 /// From the hinge down, the likelier order first: what swings farther is lower, and what is lower in the picture where both swing alike; or by the picture alone, as links
 /// that swing against each other may let the upper mark swing farther.
-fn orders(things: &[Thing], mut marks: Vec<usize>) -> [Vec<usize>; 2] {
+fn orders(things: &[TrackedObject], mut marks: Vec<usize>) -> [Vec<usize>; 2] {
     let lowest = |i: usize| {
         let mut y: Vec<f64> = things[i].path.iter().flatten().map(|p| p[1]).collect();
         y.sort_unstable_by(f64::total_cmp);
@@ -311,18 +312,18 @@ fn orders(things: &[Thing], mut marks: Vec<usize>) -> [Vec<usize>; 2] {
 }
 
 /// The still thing at the centre of the first mark's arc.
-fn hinge(things: &[Thing], belongs: &dyn Fn(&Thing) -> bool, arc: &Arc, first: usize) -> Option<usize> {
-    let off = |t: &Thing| arc.off_centre(t.place_px());
-    let like = |t: &Thing| (t.area_px2 / things[first].area_px2).ln().abs() < MOST_UNLIKE;
-    let still = |t: &Thing| t.travel_px < 0.1 * things[first].travel_px;
-    let stays = |t: &Thing| t.stretch(&things[first]) < MOST_STRETCH;
+fn hinge(things: &[TrackedObject], belongs: &dyn Fn(&TrackedObject) -> bool, arc: &Arc, first: usize) -> Option<usize> {
+    let off = |t: &TrackedObject| arc.off_centre(t.place_px());
+    let like = |t: &TrackedObject| (t.area_px2 / things[first].area_px2).ln().abs() < MOST_UNLIKE;
+    let still = |t: &TrackedObject| t.travel_px < 0.1 * things[first].travel_px;
+    let stays = |t: &TrackedObject| t.stretch(&things[first]) < MOST_STRETCH;
     let middle = things[first].place_px();
     let towards = |p: [f64; 2]| (p[1] - middle[1]).atan2(p[0] - middle[0]);
-    let on_line = |t: &Thing| {
+    let on_line = |t: &TrackedObject| {
         let turn = towards(t.place_px()) - towards(arc.centre_px);
         turn.sin().abs() < HINGE_OFF_LINE_RAD && turn.cos() > 0.0 && t.stretch(&things[first]) < HINGE_STRETCH
     };
-    let fits = |t: &Thing| belongs(t) && t.presence > LEAST_PRESENCE && still(t) && like(t) && stays(t);
+    let fits = |t: &TrackedObject| belongs(t) && t.presence > LEAST_PRESENCE && still(t) && like(t) && stays(t);
     (0..things.len())
         .filter(|i| *i != first && fits(&things[*i]) && (off(&things[*i]) < 1.0 || on_line(&things[*i])))
         .min_by(|a, b| off(&things[*a]).total_cmp(&off(&things[*b])))
@@ -333,12 +334,12 @@ mod tests {
     use super::super::steadiness::{STILL, steadiness};
     use super::*;
 
-    fn thing(hue: u8, path: impl Fn(f64) -> [f64; 2], moves: bool) -> Thing {
+    fn thing(hue: u8, path: impl Fn(f64) -> [f64; 2], moves: bool) -> TrackedObject {
         let path: Vec<Option<[f64; 2]>> = (0..300).map(|i| Some(path(0.05 * f64::from(i)))).collect();
         let x: Vec<f64> = path.iter().flatten().map(|p| p[0]).collect();
         let travel_px = 0.5 * (x.iter().copied().fold(f64::MIN, f64::max) - x.iter().copied().fold(f64::MAX, f64::min));
         let steadiness = if moves { steadiness(&path) } else { STILL };
-        Thing { hue, presence: 1.0, area_px2: 300.0, travel_px, moves, steadiness, path }
+        TrackedObject { hue, presence: 1.0, area_px2: 300.0, travel_px, moves, steadiness, path }
     }
 
     fn joint(t: f64) -> [f64; 2] {
@@ -403,7 +404,8 @@ mod tests {
         // something passes before each once in a swing
         let covered = |x: f64, by_px: f64| move |t: f64| [x + by_px * (3.0 * t + x).sin().powi(9), 190.0 + 0.4 * x];
         let chain = |by_px: f64| {
-            let things: Vec<Thing> = [100.0, 240.0, 410.0].iter().map(|x| thing(0, covered(*x, by_px), true)).collect();
+            let things: Vec<TrackedObject> =
+                [100.0, 240.0, 410.0].iter().map(|x| thing(0, covered(*x, by_px), true)).collect();
             longest(&things, &names)
         };
         // of a radius of 9.8 px
@@ -445,18 +447,18 @@ mod tests {
                 [joint(t)[0] + dx * cos + dy * sin, joint(t)[1] + dy * cos - dx * sin]
             }
         };
-        let mut things = vec![Thing { area_px2: 2900.0, ..thing(0, joint, true) }];
+        let mut things = vec![TrackedObject { area_px2: 2900.0, ..thing(0, joint, true) }];
         for (dx, dy) in [(26.0, 0.0), (-26.0, 0.0), (0.0, 26.0), (0.0, -26.0)] {
-            things.push(Thing { area_px2: 200.0, ..thing(1, beside(dx, dy), true) });
+            things.push(TrackedObject { area_px2: 200.0, ..thing(1, beside(dx, dy), true) });
         }
         let names = |ball: &str| [ball.to_owned(), "dark".to_owned()];
         assert_eq!(longest(&things, &names("dark")).unwrap().marks, [0]);
         assert_eq!(longest(&things, &names("#20a040")).unwrap().marks, [0]);
         // a wall behind them does not move as they do
-        things[0] = Thing { area_px2: 2900.0, ..thing(0, |t| [joint(0.3 * t)[0], 240.0], true) };
+        things[0] = TrackedObject { area_px2: 2900.0, ..thing(0, |t| [joint(0.3 * t)[0], 240.0], true) };
         assert_eq!(longest(&things, &names("#d0c0a0")).unwrap().marks.len(), 4);
         // dark marks on a light plate are marks
-        things[0] = Thing { area_px2: 2900.0, ..thing(0, joint, true) };
+        things[0] = TrackedObject { area_px2: 2900.0, ..thing(0, joint, true) };
         assert_eq!(longest(&things, &names("light")).unwrap().marks.len(), 4);
     }
 
@@ -491,7 +493,7 @@ mod tests {
     #[test]
     fn a_ball_that_goes_up_and_down_on_a_straight_line_is_a_mark() {
         let bounces = thing(0, |t| [400.0, 300.0 + 50.0 * (4.0 * t).sin()], true);
-        let bounces = Thing { travel_px: 50.0, ..bounces };
+        let bounces = TrackedObject { travel_px: 50.0, ..bounces };
         assert_eq!(longest(&[bounces], &["#20a040".to_owned()]).unwrap().arc, None);
     }
 

@@ -8,8 +8,8 @@ use super::super::grammar::Term;
 use super::super::hypothesis::Hypothesis;
 use super::super::posterior::Posterior;
 use super::super::refit::Refit;
-use super::super::stretches::{Asked, terms_asked_for};
-use super::sought::{Candidate, started};
+use super::super::stretches::{Asked, best_term_sets};
+use super::term_screening::{Candidate, started};
 use crate::experiment::{Coefficient, Law};
 
 /// A scale that many times the one from which it began has run away.
@@ -53,7 +53,7 @@ pub fn fitted<'a>(
     let (best, law) = (posterior.best(), &context.settings.law);
     let until = budget.until;
     // what leaves more than the base model leads nowhere
-    let base = context.judged_by(&best.problem.noise, posterior.base(), 0);
+    let base = context.with_noise(&best.problem.noise, posterior.base(), 0);
     let bound = base.map_or(f64::INFINITY, |base| base.chi2);
     let along_best = |candidate: Candidate| {
         let fit = begun_fit(context, best, &candidate, (bound, budget.motions > law.along))?;
@@ -98,7 +98,7 @@ fn begun_fit<'a>(
     let promised = context.settings.search.keeps_up * (best.chi2 - candidate.gain).max(best.values() as f64);
     let is_as_promised = begun.as_ref().is_some_and(|begun| begun.chi2 < promised);
     let is_worth = has_time && candidate.rank == 0 && !is_as_promised && *hypothesis != best.hypothesis;
-    let along = is_worth.then(|| with.refit_along(hypothesis, best, f64::INFINITY)).flatten();
+    let along = is_worth.then(|| with.refit_along_fit(hypothesis, best, f64::INFINITY)).flatten();
     begun.into_iter().chain(along).min_by(|a, b| a.chi2.total_cmp(&b.chi2))
 }
 
@@ -110,7 +110,7 @@ pub fn along_the_recording<'a>(
     effects: &[Effect],
     terms: &[Term],
 ) -> Vec<Begun<'a>> {
-    let asked = terms_asked_for(context, base, effects, terms, context.settings.search.asked);
+    let asked = best_term_sets(context, base, effects, terms, context.settings.search.asked);
     let fitted = |(asked, of_terms): (Asked, Vec<(usize, f64)>)| {
         let own = of_terms.into_iter().enumerate();
         let terms: Vec<Term> = own.map(|(place, (k, amplitude))| started(&terms[k], amplitude, place)).collect();
@@ -146,7 +146,7 @@ fn halved<'a>(context: &FitContext<'a>, mut going_on: Vec<Begun<'a>>, until: u64
         let done = context.work.done();
         let half = done + until.saturating_sub(done) / 2;
         let further = within(context, half, (GONE_ON_AT_ONCE, better.into_iter()), |(terms, fit)| {
-            gone_on(context, terms, fit, steps)
+            continue_fit(context, terms, fit, steps)
         });
         let is_last = steps >= context.settings.descent.most_steps || context.work.done() > until;
         let (ended, others): (Vec<Begun<'a>>, Vec<Begun<'a>>) =
@@ -177,7 +177,7 @@ fn within<T: Send, R: Send>(
 }
 
 /// A candidate so many steps further, its coefficients those of the fit; `None` where one has run away, and its term is another one of the grammar.
-pub fn gone_on<'a>(
+pub fn continue_fit<'a>(
     context: &FitContext<'a>,
     mut terms: Vec<Term>,
     begun: Refit<'a>,

@@ -5,11 +5,11 @@ use std::sync::OnceLock;
 use rayon::prelude::*;
 
 use super::super::base;
+use super::super::base_priors::DampingAssumption;
 use super::super::misfit::{Misfit, needs};
 use super::super::refit::{self, Refit, least};
 use super::super::rods;
 use super::super::settings::MisfitSettings;
-use super::super::taken::Taken;
 use super::{Begun, Search};
 use crate::error::Result;
 use crate::experiment::Experiment;
@@ -33,20 +33,21 @@ impl<'a> Search<'a, '_> {
 
     /// The base model's fit with another number of rods, if the recordings ask for it.
     fn with_the_preferred_count(&self, counted: &'a OnceLock<Experiment>) -> Result<Option<Self>> {
-        let count = self.count.or_else(|| rods::preferred(&self.context, &self.fits, rods::Among::Simple));
+        let count =
+            self.count.or_else(|| rods::preferred_rod_count(&self.context, &self.fits, rods::ComparedFits::Simple));
         let Some(count) = count else { return Ok(None) };
         let counted = counted.get_or_init(|| rods::with(self.context.experiment, count));
-        let context = base::context(self.prepared, counted, Taken::AtItsWord, self.context.settings)?;
+        let context = base::context(self.prepared, counted, DampingAssumption::AsStated, self.context.settings)?;
         let fit = base::fitted_near(&context, &rods::begun_with(self.base(), count), self.prepared)?;
-        let begun_at = context.work.done();
-        Ok(Some(Self::begun(self.prepared, context, fit, begun_at, self.progress)))
+        let work_at_start = context.work.done();
+        Ok(Some(Self::begun(self.prepared, context, fit, work_at_start, self.progress)))
     }
 
     /// Searches again with the number of rods that the recordings of a strip ask for, where that does better; [`Self::counted`] has asked where nothing is missing.
     ///
     /// # Errors
     /// As [`Self::of_base_model`].
-    pub fn recounted(self, counted: &'a OnceLock<Experiment>) -> Result<Self> {
+    pub fn searched_with_preferred_rods(self, counted: &'a OnceLock<Experiment>) -> Result<Self> {
         let is_asked = self.count.is_some() || !self.is_adequate();
         let again = if is_asked { self.with_the_preferred_count(counted)? } else { None };
         let Some(mut again) = again else { return Ok(self) };
@@ -74,7 +75,7 @@ impl<'a> Search<'a, '_> {
     }
 
     /// Fits what led with another number of rods.
-    pub(super) fn take_up(&mut self) {
+    pub(super) fn fit_warm_starts(&mut self) {
         let (context, noise) = (&self.context, &self.base().problem.noise);
         let fitted = |(hypothesis, x): &Begun| {
             let is_alike = context.problem(hypothesis, noise).is_ok_and(|problem| problem.variables() == x.len());
@@ -83,13 +84,13 @@ impl<'a> Search<'a, '_> {
         let found: Vec<Refit<'a>> = self.led.par_iter().with_max_len(1).filter_map(fitted).collect();
         if !found.is_empty() {
             self.keep(found);
-            self.learn_noise();
+            self.update_noise();
         }
     }
 
     /// Whether the single effects ask for another number of rods.
-    pub(super) fn is_miscounted(&mut self) -> bool {
-        self.count = rods::preferred(&self.context, &self.fits, rods::Among::Leaders);
+    pub(super) fn prefers_other_rod_count(&mut self) -> bool {
+        self.count = rods::preferred_rod_count(&self.context, &self.fits, rods::ComparedFits::Best);
         self.count.is_some()
     }
 }

@@ -2,30 +2,30 @@
 
 use std::f64::consts::{FRAC_PI_2, PI};
 
-use super::begin::{slow_mode_hz, undamped};
+use super::start_values::{slow_mode_hz, undamped};
 use super::{Record, Seen};
 use crate::error::{Error, Result};
 use crate::experiment::Experiment;
 
-/// Below this share the air that swings along, a joint or a clock may be the reason: it is said beside them.
+/// Below this share the air that swings along, a joint or a clock may be the reason: it is said beside them (judgement).
 const LARGE: f64 = 0.15;
-/// Below this share a difference is no news: half a millimetre in a quarter of a metre.
+/// Below this share a difference is no news: half a millimetre in a quarter of a metre (judgement).
 const SMALL: f64 = 0.001;
-/// Below this share it is told to five digits.
+/// Below this share it is told to five digits (judgement).
 const NEAR: f64 = 0.1;
-/// Beyond this ratio no motion of the model can follow the recording at all, and its least squares mean nothing. Units differ by more: a square root of 39 for
-/// inches, of 100 and of 1000 for centimetres and millimetres.
+/// Beyond this ratio no motion of the model can follow the recording at all, and its least squares mean nothing (judgement). Units differ by more: a square
+/// root of 39 for inches, of 100 and of 1000 for centimetres and millimetres.
 const HOPELESS: f64 = 5.0;
-/// A factor is that of a unit within this share.
+/// A factor is that of a unit within this share (judgement).
 const UNIT: f64 = 0.05;
 /// Lengths stated in these units stand in metres this many times too large.
 const LENGTH_UNITS: [(f64, &str); 4] =
     [(1000.0, "millimetres"), (100.0, "centimetres"), (39.37, "inches"), (3.281, "feet")];
 /// Stamps in these units stand in seconds this many times too large.
 const TIME_UNITS: [(f64, &str); 3] = [(1e6, "microseconds"), (1e3, "milliseconds"), (1.0 / 60.0, "minutes")];
-/// Frames per second of a slow-motion film, over those it plays at.
+/// Frames per second of a slow-motion film, over those it plays at (judgement: what cameras usually offer).
 const SLOW_MOTIONS: [f64; 5] = [2.0, 4.0, 8.0, 16.0, 32.0];
-/// Angles of which one measured part in this of its own is the same as the model's.
+/// Angles of which one measured part in this of its own is the same as the model's (judgement).
 const SHAPE: f64 = 0.1;
 
 /// The frequencies of the slow mode, seen and modelled.
@@ -122,7 +122,7 @@ impl Pace {
 ///
 /// # Errors
 /// [`Error::Table`] with the factor, where nothing in the recording swings within a factor of five of the specimen.
-pub fn refuse_another_pace(record: &Record, seen: &Seen, experiment: &Experiment) -> Result<()> {
+pub fn check_frequency(record: &Record, seen: &Seen, experiment: &Experiment) -> Result<()> {
     let Some(pace) = Pace::of(seen, experiment) else { return Ok(()) };
     let is_near = |hz: f64| (hz / pace.model_hz).ln().abs() < HOPELESS.ln();
     if pace.beyond_small || is_near(pace.seen_hz) || seen.peaks_hz.iter().any(|hz| is_near(*hz)) {

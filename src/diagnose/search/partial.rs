@@ -11,6 +11,9 @@ use super::super::settings::MisfitSettings;
 use super::rounds::{Round, Tried};
 use super::{Search, horizon};
 
+/// A single effect is not told from the best fit of a part where it needs more than that by less than so many falls of χ² that count (judgement).
+const TIED: f64 = 2.0;
+
 impl<'a> Search<'a, '_> {
     /// Searches with single effects and pairs, then from further starts: the whole recordings, or the part that can be afforded.
     pub(super) fn begin(&mut self) {
@@ -25,13 +28,20 @@ impl<'a> Search<'a, '_> {
     fn begin_on(&mut self, part: f64) {
         let records = first_part(self.context.records, part);
         let context = self.context.on(&records);
-        let Some(base) = horizon::on_the_beginning(&self.context, &context, self.base()) else { return };
-        let begun = Search::begun(self.prepared, context, base, self.begun_at, self.progress);
+        let Some(base) = horizon::refit_on_first_part(&self.context, &context, self.base()) else { return };
+        let begun = Search::begun(self.prepared, context, base, self.work_at_start, self.progress);
         let led = self.led.clone();
-        let mut early = Search { is_loose: self.is_loose, until: self.until, rival: self.rival, led, part, ..begun };
+        let mut early = Search {
+            has_added_damper: self.has_added_damper,
+            until: self.until,
+            rival: self.rival,
+            led,
+            part,
+            ..begun
+        };
         early.usual();
-        if early.is_cut_short {
-            (self.is_cut_short, self.bending_n_m2, self.count) = (true, early.bending_n_m2, early.count);
+        if early.stopped_early {
+            (self.stopped_early, self.bending_n_m2, self.count) = (true, early.bending_n_m2, early.count);
             let leading = |count| Self::leading(&early.fits, count, &early.context.settings.misfit);
             self.led = early.count.map(leading).unwrap_or_default();
             self.rounds.extend(early.rounds);
@@ -40,28 +50,29 @@ impl<'a> Search<'a, '_> {
         early.restarts();
         early.allow(self.context.settings.search.shares.restarts);
         early.round(Round::OneMore, &mut Tried::default());
+        early.drop_superfluous();
         let Search { fits, rounds, undecided, .. } = early;
         self.part = part;
         self.rounds.extend(rounds);
         self.undecided.extend(undecided);
-        self.tied = tied(&fits, &self.context.settings.misfit);
+        self.indistinguishable = indistinguishable(&fits, &self.context.settings.misfit);
         self.progress.begin("to the end", None);
         let noise = &self.base().problem.noise;
         let found: Vec<Refit<'a>> = horizon::carried(&self.context, fits, part, noise);
         self.keep(found);
-        self.learn_noise();
+        self.update_noise();
         self.allow(self.context.settings.search.shares.further);
-        self.round(Round::Tied, &mut Tried::default());
+        self.round(Round::Indistinguishable, &mut Tried::default());
         self.round(Round::OneMore, &mut Tried::default());
     }
 }
 
 /// Single effects that a part of the recordings does not tell from the best of its fits, nearest first.
-fn tied(fits: &[Refit<'_>], settings: &MisfitSettings) -> Vec<Effect> {
+fn indistinguishable(fits: &[Refit<'_>], settings: &MisfitSettings) -> Vec<Effect> {
     let Some(best) = least(fits) else { return Vec::new() };
     let least = fits.iter().map(|fit| needs(fit, best, settings)).fold(f64::INFINITY, f64::min);
     let is_tied = |fit: &Refit<'_>| match fit.hypothesis.effects[..] {
-        [only] => only.entry().cost == Cost::Ordinary && needs(fit, best, settings) < least + 2.0 * settings.counts,
+        [only] => only.entry().cost == Cost::Ordinary && needs(fit, best, settings) < least + TIED * settings.counts,
         _ => false,
     };
     let order = refit::best(fits, usize::MAX, is_tied, |fit| needs(fit, best, settings));

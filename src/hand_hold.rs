@@ -1,4 +1,4 @@
-//! The part of a recording in which what swings is free: before it a hand holds it still until it is let go, after it a hand has caught it.
+//! The part of a recording in which what swings is free: after a hand has let it go, and before it is caught.
 //!
 //! What is let go at rest stays within 4 % of its range for 0.064 of a period, and passes its middle 0.186 of a period later: 0.34 times that. Let go 2° from the top it stays as long as it then takes to
 //! fall (1.06). What stays half as long again was held. It may hang at rest first and be pulled aside then: what counts is the last hold from which it swings, of half a period or longer, as two modes together may pause for less. Caught is the same with time

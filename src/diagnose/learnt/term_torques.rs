@@ -87,7 +87,7 @@ impl Along {
     }
 
     /// Whether a term with its coefficients gives energy, all in all.
-    pub fn gives_energy(&self, term: &Term) -> bool {
+    pub fn adds_energy(&self, term: &Term) -> bool {
         let motions = self.motions.iter().flat_map(|(_, motions)| motions);
         let rates = motions.flat_map(|motion| motion.rate[..motion.links()].iter().copied());
         self.of_term(term).is_some_and(|torques| torques.iter().zip(rates).map(|(q, rate)| q * rate).sum::<f64>() > 0.0)
@@ -142,7 +142,7 @@ mod tests {
     use std::path::Path;
 
     use super::*;
-    use crate::diagnose::grammar::{Largest, terms};
+    use crate::diagnose::grammar::{StateRange, terms};
     use crate::experiment::Experiment;
     use crate::model::{Accuracy, State, Trajectory};
 
@@ -168,7 +168,7 @@ mod tests {
     #[test]
     fn a_swing_that_ends_at_rest_tells_friction_by_what_it_does_while_the_link_moves() {
         let along = along_a_swing_to_rest();
-        let largest = Largest { angle: 0.5, rate: 3.0, time_s: 40.0 };
+        let largest = StateRange { angle: 0.5, rate: 3.0, time_s: 40.0 };
         let mut term = terms(LawPlace::Strip, largest).into_iter().find(|term| term.shape == "sign").unwrap();
         term.law.parameters.get_mut("a").unwrap().start = 0.03;
         assert_eq!(along.stands_for((&term, false), &LawSettings::default()), [(Effect::HingeCoulomb, 1.0)]);

@@ -8,16 +8,16 @@ use super::descent::{Block, Descent, Outcome};
 use crate::model::Parameter;
 
 /// Descents after the first, each with the shapes of the strip as the one before found it held.
-const MOST_HOLDS: usize = 3;
+const MOST_UPDATES: usize = 3;
 
 /// Where T_h and Δ_y stand among a problem's variables.
 #[derive(Debug, Clone, Copy)]
-pub struct Straightened {
+pub struct StiffnessCoordinates {
     torque: usize,
     yields: usize,
 }
 
-impl Straightened {
+impl StiffnessCoordinates {
     /// Of a problem with a hysteresis.
     pub fn of(problem: &Problem<'_>) -> Option<Self> {
         let [torque, yields] = [Parameter::HysteresisTorque, Parameter::HysteresisYield].map(|p| problem.place(p));
@@ -73,7 +73,7 @@ impl Straightened {
 /// Descends, of a problem with a hysteresis in the variables in which its valley is straight.
 pub fn descend(problem: &Problem<'_>, descent: &Descent, x: Vec<f64>) -> Option<Outcome> {
     let lower = problem.lower();
-    let Some(valley) = Straightened::of(problem) else { return descent.run(x, &lower, |x| problem.blocks(x)) };
+    let Some(valley) = StiffnessCoordinates::of(problem) else { return descent.run(x, &lower, |x| problem.blocks(x)) };
     let straight = descent.run(valley.straight(x), &lower, |x| {
         let mut blocks = problem.blocks(&valley.bent(x))?;
         valley.straighten(&mut blocks, x);
@@ -82,19 +82,27 @@ pub fn descend(problem: &Problem<'_>, descent: &Descent, x: Vec<f64>) -> Option<
     straight.map(|outcome| valley.bend(outcome))
 }
 
-/// Descends, and on with the shapes of the strip as it was found to be held ([`as_held`]).
-pub fn descend_as_held<'a>(problem: Problem<'a>, descent: &Descent, x: Vec<f64>) -> Option<(Problem<'a>, Outcome)> {
+/// Descends, and on with the shapes of the strip as it was found to be held ([`update_strip_modes`]).
+pub fn descend_updating_modes<'a>(
+    problem: Problem<'a>,
+    descent: &Descent,
+    x: Vec<f64>,
+) -> Option<(Problem<'a>, Outcome)> {
     let outcome = descend(&problem, descent, x)?;
-    Some(as_held(problem, descent, outcome))
+    Some(update_strip_modes(problem, descent, outcome))
 }
 
-/// Goes on from the end of a descent with the shapes of the strip as it was found to be held, as often as these are others.
-pub fn as_held<'a>(mut problem: Problem<'a>, descent: &Descent, mut outcome: Outcome) -> (Problem<'a>, Outcome) {
-    for _ in 0..MOST_HOLDS {
-        if problem.is_held_as(&outcome.x) {
+/// Computes the mode shapes of a strip again for the hinge spring that was fitted, and goes on, a few times at most.
+pub fn update_strip_modes<'a>(
+    mut problem: Problem<'a>,
+    descent: &Descent,
+    mut outcome: Outcome,
+) -> (Problem<'a>, Outcome) {
+    for _ in 0..MOST_UPDATES {
+        if problem.has_modes_at(&outcome.x) {
             break;
         }
-        let held = problem.clone().held_as(&outcome.x);
+        let held = problem.clone().with_modes_at(&outcome.x);
         let on = Descent { damping: outcome.damping, worst_start: f64::INFINITY, judged: None, ..*descent };
         let again = descend(&held, &on, outcome.x.clone()).filter(|again| again.cost < outcome.cost);
         let Some((again, blocks)) = again.and_then(|again| held.blocks(&again.x).map(|blocks| (again, blocks))) else {
@@ -118,7 +126,7 @@ mod tests {
 
     #[test]
     fn there_and_back_the_normal_matrix_is_the_same() {
-        let valley = Straightened { torque: 0, yields: 2 };
+        let valley = StiffnessCoordinates { torque: 0, yields: 2 };
         let x = vec![3e-6, 7.0, 0.05];
         let straight = valley.straight(x.clone());
         assert!((straight[0] - 6e-5).abs() < 1e-18);
@@ -136,7 +144,7 @@ mod tests {
 
     #[test]
     fn derivatives_are_those_of_the_straight_variables() {
-        let valley = Straightened { torque: 0, yields: 2 };
+        let valley = StiffnessCoordinates { torque: 0, yields: 2 };
         let straight = [0.6, 7.0, 0.5];
         let value = |straight: &[f64]| slopes() * DVector::from_vec(valley.bent(straight));
         let residual = DVector::zeros(4);

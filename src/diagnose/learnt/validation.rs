@@ -7,9 +7,9 @@ use super::super::effect::{Effect, Phase, Place};
 use super::super::grammar::Term;
 use super::super::heldout::{self, HeldOut, Prediction};
 use super::super::refit::Refit;
-use super::along::{Along, place_of};
-use super::described::Described;
-use super::fitted::with_laws;
+use super::description_length::Description;
+use super::term_fitting::with_laws;
+use super::term_torques::{Along, place_of};
 use crate::model::Parameter;
 
 /// A law that was learnt.
@@ -45,7 +45,7 @@ impl Learnt<'_> {
 
     /// A coefficient's standard deviation.
     pub fn sd(&self, coefficient: Parameter) -> f64 {
-        let scale = (self.fit.chi2 / self.fit.values().max(1) as f64).max(1.0).sqrt();
+        let scale = self.fit.variance_ratio().sqrt();
         let covariance = self.fit.covariance(&[coefficient]);
         scale * covariance.get((0, 0)).map_or(f64::INFINITY, |variance| variance.max(0.0).sqrt())
     }
@@ -53,7 +53,7 @@ impl Learnt<'_> {
 
 /// The terms' formulas with the numbers of their coefficients, one after the other.
 fn formula_of(terms: &[Term]) -> String {
-    terms.iter().map(Term::with_numbers).collect::<Vec<_>>().join(" + ").replace("+ -", "- ")
+    terms.iter().map(Term::formula_with_values).collect::<Vec<_>>().join(" + ").replace("+ -", "- ")
 }
 
 /// The foremost descriptions, each with what it predicts where it is fitted to a part only, in the order of
@@ -67,24 +67,24 @@ fn formula_of(terms: &[Term]) -> String {
 /// comes later by what was learnt before is Dawid's prequential description, Journal of the Royal Statistical Society A 147 (1984) 278.)
 pub fn foretold<'a>(
     context: &FitContext<'a>,
-    mut order: Vec<Described<'a>>,
+    mut order: Vec<Description<'a>>,
     from_s: Option<f64>,
-) -> Vec<(Described<'a>, Prediction)> {
-    let (law, told) = (&context.settings.law, context.settings.prior.told_from_zero);
-    let predict = |mut own: Described<'a>| {
+) -> Vec<(Description<'a>, Prediction)> {
+    let (law, told) = (&context.settings.law, context.settings.prior.min_significance);
+    let predict = |mut own: Description<'a>| {
         let prediction = heldout::predicted(&with_laws(context, &own.terms), &own.fit, from_s)?;
         let missed = prediction.rmse_rad.iter().map(|error| error.max(f64::MIN_POSITIVE).ln());
         own.length += 2.0 * missed.sum::<f64>();
         // a law that sets in later was not learnt from what was fitted
         prediction.told.iter().all(|deviations| *deviations > told).then_some((own, prediction))
     };
-    let mut foretold: Vec<(Described<'a>, Prediction)> = Vec::new();
+    let mut foretold: Vec<(Description<'a>, Prediction)> = Vec::new();
     let mut asked = 0;
     // where none of the foremost predicts anything, the next ones are asked
     while foretold.is_empty() && asked < law.foretold && !order.is_empty() {
         let near = order[0].length + law.far;
         let count = order.iter().take_while(|own| own.length <= near).count().clamp(1, law.foretold - asked);
-        let foremost: Vec<Described<'a>> = order.drain(..count).collect();
+        let foremost: Vec<Description<'a>> = order.drain(..count).collect();
         asked += count;
         foretold = foremost.into_par_iter().with_max_len(1).filter_map(predict).collect();
     }
@@ -95,7 +95,7 @@ pub fn foretold<'a>(
 /// The law of the shortest of these descriptions, if it leaves clearly less of what was not fitted than the names do.
 pub fn proven<'a>(
     context: &FitContext<'a>,
-    foretold: &[(Described<'a>, Prediction)],
+    foretold: &[(Description<'a>, Prediction)],
     proof: &HeldOut,
     along: &Along,
 ) -> Option<Learnt<'a>> {

@@ -7,21 +7,21 @@ use super::super::effect::Effect;
 use super::super::evidence::{Scatter, normalised};
 use super::super::grammar::{Form, Term};
 use super::super::hypothesis::Hypothesis;
-use super::super::misfit::most_of_noise;
+use super::super::misfit::chi2_noise_limit;
 use super::super::posterior::{Needed, Posterior};
 use super::super::refit::Refit;
 use super::super::settings::LawSettings;
-use super::along::Along;
-use super::fitted::{Begun, Budget, along_the_recording, fitted, gone_on, with_laws};
-use super::in_place::in_place_of_names;
-use super::sought::candidates;
+use super::substitutes::substitute_terms;
+use super::term_fitting::{Begun, Budget, along_the_recording, continue_fit, fitted, with_laws};
+use super::term_screening::candidates;
+use super::term_torques::Along;
 use crate::model::Parameter;
 
 /// Scales of a term's state to begin with, over those that it had beside a name.
 const SCALED: [f64; 3] = [1.0, 0.7, 1.4];
 
 /// Terms that were fitted beside some effects, with the length of the description.
-pub struct Described<'a> {
+pub struct Description<'a> {
     /// The terms, with their coefficients.
     pub terms: Vec<Term>,
     /// The fit.
@@ -33,7 +33,7 @@ pub struct Described<'a> {
 /// Names, and the forms of terms beside them.
 type Kind = (Hypothesis, Vec<Form>);
 
-impl Described<'_> {
+impl Description<'_> {
     fn kind(&self) -> Kind {
         (self.fit.hypothesis.clone(), self.terms.iter().map(Term::form).collect())
     }
@@ -41,7 +41,7 @@ impl Described<'_> {
     /// The effects that each of its terms stands for along a motion, with the share of each.
     pub fn stand_for(&self, context: &FitContext<'_>, along: &Along) -> Vec<Vec<(Effect, f64)>> {
         let (law, misfit) = (&context.settings.law, &context.settings.misfit);
-        let is_exact = self.fit.chi2 < most_of_noise(self.fit.values(), misfit);
+        let is_exact = self.fit.chi2 < chi2_noise_limit(self.fit.values(), misfit);
         self.terms.iter().map(|term| along.stands_for((term, is_exact), law)).collect()
     }
 }
@@ -52,14 +52,14 @@ pub fn descriptions<'a>(
     context: &FitContext<'a>,
     posterior: &Posterior<'a>,
     effects: &[Effect],
-) -> Option<(Vec<Described<'a>>, Along)> {
+) -> Option<(Vec<Description<'a>>, Along)> {
     let best = posterior.best();
     let before = context.work.done();
     let linearised = best.linearised()?;
     let budget = Budget::of(context, before);
     let (mut candidates, terms, every_start) = candidates(best, &linearised, &context.settings.law)?;
     let prior = Prior::of(context, best, effects, &terms)?;
-    candidates.extend(in_place_of_names(context, best, &prior.along, &every_start));
+    candidates.extend(substitute_terms(context, best, &prior.along, &every_start));
     candidates.sort_by_key(|candidate| candidate.rank);
     let with_laws =
         fitted(context, posterior, (candidates, &budget), |base| along_the_recording(context, base, effects, &terms));
@@ -71,13 +71,13 @@ pub fn descriptions<'a>(
     let mut tried = Vec::new();
     loop {
         let near = order[0].length + context.settings.law.alternatives;
-        let new = |own: &&Described<'a>| own.length < near && !own.terms.is_empty() && !tried.contains(&own.kind());
-        let shortest: Vec<&Described<'a>> = order.iter().filter(new).collect();
+        let new = |own: &&Description<'a>| own.length < near && !own.terms.is_empty() && !tried.contains(&own.kind());
+        let shortest: Vec<&Description<'a>> = order.iter().filter(new).collect();
         if shortest.is_empty() || context.work.done() > budget.until_simpler {
             break;
         }
         tried.extend(shortest.iter().map(|own| own.kind()));
-        let simpler = |own: &&Described<'a>| {
+        let simpler = |own: &&Description<'a>| {
             let mut simpler = without_a_name(context, own);
             simpler.extend(without_a_term(context, own));
             simpler
@@ -90,7 +90,7 @@ pub fn descriptions<'a>(
 
 /// A description with terms without each of its names, from where it stands, and from there with the scales of the terms' states smaller and larger: a threshold
 /// or a width has false minima.
-fn without_a_name<'a>(context: &FitContext<'a>, own: &Described<'a>) -> Vec<Begun<'a>> {
+fn without_a_name<'a>(context: &FitContext<'a>, own: &Description<'a>) -> Vec<Begun<'a>> {
     let with = with_laws(context, &own.terms);
     // a term's amplitude comes first
     let scales: Vec<Parameter> =
@@ -102,33 +102,37 @@ fn without_a_name<'a>(context: &FitContext<'a>, own: &Described<'a>) -> Vec<Begu
             with.begin(&hypothesis, &own.fit, &start)
         };
         let begun = SCALED.map(from).into_iter().flatten().min_by(|a, b| a.chi2.total_cmp(&b.chi2))?;
-        kept_up(context, own, (own.terms.clone(), begun))
+        finish_if_competitive(context, own, (own.terms.clone(), begun))
     };
     own.fit.hypothesis.effects.par_iter().with_max_len(1).filter_map(fewer).collect()
 }
 
 /// A description with several terms without each of them, from where it stands.
-fn without_a_term<'a>(context: &FitContext<'a>, own: &Described<'a>) -> Vec<Begun<'a>> {
+fn without_a_term<'a>(context: &FitContext<'a>, own: &Description<'a>) -> Vec<Begun<'a>> {
     let fewer = |out: usize| {
         let others = own.terms.iter().enumerate().filter(|(place, _)| *place != out).map(|(_, term)| term);
         let terms: Vec<Term> = others.enumerate().map(|(place, term)| term.named(place)).collect();
         let start: Vec<_> =
             terms.iter().flat_map(|term| term.law.coefficients()).map(|(p, own)| (p, own.start)).collect();
         let begun = with_laws(context, &terms).begin(&own.fit.hypothesis, &own.fit, &start)?;
-        kept_up(context, own, (terms, begun))
+        finish_if_competitive(context, own, (terms, begun))
     };
     let several = if own.terms.len() > 1 { own.terms.len() } else { 0 };
     (0..several).into_par_iter().with_max_len(1).filter_map(fewer).collect()
 }
 
 /// The end of a simpler fit, unless it soon leaves far more than the description does.
-fn kept_up<'a>(context: &FitContext<'a>, own: &Described<'a>, (terms, begun): Begun<'a>) -> Option<Begun<'a>> {
+fn finish_if_competitive<'a>(
+    context: &FitContext<'a>,
+    own: &Description<'a>,
+    (terms, begun): Begun<'a>,
+) -> Option<Begun<'a>> {
     let (search, descent) = (&context.settings.search, &context.settings.descent);
     let keeps_up = |fit: &Refit<'a>, times: f64| fit.chi2 < times * own.fit.chi2;
     keeps_up(&begun, search.hopeless).then_some(())?;
-    let (terms, few) = gone_on(context, terms, begun, descent.few_steps)?;
+    let (terms, few) = continue_fit(context, terms, begun, descent.few_steps)?;
     keeps_up(&few, search.keeps_up).then_some(())?;
-    gone_on(context, terms, few, descent.most_steps)
+    continue_fit(context, terms, few, descent.most_steps)
 }
 
 /// What names and terms cost before anything was seen (nats).
@@ -161,7 +165,7 @@ impl Prior {
         // under whatever name, it is the table's
         let is_of_table = |term: &Term| !self.along.stands_for((term, true), &self.law).is_empty();
         let of_term = |term: &Term| if is_of_table(term) { self.of_effect } else { self.of_term };
-        let is_active = |term: &&Term| term.state != "angle" && self.along.gives_energy(term);
+        let is_active = |term: &&Term| term.state != "angle" && self.along.adds_energy(term);
         hypothesis.effects.len() as f64 * self.of_effect
             + terms.iter().map(of_term).sum::<f64>()
             + terms.iter().filter(is_active).count() as f64 * self.of_active
@@ -169,7 +173,7 @@ impl Prior {
 }
 
 /// The fits with the lengths of their descriptions, the shortest first, each kind once.
-fn described<'a>(fitted: Vec<Begun<'a>>, prior: &Prior) -> Option<Vec<Described<'a>>> {
+fn described<'a>(fitted: Vec<Begun<'a>>, prior: &Prior) -> Option<Vec<Description<'a>>> {
     let least = fitted.iter().map(|(_, fit)| fit).min_by(|a, b| a.chi2.total_cmp(&b.chi2))?;
     let scatter = Scatter::of(least, least.values());
     let together = (scatter.of_all / scatter.of_values).max(1.0);
@@ -179,8 +183,8 @@ fn described<'a>(fitted: Vec<Begun<'a>>, prior: &Prior) -> Option<Vec<Described<
             + 0.5 * count as f64 * (fit.values() as f64 / together).ln()
             + prior.of_description(terms, &fit.hypothesis)
     };
-    let mut order: Vec<Described<'a>> =
-        fitted.into_iter().map(|(terms, fit)| Described { length: length(&terms, &fit), terms, fit }).collect();
+    let mut order: Vec<Description<'a>> =
+        fitted.into_iter().map(|(terms, fit)| Description { length: length(&terms, &fit), terms, fit }).collect();
     order.sort_by(|a, b| a.length.total_cmp(&b.length));
     let mut seen = Vec::new();
     order.retain(|own| {
@@ -197,9 +201,9 @@ fn exchanged(best: &Hypothesis, name: Effect, twin: Effect) -> Vec<Effect> {
 }
 
 /// Effects that do as well in the place of a name, as the table's fits say, with their odds over it.
-struct Twins(Vec<(Effect, Effect, f64)>);
+struct Exchangeable(Vec<(Effect, Effect, f64)>);
 
-impl Twins {
+impl Exchangeable {
     /// Of the names of the likeliest fit.
     fn of(posterior: &Posterior<'_>, effects: &[Effect]) -> Self {
         let (likeliest, best) = (posterior.candidates[0].ln_posterior, &posterior.best().hypothesis);
@@ -234,13 +238,13 @@ impl Twins {
 /// motion; and that of those without it which have a term that no effect does.
 pub fn needed(
     context: &FitContext<'_>,
-    order: &[Described<'_>],
+    order: &[Description<'_>],
     posterior: &Posterior<'_>,
     effects: &[Effect],
     along: &Along,
 ) -> Vec<Needed> {
     let weights = normalised(&order.iter().map(|own| -own.length).collect::<Vec<f64>>());
-    let twins = Twins::of(posterior, effects);
+    let twins = Exchangeable::of(posterior, effects);
     // a set of names alone shares nothing with one that is a description of its own
     let is_described =
         |names: &[Effect]| order.iter().any(|own| own.terms.is_empty() && own.fit.hypothesis.effects == names);
@@ -268,7 +272,7 @@ mod tests {
 
     #[test]
     fn a_name_shares_its_weight_with_what_does_as_well_in_its_place() {
-        let twins = Twins(vec![(Effect::CameraTilt, Effect::SideForce, 0.5)]);
+        let twins = Exchangeable(vec![(Effect::CameraTilt, Effect::SideForce, 0.5)]);
         let of = |effects: &[Effect]| Hypothesis { effects: effects.to_vec(), dropped: None };
         let (tilted, both) = (of(&[Effect::CameraTilt]), of(&[Effect::CameraTilt, Effect::SideForce]));
         assert!((twins.share(Effect::CameraTilt, &tilted) - 2.0 / 3.0).abs() < 1e-12);

@@ -3,17 +3,17 @@
 use super::context::FitContext;
 use super::noise;
 use super::refit::Refit;
-use crate::fit::across::Across;
+use crate::fit::angle_correlation::Across;
 use crate::fit::noise::least_noise_rad;
 use crate::fit::whitening::{Colour, RecordNoise};
 use crate::model::observe::chord_angles_rad;
 
 /// What a fit leaves where the motion has no power, if it differs from the noise by which that fit was judged in anything that counts: all fits that are to be
 /// compared must then be judged by it.
-pub fn learnt_noise(context: &FitContext<'_>, by: &Refit<'_>) -> Option<Vec<RecordNoise>> {
+pub fn residual_noise(context: &FitContext<'_>, by: &Refit<'_>) -> Option<Vec<RecordNoise>> {
     let settings = &context.settings.noise;
     // what has names must not be judged by a noise that they made, and what has lost step leaves something at every frequency
-    let has_lost_step = by.left_share() > context.settings.misfit.out_of_step;
+    let has_lost_step = by.has_lost_step(&context.settings.misfit);
     let is_suspect = !by.hypothesis.effects.is_empty() || has_lost_step;
     let mut all = context.noise_of(by);
     let mut changed = false;

@@ -3,15 +3,15 @@
 use rayon::prelude::*;
 
 use super::super::context::FitContext;
-use super::super::learnt_noise::learnt_noise;
 use super::super::refit::{Refit, least, least_chi2};
+use super::super::residual_noise::residual_noise;
 use super::Search;
 use crate::fit::whitening::RecordNoise;
 
 impl<'a> Search<'a, '_> {
     /// Judges all fits by the noise that the best of them leaves; those that have not yet converged, and are worth it, go on. Where that led far down, the noise is
     /// what is left there.
-    pub(super) fn learn_noise(&mut self) {
+    pub(super) fn update_noise(&mut self) {
         let before = least_chi2(&self.fits);
         self.learn_noise_once();
         if self.context.settings.search.far_down * least_chi2(&self.fits) < before {
@@ -22,7 +22,7 @@ impl<'a> Search<'a, '_> {
     fn learn_noise_once(&mut self) {
         let context = &self.context;
         let best = least(&self.fits);
-        let learnt = best.and_then(|best| learnt_noise(context, best));
+        let learnt = best.and_then(|best| residual_noise(context, best));
         let (least, base) = (best.map_or(0.0, |best| best.chi2), self.base().chi2);
         let (descent, is_spent) = (&context.settings.descent, self.is_spent());
         let again = |fit: Refit<'a>| {
@@ -30,7 +30,7 @@ impl<'a> Search<'a, '_> {
             // where the budget is spent only the best one goes to its end
             let steps = if is_spent && fit.chi2 > least { descent.few_steps } else { descent.most_steps };
             match (&learnt, worth) {
-                (Some(noise), _) => context.judged_by(noise, &fit, if worth { steps } else { 0 }).unwrap_or(fit),
+                (Some(noise), _) => context.with_noise(noise, &fit, if worth { steps } else { 0 }).unwrap_or(fit),
                 (None, true) if !fit.converged => context.go_on(&fit, steps).unwrap_or(fit),
                 _ => fit,
             }
@@ -40,15 +40,15 @@ impl<'a> Search<'a, '_> {
     }
 
     /// The same fits beside the errors in step with the swing that a tracked angle may have; those that are near the noise go on from where they are.
-    pub(super) fn allow_errors_in_step(&mut self) {
+    pub(super) fn add_synchronous_errors(&mut self) {
         let mut noise = self.base().problem.noise.clone();
         for (noise, record) in noise.iter_mut().zip(self.context.records) {
-            noise.in_step = record.in_step;
+            noise.synchronous = record.synchronous;
         }
-        self.judge_by(&noise, self.context.settings.descent.few_steps);
+        self.reweight(&noise, self.context.settings.descent.few_steps);
     }
 
-    pub(super) fn judge_by(&mut self, noise: &[RecordNoise], steps: usize) {
+    pub(super) fn reweight(&mut self, noise: &[RecordNoise], steps: usize) {
         if self.base().problem.noise == noise {
             return;
         }
@@ -56,7 +56,7 @@ impl<'a> Search<'a, '_> {
         let hopeless = context.settings.search.hopeless;
         let again = |fit: Refit<'a>| {
             let worth = fit.chi2 < hopeless * (least + hopeless);
-            context.judged_by(noise, &fit, if worth { steps } else { 0 }).unwrap_or(fit)
+            context.with_noise(noise, &fit, if worth { steps } else { 0 }).unwrap_or(fit)
         };
         let fits = std::mem::take(&mut self.fits);
         self.fits = fits.into_par_iter().with_max_len(1).map(again).collect();
@@ -66,9 +66,9 @@ impl<'a> Search<'a, '_> {
 /// Whether a fit is worth further steps beside the best and the base model's.
 fn is_worth_more(context: &FitContext<'_>, fit: &Refit<'_>, least: f64, base: f64) -> bool {
     let settings = context.settings;
-    let (hopeless, dear) = (settings.search.hopeless, fit.hypothesis.has_corners());
+    let (hopeless, dear) = (settings.search.hopeless, fit.hypothesis.has_switching());
     // in every joint of a strip it has only begun
-    let bound = if dear && context.is_strip() { settings.descent.hopeful } else { hopeless };
+    let bound = if dear && context.is_strip() { settings.descent.strip_continue_ratio } else { hopeless };
     fit.hypothesis.effects.is_empty()
         || fit.chi2 < bound * (least + hopeless) && !(dear && fit.chi2 > base - settings.misfit.counts)
 }

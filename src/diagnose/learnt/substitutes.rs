@@ -6,9 +6,9 @@ use super::super::context::FitContext;
 use super::super::effect::Effect;
 use super::super::grammar::Term;
 use super::super::refit::Refit;
-use super::along::{Along, cosine};
-use super::fitted::with_laws;
-use super::sought::{Candidate, each_form_once, started};
+use super::term_fitting::with_laws;
+use super::term_screening::{Candidate, each_form_once, started};
+use super::term_torques::{Along, cosine};
 
 /// Of each name of a fit the terms that go best with its torque, each form once with the start that leaves least, and with the amplitude a of the least squares
 ///
@@ -18,7 +18,7 @@ use super::sought::{Candidate, each_form_once, started};
 ///
 /// A form without further coefficients that exerts the name's torque is the name; one with them may do so at one end of its range. One that drifts is told only by its
 /// promise: in a single release every loss fades with the swing. `LawSettings::in_place_after` that promise more begin before them.
-pub fn in_place_of_names(
+pub fn substitute_terms(
     context: &FitContext<'_>,
     best: &Refit<'_>,
     along: &Along,

@@ -4,7 +4,7 @@ use rayon::prelude::*;
 
 use super::super::context::FitContext;
 use super::super::effect::Effect;
-use super::super::laws::{self, Sought, law_of};
+use super::super::laws::{self, FitRequest, law_of};
 use super::super::misfit::Misfit;
 use super::super::refit::Refit;
 use super::super::screen::{Score, Screen};
@@ -26,7 +26,7 @@ impl<'f, 'a> Beside<'f, 'a> {
     /// The best fit of it.
     pub fn fitted(&self, context: &FitContext<'a>) -> Option<Refit<'a>> {
         let Self { base, misfit, effect, score } = self;
-        law_of(*effect).beside(&Sought { context, base, effect: *effect, score: score.as_ref(), misfit: *misfit })
+        law_of(*effect).beside(&FitRequest { context, base, effect: *effect, score: score.as_ref(), misfit: *misfit })
     }
 
     /// Every effect that a fit does not have.

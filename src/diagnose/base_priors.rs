@@ -4,21 +4,21 @@ use super::settings::SearchSettings;
 use crate::error::Result;
 use crate::experiment::Experiment;
 use crate::fit::{Belief, base_parameters};
-use crate::model::{Chain, OfLink, Parameter};
+use crate::model::{Chain, LinkProperty, Parameter};
 
-/// How a file that states no damper for a single link is taken.
+/// Whether a single link for which the file states no damper gets a free one at its hinge.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Taken {
+pub enum DampingAssumption {
     /// At its word: there is none, and what damps it is missing from the model.
-    AtItsWord,
+    AsStated,
     /// Loosely: whatever swings has a damper.
-    Loosely,
+    WithDamper,
 }
 
-impl Taken {
-    /// How a search takes the file at first: at its word, and loosely only if much is left then; loosely at once where there is no time for both.
-    pub fn at_first(experiment: &Experiment, marks: usize, is_dear: bool) -> Self {
-        if is_dear && lacks_a_damper(experiment, marks) { Self::Loosely } else { Self::AtItsWord }
+impl DampingAssumption {
+    /// At first as stated, and with a damper only if much is left then; with a damper at once where the budget allows only one search.
+    pub fn at_first(experiment: &Experiment, marks: usize, is_expensive: bool) -> Self {
+        if is_expensive && lacks_a_damper(experiment, marks) { Self::WithDamper } else { Self::AsStated }
     }
 }
 
@@ -27,22 +27,22 @@ impl Taken {
 ///
 /// # Errors
 /// [`crate::error::Error::Simulation`] for a specimen that cannot swing.
-pub fn base_of(
+pub fn base_with_priors(
     experiment: &Experiment,
     marks: usize,
-    taken: Taken,
+    taken: DampingAssumption,
     settings: &SearchSettings,
 ) -> Result<(Vec<Parameter>, Vec<Belief>)> {
     let mut base = stated(experiment, marks, taken);
     let mut beliefs = Vec::new();
     if !experiment.specimen.links.is_empty() {
         let chain = Chain::of(&experiment.specimen)?;
-        let share = |of: OfLink| match of {
-            OfLink::Inertia => settings.inertia_share,
+        let share = |of: LinkProperty| match of {
+            LinkProperty::Inertia => settings.inertia_share,
             // a single weight on a thread hangs where a ruler says
-            OfLink::Com if chain.count() == 1 => settings.length_share,
-            OfLink::Com => settings.com_share,
-            OfLink::Length => settings.length_share,
+            LinkProperty::Com if chain.count() == 1 => settings.length_share,
+            LinkProperty::Com => settings.com_share,
+            LinkProperty::Length => settings.length_share,
         };
         for parameter in chain.parameters() {
             let Parameter::Link(_, of) = parameter else { continue };
@@ -55,9 +55,9 @@ pub fn base_of(
 }
 
 /// The base model's parameters with the geometry as stated.
-pub fn stated(experiment: &Experiment, marks: usize, taken: Taken) -> Vec<Parameter> {
+pub fn stated(experiment: &Experiment, marks: usize, taken: DampingAssumption) -> Vec<Parameter> {
     let mut base = base_parameters(experiment, marks);
-    if taken == Taken::AtItsWord && lacks_a_damper(experiment, marks) {
+    if taken == DampingAssumption::AsStated && lacks_a_damper(experiment, marks) {
         base.retain(|parameter| *parameter != Parameter::HingeViscous);
     }
     base
