@@ -65,7 +65,7 @@ pub enum Error {
     Config { path: PathBuf, line: Option<usize>, message: String },
 
     /// Words of a command that cannot be understood.
-    #[error("{detail}; --help tells all options")]
+    #[error("{detail}; see --help for all options")]
     Words { detail: String },
 
     /// An option that cannot be used.
@@ -109,7 +109,7 @@ pub enum Error {
     NothingToDo { path: PathBuf },
 
     /// An output folder in which another batch works.
-    #[error("{}: {holder} works here; wait for it, or give another --out", path.display())]
+    #[error("{}: in use by {holder}; wait until it has finished, or give another --out", path.display())]
     Busy { path: PathBuf, holder: String },
 
     /// Results that cannot be kept, as the run of a recording says.
@@ -117,7 +117,7 @@ pub enum Error {
     Results { line: String },
 
     /// A self-test that measured something else than the truth.
-    #[error("the self-test measured angles that are {:.2} mrad off, where {:.2} are allowed; FFmpeg or OpenCV of this machine is broken, install them anew", 1e3 * error_rad, 1e3 * most_rad)]
+    #[error("the self-test measured angles that are {:.2} mrad off, where {:.2} are allowed; FFmpeg or OpenCV of this machine is broken, reinstall them", 1e3 * error_rad, 1e3 * most_rad)]
     SelfTest { error_rad: f64, most_rad: f64 },
 
     /// A figure that cannot be made a picture.

@@ -381,12 +381,12 @@ fn words_that_cannot_be_understood_are_one_line_too() {
     for (words, says) in [
         (
             "fit",
-            "error: the following required arguments were not provided: --config <FILE>, <ANGLES>...; --help tells",
+            "error: the following required arguments were not provided: --config <FILE>, <ANGLES>...; see --help for all options",
         ),
         ("fitt a.csv", "unrecognized subcommand 'fitt'; "),
         (
             "fit a.csv --confg e.toml",
-            "'--confg' found; a similar argument exists: '--config'; --help tells all options",
+            "'--confg' found; a similar argument exists: '--config'; see --help for all options",
         ),
         ("run a.mp4 --out x --until dinner", "invalid value 'dinner' for '--until <STAGE>'; [possible values: track, "),
         // a number below zero is answered by the command itself

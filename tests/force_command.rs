@@ -119,7 +119,7 @@ fn without_heat_only_the_push_is_told() {
     let force = Desk::new(&config).json(&[]);
     assert!(force["points"][0]["heat_m"].is_null() && force["heat"].is_null());
     let page = unwrapped(Desk::new(&config).force(&[]));
-    assert!(page.contains("Heat is not reckoned"), "{page}");
+    assert!(page.contains("Heat is not computed"), "{page}");
 }
 
 #[test]

@@ -21,7 +21,7 @@ use crate::error::{Error, Result};
 use crate::output::{OutputFile, is_same_file};
 use crate::progress::{Progress, ProgressEvent};
 
-/// Run every recording and every table of angles below a folder, and sum them up.
+/// Run every recording and every table of angles below a folder, and write a summary.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "\
 Examples:
@@ -44,7 +44,7 @@ pub struct BatchArgs {
     out: PathBuf,
     #[command(flatten)]
     extent: Extent,
-    /// Only recordings whose path below the folder matches, such as '2024-*/**' or '*.mp4' ('*' stands for no '/').
+    /// Only recordings whose path below the folder matches, such as '2024-*/**' or '*.mp4' ('*' does not match '/').
     #[arg(long, value_name = "GLOB")]
     only: Option<String>,
     /// Do those again that failed.

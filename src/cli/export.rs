@@ -20,7 +20,7 @@ Every column keeps its name, with the unit at its end. A missing number is NaN, 
 pub struct ExportArgs {
     /// The table; `-` for standard input.
     angles: PathBuf,
-    /// The file; its extension says the format.
+    /// The file; its extension sets the format.
     #[arg(long, value_name = "FILE")]
     out: Target,
 }

@@ -94,7 +94,7 @@ fn page(report: &Report, analysis: &Analysis) -> String {
 
 fn effects(report: &Report) -> String {
     let mut table =
-        Table::with_sentences(["beside the push", "probability", "would be seen from", "", "where it is there"]);
+        Table::with_sentences(["beside the push", "probability", "would be seen from", "", "value, if present"]);
     for found in &report.effects {
         let smallest =
             report.detectable.get(found.effect.id()).map_or_else(|| "–".to_owned(), |limit| um(limit.smallest, 2));
@@ -122,7 +122,7 @@ fn surroundings(report: &Report, analysis: &Analysis) -> String {
     let mut text = String::new();
     let edges: Vec<String> = report.lamp.edges_s.iter().map(|t| format!("{t:.2}")).collect();
     let found =
-        if report.lamp.found { "found in the record" } else { "led from those given to where the record has them" };
+        if report.lamp.found { "found in the record" } else { "the given times, adjusted to the steps in the record" };
     text.push_str(&paragraph("Lamp on, off, …: ", &format!("{} s, {found}.", edges.join(", "))));
     let each: Vec<String> =
         report.lamp.push_of_each_m.iter().map(|q| format!("{} ± {}", um(q.value, 3), um(q.sd, 2))).collect();
@@ -148,7 +148,7 @@ fn surroundings(report: &Report, analysis: &Analysis) -> String {
                 um(proof.baseline_rmse_m, 3),
                 um(proof.augmented_rmse_m, 3),
                 if proof.is_against() {
-                    " What is there predicts better: doubt the names, and check laser.column and its unit."
+                    " The push alone predicts these cycles better than the named effects: do not rely on the names, and check laser.column and its unit."
                 } else {
                     ""
                 }

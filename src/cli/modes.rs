@@ -21,7 +21,7 @@ const PRINTED_COMPONENTS: usize = 6;
 Example:
   freeswing modes --config videos/kapton.toml
 
-The chain of links with the springs, dampers and linear effects of [model]; two rods in closed form; the strip as a limp band, and
+The chain of links with the springs, dampers and linear effects of [model]; two rods in closed form; the strip without bending stiffness, and
 as a beam where thickness_m and young_modulus_pa are given.")]
 pub struct ModesArgs {
     /// The experiment file: specimen, rig and model.

@@ -60,7 +60,9 @@ pub fn dissipated_j(fit: &Refit<'_>, record: usize) -> [f64; 3] {
     along(fit, record, &of, |step_s, torques, rate| {
         for ((torque, value), (_, place)) in torques.iter().zip(&values).zip(&losses) {
             let power: f64 = torque.iter().zip(rate).map(|(q, omega)| q * omega).sum::<f64>() * value;
-            work_j[Place::OF_LOSSES.iter().position(|p| p == place).unwrap_or(0)] -= power * step_s;
+            if let Some(own) = Place::OF_LOSSES.iter().position(|p| p == place) {
+                work_j[own] -= power * step_s;
+            }
         }
     });
     work_j

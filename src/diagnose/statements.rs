@@ -72,28 +72,30 @@ impl Findings<'_> {
         let inclusions = self.inclusions();
         let named = inclusions.iter().filter(|(effect, _)| verdict.effects.contains(effect));
         let least = named.map(|(_, inclusion)| *inclusion).fold(1.0, f64::min);
+        let is_known = verdict.status != Status::Unknown && least - verdict.probability >= settings.told_apart;
         match verdict.effects.len() {
-            _ if verdict.status == Status::Unknown || least - verdict.probability < settings.told_apart => {
-                format!("probability {alone}")
-            }
-            0 => format!("probability {alone}"),
-            1 => format!("probability {}; {alone} that nothing else is missing", percent(least)),
-            _ => format!("probability {} each; {alone} that nothing else is missing", percent(least)),
+            1 if is_known => format!("probability {}; {alone} that nothing else is missing", percent(least)),
+            2.. if is_known => format!("probability {} each; {alone} that nothing else is missing", percent(least)),
+            _ => format!("probability {alone}"),
         }
     }
 
     /// What further starts could change: of rivals whose fits are not certified, or of the named fit.
     fn reservation(&self) -> String {
         let [low, high] = self.probability_interval();
-        let rivals: Vec<String> = self.posterior.uncertified.iter().map(|rival| names(rival, "nothing else")).collect();
-        if high - low < SLIGHT_CHANGE || rivals.is_empty() {
-            return String::new();
+        let rivals: Vec<String> = self.posterior.uncertified.iter().map(|rival| names(rival, "no effect")).collect();
+        if high - low >= SLIGHT_CHANGE && !rivals.is_empty() {
+            return format!(
+                " The fit with {} is not certified: if it fitted as well as the best one, the probability of the answer would be {}.",
+                rivals.join("; or with "),
+                percent(low)
+            );
         }
-        format!(
-            " The fit with {} is not certified: if it fitted as well as the best one, the probability of the answer would be {}.",
-            rivals.join("; or with "),
-            percent(low)
-        )
+        let is_named = matches!(self.verdict.status, Status::Identified | Status::Ambiguous);
+        if is_named && !self.named().is_certified(&self.context.settings.certificate) {
+            return " The fit of this answer is not certified.".to_owned();
+        }
+        String::new()
     }
 
     /// What of the table comes nearest to something that is not in it, and what is not told from that.

@@ -61,7 +61,7 @@ impl Doubt {
             ),
             Self::NotConverged => "not reproduced: the fit has not converged within its budget.".to_owned(),
             Self::Implausible { id, value } => format!(
-                "not reproduced: the residual is the noise's, but with {id} = {value:.3}, which is no error of a camera: lengths, stamps or units are wrong."
+                "not reproduced: the residual is at the level of the noise, but only with {id} = {value:.3}, which is too large for an error of a camera. Check lengths, time stamps and units."
             ),
         }
     }

@@ -14,7 +14,7 @@ impl Display for Identification {
         self.record.fmt(f)?;
         if self.drift_rad.iter().any(|d| *d > 0.0) {
             let each: Vec<String> = self.drift_rad.iter().map(|d| self.record.measured.show(*d, 3)).collect();
-            writeln!(f, "  drift over the record {}, no part of any mode", each.join(", "))?;
+            writeln!(f, "  drift over the record {}, removed before the analysis", each.join(", "))?;
         }
         if let Some(count) = &self.mode_count {
             writeln!(f, "  {}", count.statement)?;
@@ -164,7 +164,7 @@ impl Mode {
         if let Some(law) = envelope.decay {
             writeln!(
                 f,
-                "  dA/dt = −(b₀ + b₁A + b₂A²): b₀ = {} {own}/s, b₁ = {} /s, b₂ = {} /({own} s); viscous alone {} (a picture, no verdict)",
+                "  dA/dt = −(b₀ + b₁A + b₂A²): b₀ = {} {own}/s, b₁ = {} /s, b₂ = {} /({own} s); viscous alone {} (descriptive fit only)",
                 scientific(&law.b0_rad_per_s.times(measured.own_per_rad())),
                 scientific(&law.b1_per_s),
                 scientific(&law.b2_per_rad_s.times(1.0 / measured.own_per_rad())),

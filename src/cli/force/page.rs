@@ -129,7 +129,7 @@ fn statements(setup: &Setup, force: &Force) -> Vec<String> {
                 number(factor, 3)
             ));
             statements.push(format!(
-                "The gradient through the thickness stands after {} ms and its curl with it: no record tells it from the push by time. A layer's curl and the \
+                "The gradient through the thickness is established after {} ms, and so is its curl: no record can separate it from the push by time. A layer's curl and the \
                  recoil follow the film's temperature, with a time constant of {} s; the strip swings at {} Hz.",
                 number(1e3 * times.through_thickness_s, 2),
                 number(times.time_constant_s, 3),
@@ -143,7 +143,7 @@ fn statements(setup: &Setup, force: &Force) -> Vec<String> {
                     .to_owned(),
             );
         }
-        _ => statements.push("Heat is not reckoned: the file has no [heat].".to_owned()),
+        _ => statements.push("Heat is not computed: the file has no [heat].".to_owned()),
     }
     statements.push(models(setup, force, own.multibody_m, own.strip_m));
     statements
@@ -228,7 +228,7 @@ pub fn plan_text(plan: &Plan) -> String {
     text.push_str(&paragraph(
         "  – ",
         &format!(
-            "Chopping at the strip's own frequency raises signal over noise {} times in the same time. Nothing is learnt in the {} s after a switch, until the swing has built up or died away to a tenth; the least time holds it once for chopping, twice for one on and off.",
+            "Chopping at the strip's own frequency raises signal over noise {} times in the same time. The {} s after each switching are not used, until the swing has built up or died away to a tenth; the least time holds it once for chopping, twice for one on and off.",
             number(plan.gain, 3),
             number(plan.chopped.settling_s, 3)
         ),
@@ -245,7 +245,7 @@ pub fn plan_text(plan: &Plan) -> String {
 fn heat_words(plan: &Plan) -> String {
     let (steps, chopped) = (plan.steps.heat_over_push.abs(), plan.chopped.heat_over_push.abs());
     if steps == 0.0 {
-        return "Heat is not reckoned: the file has no [heat].".to_owned();
+        return "Heat is not computed: the file has no [heat].".to_owned();
     }
     let (long, short) = (number(steps, 3), number(chopped, 3));
     if chopped < 0.9 * steps {

@@ -125,8 +125,9 @@ impl<'f> Estimates<'f> {
 
     /// A coefficient and its standard deviation.
     pub fn value(&self, parameter: Parameter) -> (f64, f64) {
-        let i = self.added.iter().position(|p| *p == parameter).unwrap_or(0);
-        (self.fit.value(parameter).unwrap_or(0.0), self.covariance[(i, i)].sqrt())
+        let place = self.added.iter().position(|p| *p == parameter);
+        let sd = place.map_or(f64::INFINITY, |i| self.covariance[(i, i)].sqrt());
+        (self.fit.value(parameter).unwrap_or(0.0), sd)
     }
 
     /// Whether an effect's strength is told from zero.

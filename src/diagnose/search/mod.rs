@@ -55,7 +55,7 @@ const TOGETHER: usize = 4;
 const BETTER_BY: f64 = 1.0;
 
 /// A hypothesis and the variables that its fit is to begin with.
-type Begun = (Hypothesis, Vec<f64>);
+type WarmStart = (Hypothesis, Vec<f64>);
 
 /// What a round came to.
 #[derive(Debug, Clone, Copy, PartialEq, serde::Serialize)]
@@ -87,28 +87,28 @@ pub struct Search<'a, 'p> {
     pub undecided: Vec<&'static str>,
     /// What the effects promise at the base model.
     scores: Vec<Score>,
-    /// Where they are sought from, if a clock takes its pace.
+    /// The base model at the recorded frequency, from which effects are sought where its own is wrong.
     frequency_matched: Option<FrequencyMatched<'a>>,
     /// Single effects that a search of the first part did not tell from its best.
     indistinguishable: Vec<Effect>,
-    /// Whether the file is taken loosely.
+    /// Whether a single link has a damper that its file does not state.
     has_added_damper: bool,
     /// How stiff the strip is if it bends everywhere, where that explains most of what the base model's joint leaves.
     bending_n_m2: Option<f64>,
-    /// What another base model's best fit leaves of the swing: where the single effects leave more, this search is not worth its cost.
-    rival: Option<f64>,
-    /// It ended there, or where a strip was found to bend, or to be made of another number of rods.
+    /// Relative residual of another base model's best fit: where the single effects stay above it, this search ends.
+    rival_residual: Option<f64>,
+    /// Whether it ended there, or where a strip was found to bend, or to need another number of rods.
     stopped_early: bool,
     /// That number.
     count: Option<usize>,
-    /// What led with another number.
-    led: Vec<Begun>,
-    /// What searches that it goes on from have held against every other effect, and the hypotheses of which each effect was exchanged.
+    /// What led with another number of rods, to be begun with.
+    warm_starts: Vec<WarmStart>,
+    /// How many effects of a hypothesis earlier searches have compared with every other, and the hypotheses of which each was exchanged.
     compared: Compared,
-    /// The work that had been done when it began, the base model's fit with it.
+    /// The work that had been done when it began, that of the base model's fit included.
     work_at_start: u64,
-    /// The work up to which the present phase may go.
-    until: u64,
+    /// The limit of the present phase.
+    work_limit: u64,
     /// The part of the recordings that its first rounds fitted.
     part: f64,
     progress: &'p dyn Progress,
@@ -156,13 +156,13 @@ impl<'a, 'p> Search<'a, 'p> {
             indistinguishable: Vec::new(),
             has_added_damper: false,
             bending_n_m2: None,
-            rival: None,
+            rival_residual: None,
             stopped_early: false,
             count: None,
-            led: Vec::new(),
+            warm_starts: Vec::new(),
             compared: Compared::default(),
             work_at_start,
-            until: work_at_start,
+            work_limit: work_at_start,
             part: 1.0,
             progress,
         }
@@ -191,7 +191,7 @@ impl<'a, 'p> Search<'a, 'p> {
 
     /// Allows the search a share of the budget that was left when it began.
     fn allow(&mut self, share: f64) {
-        self.until = self.work_limit_at(share);
+        self.work_limit = self.work_limit_at(share);
     }
 
     /// The work at which a share is spent of the budget that was left when the search began.
@@ -416,7 +416,7 @@ impl<'a, 'p> Search<'a, 'p> {
 
     /// Whether the present phase has done the work it was allowed. It is asked between fits that run together, so that the answer does not depend on threads.
     fn is_spent(&self) -> bool {
-        self.context.work.done() >= self.until
+        self.context.work.done() >= self.work_limit
     }
 
     fn fitted(&self, proposals: &[Proposal<'_, 'a>]) -> Vec<Refit<'a>> {

@@ -30,20 +30,20 @@ impl<'a> Search<'a, '_> {
         let context = self.context.on(&records);
         let Some(base) = horizon::refit_on_first_part(&self.context, &context, self.base()) else { return };
         let begun = Search::begun(self.prepared, context, base, self.work_at_start, self.progress);
-        let led = self.led.clone();
+        let warm_starts = self.warm_starts.clone();
         let mut early = Search {
             has_added_damper: self.has_added_damper,
-            until: self.until,
-            rival: self.rival,
-            led,
+            work_limit: self.work_limit,
+            rival_residual: self.rival_residual,
+            warm_starts,
             part,
             ..begun
         };
         early.usual();
         if early.stopped_early {
             (self.stopped_early, self.bending_n_m2, self.count) = (true, early.bending_n_m2, early.count);
-            let leading = |count| Self::leading(&early.fits, count, &early.context.settings.misfit);
-            self.led = early.count.map(leading).unwrap_or_default();
+            let leading = |count| Self::best_warm_starts(&early.fits, count, &early.context.settings.misfit);
+            self.warm_starts = early.count.map(leading).unwrap_or_default();
             self.rounds.extend(early.rounds);
             return;
         }

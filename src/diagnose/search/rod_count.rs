@@ -10,7 +10,7 @@ use super::super::misfit::{Misfit, needs};
 use super::super::refit::{self, Refit, least};
 use super::super::rods;
 use super::super::settings::MisfitSettings;
-use super::{Begun, Search};
+use super::{Search, WarmStart};
 use crate::error::Result;
 use crate::experiment::Experiment;
 
@@ -52,9 +52,9 @@ impl<'a> Search<'a, '_> {
         let again = if is_asked { self.with_the_preferred_count(counted)? } else { None };
         let Some(mut again) = again else { return Ok(self) };
         let pieces = again.context.experiment.model.pieces;
-        again.led = match self.led.is_empty() {
-            true => Self::leading(&self.fits, pieces, &self.context.settings.misfit),
-            false => self.led.clone(),
+        again.warm_starts = match self.warm_starts.is_empty() {
+            true => Self::best_warm_starts(&self.fits, pieces, &self.context.settings.misfit),
+            false => self.warm_starts.clone(),
         };
         again.run();
         let is_kept = self.count.is_some() || rods::is_kept(&self.context, &self.fits, &again.fits);
@@ -62,7 +62,7 @@ impl<'a> Search<'a, '_> {
     }
 
     /// The hypotheses that leave least, to be begun with another number of rods: the budget may end before they are sought again.
-    pub(super) fn leading(fits: &[Refit<'_>], pieces: usize, settings: &MisfitSettings) -> Vec<Begun> {
+    pub(super) fn best_warm_starts(fits: &[Refit<'_>], pieces: usize, settings: &MisfitSettings) -> Vec<WarmStart> {
         let Some(best) = least(fits) else { return Vec::new() };
         let leaders = refit::best(
             fits,
@@ -77,11 +77,11 @@ impl<'a> Search<'a, '_> {
     /// Fits what led with another number of rods.
     pub(super) fn fit_warm_starts(&mut self) {
         let (context, noise) = (&self.context, &self.base().problem.noise);
-        let fitted = |(hypothesis, x): &Begun| {
+        let fitted = |(hypothesis, x): &WarmStart| {
             let is_alike = context.problem(hypothesis, noise).is_ok_and(|problem| problem.variables() == x.len());
             is_alike.then(|| context.descend_from(hypothesis, noise, x.clone(), context.settings.descent.few_steps))?
         };
-        let found: Vec<Refit<'a>> = self.led.par_iter().with_max_len(1).filter_map(fitted).collect();
+        let found: Vec<Refit<'a>> = self.warm_starts.par_iter().with_max_len(1).filter_map(fitted).collect();
         if !found.is_empty() {
             self.keep(found);
             self.update_noise();

@@ -41,8 +41,8 @@ impl<'a> Search<'a, '_> {
             self.stopped_early = false;
             self.end();
         }
-        let rival = least(&self.fits).filter(|_| !is_found).map(Refit::relative_residual);
-        strip.map(|strip| Self { rival, ..strip })
+        let rival_residual = least(&self.fits).filter(|_| !is_found).map(Refit::relative_residual);
+        strip.map(|strip| Self { rival_residual, ..strip })
     }
 
     /// Whether bending explains most of what the base model leaves, and leaves less than anything else.
@@ -60,7 +60,7 @@ impl<'a> Search<'a, '_> {
 
     /// Whether another base model does better.
     pub fn is_behind(&self) -> bool {
-        self.rival.is_some_and(|rival| least(&self.fits).is_none_or(|best| best.relative_residual() > rival))
+        self.rival_residual.is_some_and(|rival| least(&self.fits).is_none_or(|best| best.relative_residual() > rival))
     }
 
     /// Bending where nothing else explains what is left: from the base model's motion its own may not be found.
