@@ -11,7 +11,8 @@ use crate::fit::whitening::RecordNoise;
 use crate::fit::{Belief, Problem, Record};
 use crate::model::{Parameter, Work};
 
-/// A yield angle of the joint's hysteresis to expect, as a part of the largest bend, and how far from it that may be, as a part of itself (judgement).
+/// A yield angle of the joint's hysteresis to expect, as a part of the bend that every joint reaches, and how far from it
+/// that may be, as a part of itself (judgement).
 const YIELD: (f64, f64) = (0.2, 2.5);
 /// The same of a joint that has no spring: a bearing, whose friction is dry (judgement: it yields at once, as both bearings of a real double arm do).
 const DRY_YIELD: (f64, f64) = (1e-3, 0.5);

@@ -95,6 +95,14 @@ impl Phase {
             Self::Velocity => "velocity",
         }
     }
+
+    /// What it means.
+    pub fn words(self) -> &'static str {
+        match self {
+            Self::Position => "in phase with the angle, as a spring does",
+            Self::Velocity => "in phase with the velocity, as a damper does",
+        }
+    }
 }
 
 /// What makes an effect cost more than one motion a step.

@@ -37,7 +37,7 @@ impl Misfit {
         let out_of_step = relative_residual > settings.out_of_step;
         let unexplained = relative_residual > settings.much || fit.chi2 > chi2_limit;
         let least_fall = settings.leads * (fit.chi2 - values);
-        let hopeless_ratio = context.settings.descent.hopeless_ratio * fit.chi2;
+        let hopeless_chi2 = context.settings.descent.hopeless_ratio * fit.chi2;
         Self {
             chi2_limit,
             unexplained,
@@ -45,7 +45,7 @@ impl Misfit {
             little: fit.chi2 < settings.little * values,
             out_of_step,
             spring_drifted: unexplained && has_drifted(fit, settings.strays),
-            leads: if unexplained && !out_of_step { fit.chi2 - least_fall } else { hopeless_ratio },
+            leads: if unexplained && !out_of_step { fit.chi2 - least_fall } else { hopeless_chi2 },
             seen: scores.iter().any(|s| s.gain > settings.counts && !s.effect.is_scanned()),
         }
     }

@@ -16,7 +16,7 @@ use crate::model::Parameter;
 const SLIGHT_CHANGE: f64 = 0.01;
 /// Ratios of frequencies that differ by less are one: the swing is slower at large angles (physics: by so much at 80°).
 const SAME_FREQUENCY: f64 = 0.12;
-/// A joint that yields before this part of its largest bend is dry (judgement).
+/// A joint that yields before this part of the bend that every joint reaches is dry (judgement).
 const DRY_SHARE: f64 = 0.01;
 
 impl Findings<'_> {
@@ -270,7 +270,7 @@ impl Findings<'_> {
         .to_owned();
         let phase = self.phase().filter(|_| place != Place::Camera);
         if let Some(phase) = phase {
-            let _ = write!(statement, ", {}", in_phase(phase));
+            let _ = write!(statement, ", {}", phase.words());
         }
         if let (Some([from_s, until_s]), Some([least, most])) = (departure.time_s, departure.amplitude_rad) {
             let _ = write!(
@@ -325,13 +325,6 @@ fn percent(probability: f64) -> String {
         percent if percent >= 99.5 => "more than 99 %".to_owned(),
         percent if percent < 0.5 => "less than 1 %".to_owned(),
         percent => format!("{percent:.0} %"),
-    }
-}
-
-fn in_phase(phase: Phase) -> &'static str {
-    match phase {
-        Phase::Position => "in phase with the angle, as a spring does",
-        Phase::Velocity => "in phase with the velocity, as a damper does",
     }
 }
 

@@ -18,7 +18,7 @@ const IN_A_ROW: usize = 40;
 const BOUND: f64 = 4.0;
 /// A descent that leaves more than this, over the variance of the noise, is tried from the values as they are, too (judgement: five times the noise).
 const POOR_FIT: f64 = 25.0;
-/// Beginnings of a hysteresis: its yield angle as part of the largest bend, its share of the spring (start values); and the part of the recordings that chooses
+/// Beginnings of a hysteresis: its yield angle as part of the bend that every joint reaches, its share of the spring (start values); and the part of the recordings that chooses
 /// (cost).
 const YIELDS: [f64; 3] = [0.05, 0.2, 0.6];
 const SPRINGS: [f64; 2] = [0.4, 0.9];

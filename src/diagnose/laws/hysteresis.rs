@@ -10,9 +10,9 @@ use super::super::settings::PriorSettings;
 use super::{Coefficients, FitRequest, Law};
 use crate::model::Parameter;
 
-/// Yield angles at which it is scored, as parts of the largest bend (start values).
+/// Yield angles at which it is scored, as parts of the bend that every joint reaches (start values).
 const SCORED: [f64; 3] = [0.03, 0.15, 0.6];
-/// Starts: yield angles as parts of the largest bend, and the hysteresis' part of the spring (start values).
+/// Starts: yield angles as parts of the bend that every joint reaches, and the hysteresis' part of the spring (start values).
 const YIELD_SHARES: [f64; 3] = [0.05, 0.2, 0.6];
 const SPRING_SHARES: [f64; 2] = [0.4, 0.9];
 /// The same where everything else has failed, and how much stiffer the joint may then be (start values); how many of them begin a descent, and how many end it
@@ -91,7 +91,7 @@ fn softened<'a>(context: &FitContext<'a>, null: &Refit<'a>, bound: f64) -> Optio
     context.refit_below(bound, &hypothesis, null, &best)
 }
 
-/// Where a hysteresis beside a fit may start: with these yield angles, as parts of the largest bend, as these parts of the spring, the spring being as many times
+/// Where a hysteresis beside a fit may start: with these yield angles, as parts of the bend that every joint reaches, as these parts of the spring, the spring being as many times
 /// as stiff before it yields as that fit has it.
 fn starts(
     context: &FitContext<'_>,

@@ -44,8 +44,8 @@ impl<'a> Search<'a, '_> {
             let new = self.context.refit_by_shooting(&alone, &start, base).filter(takes)?;
             Some((*effect, alone, Some(new)))
         };
-        let is_applicable = FREQUENCY_EFFECTS.iter().filter(|effect| self.effects.contains(effect));
-        let Some((effect, alone, new)) = is_applicable.into_iter().find_map(of) else { return };
+        let possible = FREQUENCY_EFFECTS.iter().filter(|effect| self.effects.contains(effect));
+        let Some((effect, alone, new)) = possible.into_iter().find_map(of) else { return };
         if let Some(new) = new {
             self.keep(vec![new]);
             self.update_noise();

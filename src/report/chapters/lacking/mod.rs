@@ -8,7 +8,7 @@ pub use places::places;
 use std::fmt::Write;
 
 use super::{Chapter, times};
-use crate::diagnose::Effect;
+use crate::diagnose::{Effect, Phase};
 use crate::report::html::{escaped, milli, paragraph, table, value, verbatim, verbatim_copyable, with_half};
 use crate::report::left::{Candidate, Diagnosed, Law, Left, Remainder};
 use crate::report::plot::{Axis, Ink, Plot, Series, Style};
@@ -159,7 +159,7 @@ fn proof(found: &Diagnosed) -> String {
 }
 
 fn remains(remainder: &Remainder) -> String {
-    let place = [remainder.place.as_ref().map(|p| at(p)), remainder.phase.as_ref().map(|p| in_phase(p).to_owned())];
+    let place = [remainder.place.as_ref().map(|p| at(p)), remainder.phase.as_deref().and_then(in_phase)];
     let place: Vec<String> = place.into_iter().flatten().collect();
     let mut html = "<h3>What remains beside the effects named</h3>\n".to_owned();
     let rows = (0..remainder.rms_rad.len()).map(|link| {
@@ -180,8 +180,9 @@ fn remains(remainder: &Remainder) -> String {
     html + &table(&["angle", "residual (rms)", "over the noise"], rows)
 }
 
-fn in_phase(phase: &str) -> &'static str {
-    if phase == "position" { "in phase with the angle, as a spring" } else { "in phase with the velocity, as a damper" }
+fn in_phase(id: &str) -> Option<String> {
+    let known = [Phase::Position, Phase::Velocity].into_iter().find(|phase| phase.id() == id);
+    known.map(|phase| phase.words().to_owned())
 }
 
 fn at(place: &str) -> String {
