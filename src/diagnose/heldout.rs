@@ -127,10 +127,20 @@ pub fn reorder_by_inclusion<'a>(
 /// What one fit predicts of what is not fitted: the last third of a single recording from the first two; of several, the last recording from the others, of
 /// which only the start is then fitted. `from_s` moves the border of a single one.
 pub fn predicted(context: &FitContext<'_>, fit: &Refit<'_>, from_s: Option<f64>) -> Option<Prediction> {
+    predicted_by(context, fit, from_s, true)
+}
+
+/// The same; `is_continued` says whether a fit that leaves far more than noise is fitted from the beginning of what is fitted, too.
+fn predicted_by(
+    context: &FitContext<'_>,
+    fit: &Refit<'_>,
+    from_s: Option<f64>,
+    is_continued: bool,
+) -> Option<Prediction> {
     // a prediction is held against what was seen, whoever erred
     let fit = plain(fit);
     match border(context, from_s)? {
-        HoldoutSplit::Row(rows, _) => along(context, &fit, rows),
+        HoldoutSplit::Row(rows, _) => along(context, &fit, rows, is_continued),
         HoldoutSplit::Piece(pieces, _) => beyond(context, &fit, pieces),
         HoldoutSplit::Record(last) => across(context, &fit, last),
     }
@@ -144,7 +154,9 @@ fn held_out(
     from_s: Option<f64>,
 ) -> Vec<Option<HeldOut>> {
     let of_fits = || fits.par_iter().with_max_len(1).map(|fit| predicted(context, fit, from_s)).collect::<Vec<_>>();
-    let (baseline, augmented) = rayon::join(|| predicted(context, null, from_s), of_fits);
+    // a strip's base model that has lost step would take a quarter of a minute more
+    let is_continued = context.work.done() < context.settings.search.budget;
+    let (baseline, augmented) = rayon::join(|| predicted_by(context, null, from_s, is_continued), of_fits);
     let (record, from_s) = match border(context, from_s) {
         Some(HoldoutSplit::Row(_, border_s)) => (0, border_s),
         Some(HoldoutSplit::Piece(_, border_s)) => (0, border_s),
@@ -191,14 +203,14 @@ fn plain<'a>(fit: &Refit<'a>) -> Refit<'a> {
     fit
 }
 
-fn along(context: &FitContext<'_>, fit: &Refit<'_>, rows: usize) -> Option<Prediction> {
+fn along(context: &FitContext<'_>, fit: &Refit<'_>, rows: usize, is_continued: bool) -> Option<Prediction> {
     let record = &context.records[0];
     let early = [record.until(rows)];
     let part = context.on(&early);
     let refitted = part.refit(&fit.hypothesis, fit, &[])?;
     // what leaves far more than noise may have lost step between here and there
-    let grown = leaves_more_than_noise(&refitted, &context.settings.noise);
-    let grown = grown.then(|| continue_one(&part, &refitted)).flatten();
+    let is_continued = is_continued && leaves_more_than_noise(&refitted, &context.settings.noise);
+    let grown = is_continued.then(|| continue_one(&part, &refitted)).flatten();
     let refitted = grown.into_iter().chain([refitted]).min_by(|a, b| a.chi2.total_cmp(&b.chi2))?;
     let whole = context.problem_near(&fit.hypothesis, &refitted).ok()?;
     let rmse_rad = errors(&whole.predict(0, &refitted.x, false).ok()?.values, record, rows)?;

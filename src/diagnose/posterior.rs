@@ -75,9 +75,9 @@ pub fn weigh<'a>(fits: Vec<Refit<'a>>, effects: usize, compared: &Compared, sett
         let others = fits.iter().filter(|f| !f.hypothesis.effects.contains(&effect));
         others.map(|f| f.chi2).fold(f64::INFINITY, f64::min)
     };
-    let ln = |f: &Refit<'_>| {
-        evidence::ln_evidence(f, scatter, least_without, &settings.prior, settings.misfit.counts)
-            + evidence::ln_prior(&f.hypothesis, effects, &settings.prior)
+    let ln_prior = |fit: &Refit<'_>| evidence::ln_prior(&fit.hypothesis, effects, &settings.prior);
+    let ln = |fit: &Refit<'_>| {
+        evidence::ln_evidence(fit, scatter, least_without, &settings.prior, settings.misfit.counts) + ln_prior(fit)
     };
     let is_seen = |fit: &Refit<'_>| {
         fit.hypothesis.effects.iter().all(|effect| {
@@ -89,16 +89,12 @@ pub fn weigh<'a>(fits: Vec<Refit<'a>>, effects: usize, compared: &Compared, sett
     let mut posterior: Vec<f64> =
         fits.iter().map(|fit| if is_seen(fit) { ln(fit) } else { f64::NEG_INFINITY }).collect();
     let best = (0..fits.len()).max_by(|a, b| posterior[*a].total_cmp(&posterior[*b])).unwrap_or(0);
-    let latents = unknowns(&fits[best], fits[best].chi2 / values as f64, LatentConfig::RESIDUAL);
-    let law_error_n_m = law_error_n_m(&fits[best], added_torque_n_m(&fits[best]));
-    let coloured = settings.noise.coloured;
-    let gain = (unknown_gain(&latents, law_error_n_m, slow_errors_rad(&fits[best]), coloured)
-        - gain_of_rounding(&fits[best], law_error_n_m, coloured))
-    .max(gain_over_a_failed_fit(&fits[best], scatter, settings));
-    posterior.push(posterior[best] + settings.prior.unknown.ln() + gain);
+    let unknowns = unknowns(&fits[best], fits[best].chi2 / values as f64, LatentConfig::RESIDUAL);
+    posterior.push(
+        posterior[best] + settings.prior.unknown.ln() + ln_gain_of_unknown(&fits[best], &unknowns, scatter, settings),
+    );
     let rivals = uncertified_within_reach(&fits, best, settings);
     let mut at_best = posterior.clone();
-    let ln_prior = |fit: &Refit<'_>| evidence::ln_prior(&fit.hypothesis, effects, &settings.prior);
     for rival in &rivals {
         at_best[*rival] = at_best[*rival].max(posterior[best] + ln_prior(&fits[*rival]) - ln_prior(&fits[best]));
     }
@@ -117,17 +113,14 @@ pub fn weigh<'a>(fits: Vec<Refit<'a>>, effects: usize, compared: &Compared, sett
         unknown += (1.0 - not_imitated) * *probability;
         *probability *= not_imitated;
     }
-    let mut candidates: Vec<Candidate<'a>> = fits
-        .into_iter()
-        .enumerate()
-        .map(|(place, fit)| Candidate {
-            fit,
-            ln_posterior: posterior[place],
-            probability: probability[place],
-            if_named: if_named[place],
-            mixture_probability: mixture_probability[place],
-        })
-        .collect();
+    let candidate = |(place, fit)| Candidate {
+        fit,
+        ln_posterior: posterior[place],
+        probability: probability[place],
+        if_named: if_named[place],
+        mixture_probability: mixture_probability[place],
+    };
+    let mut candidates: Vec<Candidate<'a>> = fits.into_iter().enumerate().map(candidate).collect();
     // where the unknown takes all, or next to all, their order among themselves still counts
     candidates
         .sort_by(|a, b| (b.probability.total_cmp(&a.probability)).then(b.ln_posterior.total_cmp(&a.ln_posterior)));
@@ -137,10 +130,20 @@ pub fn weigh<'a>(fits: Vec<Refit<'a>>, effects: usize, compared: &Compared, sett
         remains,
         lowest,
         uncertified,
-        unknowns: latents,
+        unknowns,
         compared: compared.clone(),
         needed: Vec::new(),
     }
+}
+
+/// By how much something outside the table raises the ln of the evidence around the likeliest fit: what its latent forces explain beyond the rounding of the table,
+/// or what a fit that failed leaves.
+fn ln_gain_of_unknown(best: &Refit<'_>, unknowns: &[LatentForce], scatter: Scatter, settings: &Settings) -> f64 {
+    let law_error_n_m = law_error_n_m(best, added_torque_n_m(best));
+    let coloured = settings.noise.coloured;
+    let explained = unknown_gain(unknowns, law_error_n_m, slow_errors_rad(best), coloured);
+    let of_rounding = gain_of_rounding(best, law_error_n_m, coloured);
+    (explained - of_rounding).max(gain_over_a_failed_fit(best, scatter, settings))
 }
 
 /// The names in layers: P(S) = (1 − z) P(S | nothing remains) + z g P(S | something remains), z being the probability that something does, and g the odds
@@ -320,6 +323,11 @@ impl<'a> Posterior<'a> {
         of_frequency > 1 || effects.iter().any(|effect| odds(*effect, best, &others, settings) < 1.0)
     }
 
+    /// Whether something remains, and the names, which may imitate a law of no table, have not been held against any: a strip's fits are too dear for that.
+    fn may_stand_for_a_law(&self, settings: &Settings) -> bool {
+        self.needed.is_empty() && self.remains > settings.verdict.even && self.may_be_imitation(settings)
+    }
+
     fn fits(&self) -> Vec<&Refit<'a>> {
         self.candidates.iter().map(|c| &c.fit).collect()
     }
@@ -343,10 +351,11 @@ impl<'a> Posterior<'a> {
     /// sought, all descriptions.
     fn inclusion(&self, effect: Effect, settings: &Settings) -> f64 {
         let others = self.fits();
+        let is_untried = self.may_stand_for_a_law(settings);
         let not_imitated = |fit: &Refit<'_>| {
             let explaining = self.by_contribution(fit);
             let compared = self.compared.of(&fit.hypothesis.effects);
-            let is_further = explaining.iter().skip(compared).any(|further| *further == effect);
+            let is_further = is_untried || explaining.iter().skip(compared).any(|further| *further == effect);
             genuine_alone(effect, is_further, fit, &others, settings)
         };
         let with = || self.candidates.iter().filter(|c| c.fit.hypothesis.has(effect));
@@ -373,5 +382,63 @@ impl<'a> Posterior<'a> {
         };
         effects.sort_by(|a, b| left_without(b).total_cmp(&left_without(a)));
         effects
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::path::Path;
+
+    use super::*;
+    use crate::diagnose::base_priors::DampingAssumption;
+    use crate::diagnose::hypothesis::Hypothesis;
+    use crate::diagnose::preparation;
+    use crate::diagnose::search::Search;
+    use crate::experiment::Experiment;
+    use crate::model::{ForwardModel, State, Trajectory};
+    use crate::progress::Silent;
+
+    #[test]
+    fn a_clock_and_a_scale_that_were_held_against_no_law_are_less_probable_where_something_remains() {
+        let text = "[[specimen.links]]\nlength_m = 0.3\nmass_kg = 0.1\ncom_m = 0.2\ninertia_kg_m2 = 1e-3\n\
+                    [model]\nrelease_rad = [0.5]\n[model.effects]\nhinge_viscous = 2e-5\n";
+        let experiment = Experiment::parse(text, Path::new("arm")).unwrap();
+        let model = ForwardModel::of(&experiment).unwrap();
+        let swing = Trajectory::swing(&model, &State::released(&model, &[0.5]).unwrap(), 0.0, 10.0).unwrap();
+        let t_s: Vec<f64> = (0..300).map(|row| f64::from(row) / 30.0).collect();
+        let angles = t_s.iter().map(|t| Some(swing.at(*t).theta_rad[0])).collect();
+        let record = Record::uniform("made", t_s, vec![angles]);
+        let settings = Settings::default();
+        let prepared = preparation::prepare(&[record], &experiment, &settings).unwrap();
+        let taken = DampingAssumption::AsStated;
+        let search = Search::of_base_model(&prepared, &prepared.experiment, taken, &settings, &Silent).unwrap();
+        let inclusion = |effects: &[Effect], remains: f64| {
+            let of = |hypothesis: Hypothesis, effect: &Effect| hypothesis.and(*effect, None);
+            let hypothesis = effects.iter().fold(Hypothesis::default(), of);
+            let fit = search.context.refit(&hypothesis, search.base(), &[]).unwrap();
+            let weighed = |fit, probability| Candidate {
+                fit,
+                ln_posterior: 0.0,
+                probability,
+                if_named: probability,
+                mixture_probability: probability,
+            };
+            let posterior = Posterior {
+                candidates: vec![weighed(fit, 1.0), weighed(search.base().clone(), 0.0)],
+                unknown: 0.0,
+                remains,
+                lowest: 1.0,
+                uncertified: Vec::new(),
+                unknowns: Vec::new(),
+                compared: Compared { of_any: 2, ..Compared::default() },
+                needed: Vec::new(),
+            };
+            posterior.inclusion(Effect::TimeBase, &settings)
+        };
+        let both = [Effect::TimeBase, Effect::AngleGain];
+        assert!((inclusion(&both, 1.0) / inclusion(&both, 0.0) - settings.prior.not_compared).abs() < 1e-9);
+        // a clock alone changes no frequency with amplitude
+        let alone = [Effect::TimeBase];
+        assert_eq!(inclusion(&alone, 1.0), inclusion(&alone, 0.0));
     }
 }

@@ -19,7 +19,7 @@ const FEWEST: usize = 4;
 const MOST: usize = 20;
 /// Fits that leave least, of which those with fewer effects are compared (cost).
 pub const LEADERS: usize = 5;
-/// A fit that leaves so many times the χ² of the best one is not led below that by another count (cost: up to four times was seen, with two thirds of
+/// A fit that leaves so many times the χ² that is wanted is not led below that by another count (cost: up to four times was seen, with two thirds of
 /// the rods and 0.33 mrad of noise).
 const MAX_CHI2_RATIO: f64 = 10.0;
 /// A spring at the hinge has at least this part of the compliance of half a rod (judgement: a clamp has all of it).
@@ -45,6 +45,10 @@ impl<'s> Weights<'s> {
     /// The weight of a fit if it left another χ².
     fn with_chi2(&self, fit: &Refit<'_>, chi2: f64) -> f64 {
         chi2 / self.scatter + self.settings.misfit.counts * fit.coefficients() as f64
+    }
+
+    fn is_unexplained(&self) -> bool {
+        self.scatter > self.settings.search.count_unexplained
     }
 
     fn best<'f, 'a>(&self, fits: &'f [Refit<'a>]) -> Option<&'f Refit<'a>> {
@@ -168,35 +172,36 @@ pub fn preferred_rod_count(context: &FitContext<'_>, fits: &[Refit<'_>], among: 
     let best = weights.best(fits)?;
     // one effect of a leader may only make up for the count, and be told from the others where that is right
     let leaders = refit::best(fits, LEADERS, |_| true, |fit| weights.weight(fit));
-    // what leaves many times as much is not led to the best by another count
-    let may_win = |fit: &&Refit<'_>| fit.chi2 < MAX_CHI2_RATIO * best.chi2;
+    // a single effect may only lead the way where nothing else is left: beside a wrong effect a wrong count makes up for what that one gets wrong
+    let most = match among {
+        ComparedFits::Best => context.settings.search.count_unexplained * context.values() as f64,
+        ComparedFits::Simple => f64::INFINITY,
+    };
+    // what leaves many times as much is not led there by another count
+    let may_win = |fit: &&Refit<'_>| fit.chi2 < MAX_CHI2_RATIO * best.chi2.min(most);
     let within = |fit: &Refit<'_>| leaders.iter().any(|leader| fit.hypothesis.is_within(&fits[*leader].hypothesis));
     let simple = |fit: &Refit<'_>| fit.hypothesis.effects.len() < 2 && !fit.hypothesis.is_expensive();
-    let unexplained = weights.scatter > weights.settings.search.count_unexplained;
+    let unexplained = weights.is_unexplained();
     let compared: Vec<&Refit<'_>> = fits
         .iter()
         .filter(|fit| within(fit) || among == ComparedFits::Simple && unexplained && simple(fit))
         .filter(may_win)
         .collect();
     let better = weights.weight(best) - weights.settings.search.worth_a_count;
-    // a single effect may only lead the way where nothing else is left: beside a wrong effect a wrong count makes up for what that one gets wrong
-    let wanted = |fit: &Refit<'_>| match among {
-        ComparedFits::Best => {
-            better.min(weights.with_chi2(fit, weights.settings.search.count_unexplained * context.values() as f64))
-        }
-        ComparedFits::Simple => better,
-    };
+    let wanted = |fit: &Refit<'_>| better.min(weights.with_chi2(fit, most));
     let experiments: Vec<Experiment> = (0..=MOST).map(|pieces| with(context.experiment, pieces)).collect();
     let contexts: Vec<FitContext<'_>> =
         experiments.iter().map(|experiment| FitContext { experiment, ..context.clone() }).collect();
     let promised = compared.par_iter().with_max_len(1).filter_map(|fit| {
         let mut counted = RodCountScan { contexts: &contexts, fits: vec![(usual, (*fit).clone())] };
         for pieces in TRIED {
-            counted.try_count(pieces)?;
+            if counted.may_reach(wanted(fit), &weights) {
+                counted.try_count(pieces)?;
+            }
         }
         // the parabola is only a guide
         for _ in 0..GUIDED {
-            if counted.may_reach(wanted(fit), &weights) {
+            if counted.fits.len() > TRIED.len() && counted.may_reach(wanted(fit), &weights) {
                 let (pieces, _) = likeliest_count(&counted.nearest_three(&weights), FEWEST)?;
                 counted.try_count(pieces);
             }
@@ -207,6 +212,11 @@ pub fn preferred_rod_count(context: &FitContext<'_>, fits: &[Refit<'_>], among: 
         counted.best(&weights).filter(|(_, weight)| *weight < wanted(fit))
     });
     promised.min_by(|a, b| a.1.total_cmp(&b.1)).map(|(pieces, _)| pieces)
+}
+
+/// Whether the best fit leaves so much that a wrong count may have led to it.
+pub fn is_unexplained(context: &FitContext<'_>, fits: &[Refit<'_>]) -> bool {
+    Weights::of(context, fits).is_unexplained()
 }
 
 /// Whether another count lowers the penalised χ², both judged by the noise of the first search.

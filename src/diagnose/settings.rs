@@ -245,8 +245,8 @@ pub struct PriorSettings {
     pub beside_no_answer: f64,
     /// The part of names that stand for something outside the table (training bank: names stated at 0.99 were right in 97 of 100 cases).
     pub imitated: f64,
-    /// Each name that has not been held against every other effect, as those beyond two are not, and fewer where the budget ends before, is with these odds what it
-    /// seems to be (judgement: no bank has calibrated them).
+    /// Each name that has not been held against every other effect, as those beyond two are not, and fewer where the budget ends before, or that may imitate a law of no
+    /// table and has not been held against any, is with these odds what it seems to be (judgement: no bank has calibrated them).
     pub not_compared: f64,
     /// A support in step with the swing is with these odds what it seems to be (training bank: four times out of five).
     pub support_in_step: f64,

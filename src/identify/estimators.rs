@@ -174,14 +174,7 @@ impl Estimators {
         let is_told =
             |law: &FrequencyLaw, other: Estimate| (known && mode == 0) || law.f0_hz.half() < WIDEST_LAW * other.half();
         if let Some(own) = whole.modulated.filter(|own| is_told(&own.frequency, over_the_record[0])) {
-            return Choice {
-                frequency_hz: own.frequency.f0_hz,
-                damping_ratio: own.damping_ratio,
-                frequency_at_rad: None,
-                basis: "one oscillation whose frequency and damping go with its amplitude: f and ξ at small amplitude"
-                    .to_owned(),
-                at_small_amplitude: true,
-            };
+            return Choice::of_modulated(own);
         }
         // what angle a displacement is of nobody knows, nor therefore what amplitude has changed
         let felt = !known || changed_hz > 0.3 * frequency_hz.sd;
@@ -198,36 +191,19 @@ impl Estimators {
             let linear = envelope.linear_damping().map(|xi| relatively_blurred(xi, omitted[1]));
             linear.unwrap_or_else(|| envelope.damping_over_the_record())
         };
-        match law {
-            Some((envelope, law)) if felt || self.residual_excess > 1.0 => Choice {
-                frequency_hz: {
-                    let f0_hz = relatively_blurred(law.f0_hz, omitted[0].hypot(of_losses(envelope, duration_s)));
-                    if trend == Some(Trend::Uneven) { envelope.over_steps(f0_hz) } else { f0_hz }
-                },
-                damping_ratio: of_windows(envelope),
-                frequency_at_rad: None,
-                basis: "windows: f and ξ at small amplitude".to_owned(),
-                at_small_amplitude: true,
-            },
-            None if felt || self.residual_excess > 1.0 => {
-                let [frequency_hz, damping_ratio] = over_the_record;
-                let widened = "damped sinusoids over the whole record; widened for what amplitude may have changed";
-                Choice {
-                    frequency_hz,
-                    // a frequency that changes makes the swing smaller than a sinusoid of one frequency, which takes that for damping
-                    damping_ratio: envelope.map_or(damping_ratio, of_windows),
-                    frequency_at_rad: felt.then(|| amplitudes_rad[mode] * weighed(decays).sqrt()),
-                    basis: if envelope.is_some() { format!("f: {widened}; ξ: windows") } else { widened.to_owned() },
-                    at_small_amplitude: envelope.is_some_and(|e| e.linear_damping().is_some()),
-                }
+        let is_needed = felt || self.residual_excess > 1.0;
+        match law.filter(|_| is_needed) {
+            Some((envelope, law)) => {
+                let f0_hz = relatively_blurred(law.f0_hz, omitted[0].hypot(of_losses(envelope, duration_s)));
+                let f0_hz = if trend == Some(Trend::Uneven) { envelope.over_steps(f0_hz) } else { f0_hz };
+                Choice::of_windows(f0_hz, of_windows(envelope))
             }
-            _ => Choice {
-                frequency_hz: self.over_stretches(whole, [frequency_hz, damping_ratio])[0],
-                damping_ratio,
-                frequency_at_rad: None,
-                basis: "damped sinusoids over the whole record".to_owned(),
-                at_small_amplitude: false,
-            },
+            None if is_needed => {
+                let at_rad = felt.then(|| amplitudes_rad[mode] * weighed(decays).sqrt());
+                let in_windows = envelope.map(|e| (of_windows(e), e.linear_damping().is_some()));
+                Choice::of_widened_sinusoids(over_the_record, at_rad, in_windows)
+            }
+            None => Choice::of_sinusoids(self.over_stretches(whole, [frequency_hz, damping_ratio])[0], damping_ratio),
         }
     }
 }
@@ -259,6 +235,57 @@ pub(super) fn harmonic_share(fit: &SinusoidFit, mode: usize) -> f64 {
 }
 
 impl Choice {
+    /// From the laws of one oscillation over the whole record.
+    fn of_modulated(own: &Modulated) -> Self {
+        Self {
+            frequency_hz: own.frequency.f0_hz,
+            damping_ratio: own.damping_ratio,
+            frequency_at_rad: None,
+            basis: "one oscillation whose frequency and damping go with its amplitude: f and ξ at small amplitude"
+                .to_owned(),
+            at_small_amplitude: true,
+        }
+    }
+
+    /// From the laws through the windows.
+    fn of_windows(frequency_hz: Estimate, damping_ratio: Estimate) -> Self {
+        Self {
+            frequency_hz,
+            damping_ratio,
+            frequency_at_rad: None,
+            basis: "windows: f and ξ at small amplitude".to_owned(),
+            at_small_amplitude: true,
+        }
+    }
+
+    /// From damped sinusoids whose intervals allow for what amplitude may have changed, at the amplitude that is given; ξ from the windows where there are any, with
+    /// whether that is at small amplitude: a frequency that changes makes the swing smaller than a sinusoid of one frequency, which takes that for damping.
+    fn of_widened_sinusoids(
+        [frequency_hz, damping_ratio]: [Estimate; 2],
+        frequency_at_rad: Option<f64>,
+        in_windows: Option<(Estimate, bool)>,
+    ) -> Self {
+        let widened = "damped sinusoids over the whole record; widened for what amplitude may have changed";
+        Self {
+            frequency_hz,
+            damping_ratio: in_windows.map_or(damping_ratio, |own| own.0),
+            frequency_at_rad,
+            basis: if in_windows.is_some() { format!("f: {widened}; ξ: windows") } else { widened.to_owned() },
+            at_small_amplitude: in_windows.is_some_and(|own| own.1),
+        }
+    }
+
+    /// From damped sinusoids as they are.
+    fn of_sinusoids(frequency_hz: Estimate, damping_ratio: Estimate) -> Self {
+        Self {
+            frequency_hz,
+            damping_ratio,
+            frequency_at_rad: None,
+            basis: "damped sinusoids over the whole record".to_owned(),
+            at_small_amplitude: false,
+        }
+    }
+
     /// The slowest mode's, with intervals that allow for one that swings three times as fast, which gives energy to it and takes it back: its torque on the slowest goes with
     /// A₀²A₁, and what it holds is A₁²(3ω)² of A₀²ω². Of both only the order is known.
     pub fn widened_for_resonance(self, whole: &Whole, mode: usize) -> Self {

@@ -302,14 +302,13 @@ impl Identification {
             (Ok(windows), _) => windows.noise_rad.clone(),
             (Err(_), None) => fit.links.iter().map(|l| l.noise_rad).collect(),
         };
-        let noise_rad = &self.record.noise_rad;
         let whole = Whole {
             signal,
             spectrum: &self.spectrum,
             fit: &fit,
             windows: &windows,
             modulated: modulated.as_ref(),
-            noise_rad,
+            noise_rad: &self.record.noise_rad,
             measured: self.record.measured,
             third_rad,
         };
@@ -318,6 +317,31 @@ impl Identification {
         let mut modes: Vec<Mode> =
             (0..fit.poles.len()).map(|m| Mode::of(&whole, m, same_links, gravity_m_s2)).collect();
         modes.sort_by(|a, b| b.rms_rad.total_cmp(&a.rms_rad));
+        let modes = self.resolved_modes(modes);
+        if modes.is_empty() {
+            return;
+        }
+        self.bound_noise(&modes, signal);
+        self.modes = modes.into_iter().enumerate().map(|(k, mode)| mode.numbered(k + 1)).collect();
+        self.mode_count = Some(count);
+        let swing = self.modes.iter().position(Mode::moves_together).unwrap_or(0);
+        self.swing_mode = Some(swing + 1);
+        if body.is_some() && same_links.is_none() {
+            let message = "the experiment file has another number of links than the table; its own links make the floor and the equivalents";
+            self.notes.push(message.to_owned());
+        }
+        if let Some(body) = body {
+            self.add_equivalents(body, swing);
+        }
+        let findings = self.modes.iter().flat_map(|m| m.notes.iter().cloned());
+        self.notes.extend(findings);
+        if signal.links.len() == 1 {
+            self.notes.extend(close_pair::of_one_link(&self.modes));
+        }
+    }
+
+    /// The modes without those that may be the harmonic of a large swing, and those without one frequency; a note says so of each.
+    fn resolved_modes(&mut self, modes: Vec<Mode>) -> Vec<Mode> {
         let (harmonics, modes): (Vec<Mode>, Vec<Mode>) = modes.into_iter().partition(|mode| mode.may_be_harmonic);
         self.notes.extend(harmonics.iter().map(|mode| {
             format!(
@@ -334,10 +358,11 @@ impl Identification {
                 mode.frequency_hz.value
             )
         }));
-        if modes.is_empty() {
-            return;
-        }
-        // a wide swing is no sum of a few sinusoids: what they leave is more than noise
+        modes
+    }
+
+    /// Takes for noise no more than neighbouring values differ by where modes leave more: a wide swing is no sum of a few sinusoids.
+    fn bound_noise(&mut self, modes: &[Mode], signal: &Signal) {
         let of_values = |link: &LinkSamples| {
             crate::series::noise::of_angle(&link.t_s, &link.theta_rad.iter().copied().map(Some).collect::<Vec<_>>())
         };
@@ -345,27 +370,18 @@ impl Identification {
             let least = signal.links.iter().map(of_values);
             self.record.noise_rad.iter_mut().zip(least).for_each(|(noise, least)| *noise = noise.min(least));
         }
-        self.modes = modes.into_iter().enumerate().map(|(k, mode)| mode.numbered(k + 1)).collect();
-        self.mode_count = Some(count);
-        let swing = self.modes.iter().position(Mode::moves_together).unwrap_or(0);
-        self.swing_mode = Some(swing + 1);
-        if body.is_some() && same_links.is_none() {
-            let message = "the experiment file has another number of links than the table; its own links make the floor and the equivalents";
-            self.notes.push(message.to_owned());
-        }
-        if let (Some(body), Some(swing)) = (body, self.modes.get(swing)) {
-            let frequency_hz = swing.small_amplitude_hz(swing.expected_kappa_per_rad2.unwrap_or(PENDULUM));
-            let damping_ratio = swing.damping.estimate().copied();
-            let floor = Floor::of(&body.experiment.specimen, &body.chain, gravity_m_s2, frequency_hz);
-            self.notes.extend(floor.below.then(|| floor.statement.clone()));
-            self.floor = Some(floor);
-            self.equivalents = Some(Equivalents::of(&body.chain, gravity_m_s2, frequency_hz, damping_ratio));
-        }
-        let findings = self.modes.iter().flat_map(|m| m.notes.iter().cloned());
-        self.notes.extend(findings);
-        if signal.links.len() == 1 {
-            self.notes.extend(close_pair::of_one_link(&self.modes));
-        }
+    }
+
+    /// The floor of a rigid pendulum, and the joint's equivalents, from the mode in which all links swing together.
+    fn add_equivalents(&mut self, body: &Body, swing: usize) {
+        let Some(swing) = self.modes.get(swing) else { return };
+        let gravity_m_s2 = body.experiment.rig.gravity_m_s2;
+        let frequency_hz = swing.small_amplitude_hz(swing.expected_kappa_per_rad2.unwrap_or(PENDULUM));
+        let damping_ratio = swing.damping.estimate().copied();
+        let floor = Floor::of(&body.experiment.specimen, &body.chain, gravity_m_s2, frequency_hz);
+        self.notes.extend(floor.below.then(|| floor.statement.clone()));
+        self.floor = Some(floor);
+        self.equivalents = Some(Equivalents::of(&body.chain, gravity_m_s2, frequency_hz, damping_ratio));
     }
 }
 

@@ -10,7 +10,7 @@ use super::super::effect::Effect;
 use super::super::hypothesis::Hypothesis;
 use super::super::misfit::needs;
 use super::super::refit::{self, Refit, best_of_each_count, least, merged};
-use super::super::settings::SearchSettings;
+use super::super::settings::{MisfitSettings, SearchSettings};
 use super::one_more::with_one_more;
 use crate::fit::recordings;
 use crate::fit::search::PARTS;
@@ -41,7 +41,11 @@ pub fn continued<'a>(context: &FitContext<'a>, fits: &[Refit<'a>], effects: &[Ef
             .into_iter()
             .flat_map(|best| with_one_more(&early, best, effects))
             .collect();
-        followed = to_follow(foremost(merged(there, more, context.settings.certificate.agrees), settings));
+        let merged = merged(there, more, context.settings.certificate.agrees);
+        followed = to_follow(foremost(in_step(merged, &context.settings.misfit), settings));
+        if followed.is_empty() {
+            return Vec::new();
+        }
     }
     descended(context, &noise, followed, steps.most_steps)
 }
@@ -52,7 +56,8 @@ pub fn carried<'a>(context: &FitContext<'a>, fits: Vec<Refit<'_>>, part: f64, no
     // of a longer part each step costs more; what an effect has not earned does not come before the fit without it
     let few = |fits: Vec<Refit<'_>>| {
         let Some(least) = least(&fits) else { return Vec::new() };
-        let chosen = refit::best(&fits, settings.carried, |_| true, |fit| needs(fit, least, &context.settings.misfit));
+        let is_near = |fit: &Refit<'_>| fit.chi2 < settings.far * least.chi2;
+        let chosen = refit::best(&fits, settings.carried, is_near, |fit| needs(fit, least, &context.settings.misfit));
         chosen.into_iter().map(|place| (fits[place].hypothesis.clone(), fits[place].x.clone())).collect()
     };
     let keeps_step = |(hypothesis, x): &(Hypothesis, Vec<f64>)| {
@@ -63,7 +68,8 @@ pub fn carried<'a>(context: &FitContext<'a>, fits: Vec<Refit<'_>>, part: f64, no
         few(foremost(fits, settings)).into_iter().partition(keeps_step);
     for longer in PARTS.into_iter().filter(|longer| *longer > MUCH_LONGER * part) {
         let records = first_part(context.records, longer);
-        followed = few(foremost(descended(&context.on(&records), noise, followed, steps.few_steps), settings));
+        let there = descended(&context.on(&records), noise, followed, steps.few_steps);
+        followed = few(foremost(in_step(there, &context.settings.misfit), settings));
     }
     at_the_end.extend(followed);
     // those that are worth it go on once the noise is known
@@ -98,6 +104,12 @@ fn best_and_base<'a>(fits: &[Refit<'a>], count: usize, left: impl Fn(&Refit<'a>)
     chosen.sort_unstable();
     chosen.dedup();
     chosen
+}
+
+/// Those that have not lost step: what has does not find it again in a longer part.
+fn in_step<'b>(mut fits: Vec<Refit<'b>>, settings: &MisfitSettings) -> Vec<Refit<'b>> {
+    fits.retain(|fit| !fit.has_lost_step(settings));
+    fits
 }
 
 fn to_follow(fits: Vec<Refit<'_>>) -> Vec<(Hypothesis, Vec<f64>)> {

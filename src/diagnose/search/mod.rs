@@ -8,6 +8,7 @@
 //! | [`rounds`] | the rounds, in order, and what each proposes |
 //! | [`proposal`] | what can be proposed, and how it is fitted |
 //! | [`one_more`] | an effect beside a fit |
+//! | `budget` | what it may cost |
 //! | `rod_count` | the number of a strip's rods |
 //! | `partial` | the search of the first part, where the whole takes too much work |
 //! | [`horizon`] | horizon continuation: fits that follow a recording from its beginning |
@@ -16,6 +17,7 @@
 //! | `strip` | a strip that is found to bend everywhere |
 //! | `superfluous` | effects that a set of several does not need |
 
+mod budget;
 mod frequency_match;
 pub mod horizon;
 pub mod one_more;
@@ -35,7 +37,7 @@ use super::base;
 use super::base_priors::{DampingAssumption, lacks_a_damper};
 use super::context::{FitContext, without_synchronous_errors};
 use super::effect::Effect;
-use super::hypothesis::{Compared, Hypothesis};
+use super::hypothesis::Compared;
 use super::laws;
 use super::misfit::{Misfit, leaves_more_than_noise};
 use super::preparation::Prepared;
@@ -45,17 +47,16 @@ use super::settings::Settings;
 use crate::error::Result;
 use crate::experiment::Experiment;
 use crate::progress::Progress;
+use budget::Budget;
 use frequency_match::FrequencyMatched;
 use proposal::Proposal;
+use rod_count::RodCount;
 use rounds::{NoiseUpdate, Round, Tried};
 
 /// Proposals fitted together, between two looks at the budget.
 const TOGETHER: usize = 4;
 /// A fit of the same hypothesis is better where its χ² is lower by more than this (statistics: half of an ln-likelihood).
 const BETTER_BY: f64 = 1.0;
-
-/// A hypothesis and the variables that its fit is to begin with.
-type WarmStart = (Hypothesis, Vec<f64>);
 
 /// What a round came to.
 #[derive(Debug, Clone, Copy, PartialEq, serde::Serialize)]
@@ -99,16 +100,11 @@ pub struct Search<'a, 'p> {
     rival_residual: Option<f64>,
     /// Whether it ended there, or where a strip was found to bend, or to need another number of rods.
     stopped_early: bool,
-    /// That number.
-    count: Option<usize>,
-    /// What led with another number of rods, to be begun with.
-    warm_starts: Vec<WarmStart>,
+    /// What the search of a strip knows of its rods.
+    rods: RodCount,
     /// How many effects of a hypothesis earlier searches have compared with every other, and the hypotheses of which each was exchanged.
     compared: Compared,
-    /// The work that had been done when it began, that of the base model's fit included.
-    work_at_start: u64,
-    /// The limit of the present phase.
-    work_limit: u64,
+    budget: Budget,
     /// The part of the recordings that its first rounds fitted.
     part: f64,
     progress: &'p dyn Progress,
@@ -128,19 +124,13 @@ impl<'a, 'p> Search<'a, 'p> {
     ) -> Result<Self> {
         let context = base::context(prepared, experiment, taken, settings)?;
         let fit = base::fitted(&context, prepared)?;
-        let work_at_start = context.work.done();
         let has_added_damper = taken == DampingAssumption::WithDamper;
-        Ok(Self { has_added_damper, ..Self::begun(prepared, context, fit, work_at_start, progress) })
+        Ok(Self { has_added_damper, ..Self::begun(prepared, context, fit, progress) })
     }
 
     /// Of the whole recordings, the file taken at its word: there is the base model's fit, and no work is allowed yet.
-    fn begun(
-        prepared: &'a Prepared,
-        context: FitContext<'a>,
-        base: Refit<'a>,
-        work_at_start: u64,
-        progress: &'p dyn Progress,
-    ) -> Self {
+    fn begun(prepared: &'a Prepared, context: FitContext<'a>, base: Refit<'a>, progress: &'p dyn Progress) -> Self {
+        let budget = Budget::from(context.work.done(), context.settings.search.budget);
         let effects = base::candidates(&context);
         let scored = laws::cheap_to_score(&context, &effects);
         let scores = Screen::at(&context, &base).map(|screen| laws::scores(&screen, &scored)).unwrap_or_default();
@@ -158,11 +148,9 @@ impl<'a, 'p> Search<'a, 'p> {
             bending_n_m2: None,
             rival_residual: None,
             stopped_early: false,
-            count: None,
-            warm_starts: Vec::new(),
+            rods: RodCount::default(),
             compared: Compared::default(),
-            work_at_start,
-            work_limit: work_at_start,
+            budget,
             part: 1.0,
             progress,
         }
@@ -185,19 +173,8 @@ impl<'a, 'p> Search<'a, 'p> {
     fn end(&mut self) {
         self.drop_superfluous();
         self.add_synchronous_errors();
-        self.allow(self.context.settings.search.shares.certified);
+        self.budget.allow(self.context.settings.search.shares.certified);
         self.certify();
-    }
-
-    /// Allows the search a share of the budget that was left when it began.
-    fn allow(&mut self, share: f64) {
-        self.work_limit = self.work_limit_at(share);
-    }
-
-    /// The work at which a share is spent of the budget that was left when the search began.
-    fn work_limit_at(&self, share: f64) -> u64 {
-        let left = self.context.settings.search.budget.saturating_sub(self.work_at_start);
-        self.work_at_start + (share * left as f64) as u64
     }
 
     /// The same with what another search has spent before, or in vain.
@@ -229,7 +206,7 @@ impl<'a, 'p> Search<'a, 'p> {
         let mut search =
             Self::of_base_model(kept.get_or_init(|| pieces), experiment, taken, settings, self.progress).ok()?;
         // what the stretches ask for is where the search for more and fewer effects begins
-        search.allow(settings.search.shares.usual);
+        search.budget.allow(settings.search.shares.usual);
         search.round(Round::Asked, &mut Tried::default());
         search.update_noise();
         if search.fits.len() == 1 {
@@ -242,7 +219,7 @@ impl<'a, 'p> Search<'a, 'p> {
     /// loosely if it may be doubted, and from the beginning of the recordings on.
     #[must_use]
     pub fn doubted(self, pieces: &'a OnceLock<Prepared>) -> Self {
-        let enough = self.work_limit_at(self.context.settings.search.shares.certified);
+        let enough = self.budget.at(self.context.settings.search.shares.certified);
         let with_damper = || {
             (self.context.work.done() < enough).then_some(())?;
             let lacks_a_damper = lacks_a_damper(self.context.experiment, self.context.marks());
@@ -263,11 +240,11 @@ impl<'a, 'p> Search<'a, 'p> {
                 None => self,
             },
         };
-        search.allow(search.context.settings.search.shares.further);
+        search.budget.allow(search.context.settings.search.shares.further);
         search.further();
         search.drop_superfluous();
         search.add_synchronous_errors();
-        search.allow(1.0);
+        search.budget.allow(1.0);
         search.certify();
         search
     }
@@ -311,7 +288,7 @@ impl<'a, 'p> Search<'a, 'p> {
 
     /// Singles and pairs, until a strip is found to bend everywhere, or to be made of another number of rods: pairs would make up for a wrong one.
     fn usual(&mut self) {
-        self.allow(self.context.settings.search.shares.usual);
+        self.budget.allow(self.context.settings.search.shares.usual);
         self.fit_warm_starts();
         self.match_frequency();
         for round in Round::USUAL {
@@ -327,7 +304,7 @@ impl<'a, 'p> Search<'a, 'p> {
 
     /// Restarts where the best fit leaves more than noise. A strip's fits are too dear for it.
     fn restarts(&mut self) {
-        self.allow(self.context.settings.search.shares.restarts);
+        self.budget.allow(self.context.settings.search.shares.restarts);
         if !self.stopped_early && !self.context.is_strip() && self.misfit().is_some_and(|misfit| misfit.unexplained) {
             Round::RESTARTS.into_iter().for_each(|round| self.round(round, &mut Tried::default()));
         }
@@ -416,7 +393,7 @@ impl<'a, 'p> Search<'a, 'p> {
 
     /// Whether the present phase has done the work it was allowed. It is asked between fits that run together, so that the answer does not depend on threads.
     fn is_spent(&self) -> bool {
-        self.context.work.done() >= self.work_limit
+        self.budget.is_spent(self.context.work.done())
     }
 
     fn fitted(&self, proposals: &[Proposal<'_, 'a>]) -> Vec<Refit<'a>> {

@@ -29,27 +29,26 @@ impl<'a> Search<'a, '_> {
         let records = first_part(self.context.records, part);
         let context = self.context.on(&records);
         let Some(base) = horizon::refit_on_first_part(&self.context, &context, self.base()) else { return };
-        let begun = Search::begun(self.prepared, context, base, self.work_at_start, self.progress);
-        let warm_starts = self.warm_starts.clone();
         let mut early = Search {
             has_added_damper: self.has_added_damper,
-            work_limit: self.work_limit,
             rival_residual: self.rival_residual,
-            warm_starts,
+            budget: self.budget,
+            rods: self.rods.clone(),
             part,
-            ..begun
+            ..Search::begun(self.prepared, context, base, self.progress)
         };
         early.usual();
         if early.stopped_early {
-            (self.stopped_early, self.bending_n_m2, self.count) = (true, early.bending_n_m2, early.count);
-            let leading = |count| Self::best_warm_starts(&early.fits, count, &early.context.settings.misfit);
-            self.warm_starts = early.count.map(leading).unwrap_or_default();
+            (self.stopped_early, self.bending_n_m2) = (true, early.bending_n_m2);
+            self.rods = early.rods_with_warm_starts();
             self.rounds.extend(early.rounds);
             return;
         }
         early.restarts();
-        early.allow(self.context.settings.search.shares.restarts);
-        early.round(Round::OneMore, &mut Tried::default());
+        early.budget.allow(self.context.settings.search.shares.restarts);
+        if !self.context.is_strip() {
+            early.round(Round::OneMore, &mut Tried::default());
+        }
         early.drop_superfluous();
         let Search { fits, rounds, undecided, .. } = early;
         self.part = part;
@@ -61,7 +60,12 @@ impl<'a> Search<'a, '_> {
         let found: Vec<Refit<'a>> = horizon::carried(&self.context, fits, part, noise);
         self.keep(found);
         self.update_noise();
-        self.allow(self.context.settings.search.shares.further);
+        // one more effect would make up for a wrong number of rods, which only whole recordings tell
+        if self.prefers_other_rod_count() {
+            self.stopped_early = true;
+            return;
+        }
+        self.budget.allow(self.context.settings.search.shares.further);
         self.round(Round::Indistinguishable, &mut Tried::default());
         self.round(Round::OneMore, &mut Tried::default());
     }

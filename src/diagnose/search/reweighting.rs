@@ -69,6 +69,5 @@ fn is_worth_more(context: &FitContext<'_>, fit: &Refit<'_>, least: f64, base: f6
     let (hopeless, dear) = (settings.search.hopeless, fit.hypothesis.has_switching());
     // in every joint of a strip it has only begun
     let bound = if dear && context.is_strip() { settings.descent.strip_continue_ratio } else { hopeless };
-    fit.hypothesis.effects.is_empty()
-        || fit.chi2 < bound * (least + hopeless) && !(dear && fit.chi2 > base - settings.misfit.counts)
+    fit.chi2 < bound * (least + hopeless) && !(dear && fit.chi2 > base - settings.misfit.counts)
 }

@@ -219,12 +219,10 @@ impl<'a> Search<'a, '_> {
         others.map(|fit| Proposal::FromLeader { fit, hypothesis: fit.hypothesis.clone(), leader }).collect()
     }
 
-    /// Where the base model leaves more than noise: a rival in a false minimum would count as evidence for the best.
+    /// Where the base model leaves more than noise: a rival in a false minimum would count as evidence for the best. A strip's fits are too dear for it.
     fn along_the_leader(&self) -> Vec<Proposal<'_, 'a>> {
-        let misfit = self.lacking();
-        let Some(leader) = least(&self.fits).filter(|_| misfit.unexplained) else {
-            return Vec::new();
-        };
+        let is_asked = self.lacking().unexplained && !self.context.is_strip();
+        let Some(leader) = least(&self.fits).filter(|_| is_asked) else { return Vec::new() };
         let behind = leader.chi2 + self.context.settings.misfit.counts;
         let is_behind = |fit: &&Refit<'a>| !fit.hypothesis.is_expensive() && fit.chi2 > behind;
         self.fits
