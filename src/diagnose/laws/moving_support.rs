@@ -19,6 +19,9 @@ use crate::model::observe::chord_angles_rad;
 
 /// Frequencies: this fine for the length of the recording (start values: as many as that tells apart).
 const PER_RESOLUTION: f64 = 1.0;
+/// Each peak is then sought at these places around it, in steps of that (start values: half a step off, a support has slipped by a quarter of a cycle at both ends of the
+/// recording, from where a descent may not find it).
+const BETWEEN: [f64; 4] = [-0.5, -0.25, 0.25, 0.5];
 /// Frequencies that are followed side by side (cost: no answer depends on it).
 const AT_ONCE: usize = 8;
 /// Peaks over the frequency that are kept beside the highest (cost).
@@ -122,6 +125,13 @@ fn scanned(screen: &Screen<'_, '_>) -> Option<Score> {
     };
     let mut peaks: Vec<(f64, f64)> = (0..promises.len()).filter(is_peak).map(|k| promises[k]).collect();
     peaks.sort_by(|a, b| b.0.total_cmp(&a.0));
+    peaks.truncate(1 + FURTHER_PEAKS);
+    let between = |peak: &(f64, f64)| {
+        let near: Vec<f64> = BETWEEN.iter().map(|part| peak.1 + part / (PER_RESOLUTION * span_s)).collect();
+        of_several(&near).into_iter().fold(*peak, |best, other| if other.0 > best.0 { other } else { best })
+    };
+    let mut peaks: Vec<(f64, f64)> = peaks.iter().map(between).collect();
+    peaks.sort_by(|a, b| b.0.total_cmp(&a.0));
     let at = |hz: f64| {
         let columns = at_frequencies(screen, &around, &[hz]).columns(0, 2).into_owned();
         let parameters = [Parameter::SupportSine, Parameter::SupportCosine];
@@ -130,7 +140,7 @@ fn scanned(screen: &Screen<'_, '_>) -> Option<Score> {
         Some(score)
     };
     let mut score = at(peaks.first()?.1)?;
-    let further = peaks.iter().skip(1).take(FURTHER_PEAKS).filter_map(|(_, hz)| at(*hz));
+    let further = peaks.iter().skip(1).filter_map(|(_, hz)| at(*hz));
     score.further = further.map(|other| other.start).collect();
     Some(score)
 }
@@ -211,4 +221,51 @@ fn chord_powers(fit: &Refit<'_>) -> Vec<Vec<Power>> {
         Some((0..fit.problem.marks()).map(|link| Power { of_bins: of_bins(link), span_s }).collect())
     };
     (0..fit.problem.records.len()).filter_map(of_record).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use std::path::Path;
+
+    use super::*;
+    use crate::diagnose::base_priors::DampingAssumption;
+    use crate::diagnose::preparation;
+    use crate::diagnose::search::Search;
+    use crate::experiment::Experiment;
+    use crate::fit::Record;
+    use crate::model::{ForwardModel, State, Trajectory};
+    use crate::progress::Silent;
+
+    const LENGTH_S: f64 = 40.0;
+
+    fn arm(effects: &str) -> Experiment {
+        let text = format!(
+            "[[specimen.links]]\nlength_m = 0.3\nmass_kg = 0.1\ncom_m = 0.2\ninertia_kg_m2 = 1e-3\n\
+             [model]\nrelease_rad = [0.5]\n[model.effects]\nhinge_viscous = 2e-4\n{effects}"
+        );
+        Experiment::parse(&text, Path::new("arm")).unwrap()
+    }
+
+    #[test]
+    fn a_support_is_found_wherever_its_frequency_stands_among_those_looked_at() {
+        let settings = Settings::default();
+        for part in [0.0, 0.3, 0.5, 0.7] {
+            let frequency_hz = (78.0 + part) / LENGTH_S;
+            let moving =
+                format!("support_motion = {{ amplitude_m = 2e-3, frequency_hz = {frequency_hz}, phase_rad = 1.0 }}\n");
+            let model = ForwardModel::of(&arm(&moving)).unwrap();
+            let swing = Trajectory::swing(&model, &State::released(&model, &[0.5]).unwrap(), 0.0, LENGTH_S).unwrap();
+            let t_s: Vec<f64> = (0..(25.0 * LENGTH_S) as usize).map(|row| row as f64 / 25.0).collect();
+            let angles = t_s.iter().map(|t| Some(swing.at(*t).theta_rad[0])).collect();
+            let record = Record::uniform("made", t_s, vec![angles]);
+            let prepared = preparation::prepare(&[record], &arm(""), &settings).unwrap();
+            let taken = DampingAssumption::AsStated;
+            let search = Search::of_base_model(&prepared, &prepared.experiment, taken, &settings, &Silent).unwrap();
+            let score = scanned(&Screen::at(&search.context, search.base()).unwrap()).unwrap();
+            let found_hz = score.start.iter().find(|own| own.0 == Parameter::SupportFrequency).unwrap().1;
+            // an eighth of a cycle at each end of the recording
+            assert!((found_hz - frequency_hz).abs() * LENGTH_S <= 0.26, "{part}: {found_hz} for {frequency_hz}");
+            assert!(score.gain > 0.5 * search.base().chi2, "{part}: {} of {}", score.gain, search.base().chi2);
+        }
+    }
 }
