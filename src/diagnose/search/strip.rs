@@ -58,9 +58,11 @@ impl<'a> Search<'a, '_> {
         self.effects.contains(&Effect::DistributedFlexibility) && self.misfit().is_some_and(|misfit| misfit.unexplained)
     }
 
-    /// Whether another base model does better.
+    /// Whether another base model does better. What leaves only noise is not behind: how much that is of a swing differs between a part of the recordings and the whole.
     pub fn is_behind(&self) -> bool {
-        self.rival_residual.is_some_and(|rival| least(&self.fits).is_none_or(|best| best.relative_residual() > rival))
+        let is_explained = self.misfit().is_some_and(|misfit| !misfit.unexplained);
+        let leaves_more = |rival| least(&self.fits).is_none_or(|best| best.relative_residual() > rival);
+        !is_explained && self.rival_residual.is_some_and(leaves_more)
     }
 
     /// Bending where nothing else explains what is left: from the base model's motion its own may not be found.
