@@ -66,7 +66,7 @@ fn beginning(prepared: &Prepared, x: &[f64], experiment: &Experiment, base: &[Pa
     Ok(parameters.chain(problem.starts_in_shapes(starts, shapes)).collect())
 }
 
-/// The base model's fit, with the noise that it leaves. Where its motion has lost step, more steps only bend its parameters to what it lacks.
+/// The base model's fit, with the noise that it leaves. Where it has gone astray, more steps only bend its parameters to what it lacks.
 ///
 /// # Errors
 /// [`Error::Simulation`] where no motion near the start values follows the recordings.
@@ -79,8 +79,11 @@ pub fn fitted<'a>(context: &FitContext<'a>, prepared: &Prepared) -> Result<Refit
     let ended = beginning(prepared, &prepared.ended, context.experiment, &context.base)?;
     let from = |x: Vec<f64>| {
         let fit = context.descend_from(&nothing, &prepared.noise, x, steps.few_steps)?;
-        let is_at_its_end = fit.converged || fit.has_lost_step(&context.settings.misfit);
-        if is_at_its_end { Some(fit) } else { context.go_on(&fit, steps.most_steps - steps.few_steps) }
+        if fit.converged || is_astray(context, &fit) {
+            Some(fit)
+        } else {
+            context.go_on(&fit, steps.most_steps - steps.few_steps)
+        }
     };
     let (first, other) = rayon::join(|| from(context.begun.clone()), || from(ended));
     let first = context.best_of([first, other]).ok_or_else(refused)?;
@@ -96,11 +99,16 @@ pub fn fitted_near<'a>(context: &FitContext<'a>, near: &Refit<'_>, prepared: &Pr
     found.map_or_else(|| fitted(context, prepared), Ok)
 }
 
+/// Whether its motion has lost step; of a strip, whose steps are dear, whether it leaves much of the swing.
+fn is_astray(context: &FitContext<'_>, fit: &Refit<'_>) -> bool {
+    let misfit = &context.settings.misfit;
+    fit.has_lost_step(misfit) || context.is_strip() && fit.relative_residual() > misfit.much
+}
+
 /// A fit judged by the noise that it leaves.
 fn with_its_noise<'a>(context: &FitContext<'a>, fit: Refit<'a>) -> Option<Refit<'a>> {
     let descent = &context.settings.descent;
-    let has_lost_step = fit.has_lost_step(&context.settings.misfit);
-    let steps = if has_lost_step { descent.first_steps } else { descent.most_steps };
+    let steps = if is_astray(context, &fit) { descent.first_steps } else { descent.most_steps };
     match residual_noise(context, &fit) {
         Some(noise) => context.with_noise(&noise, &fit, steps),
         None => Some(fit),

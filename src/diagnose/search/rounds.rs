@@ -187,20 +187,27 @@ impl<'a> Search<'a, '_> {
                 |effect| Proposal::Along(Hypothesis { effects: vec![effect], dropped: None }, leader, f64::INFINITY);
             return indistinguishable.into_iter().map(along).collect();
         }
-        let promised = |effect: Effect| self.scores.iter().find(|s| s.effect == effect).map_or(0.0, |s| s.gain);
-        indistinguishable.retain(|effect| promised(*effect) > settings.misfit.counts);
-        indistinguishable.sort_by(|a, b| promised(*b).total_cmp(&promised(*a)));
+        indistinguishable.retain(|effect| self.promised(*effect) > settings.misfit.counts);
+        indistinguishable.sort_by(|a, b| self.promised(*b).total_cmp(&self.promised(*a)));
         indistinguishable.truncate(settings.search.tried);
         self.beside_base(self.lacking(), |effect| indistinguishable.contains(&effect))
     }
 
+    /// Effects of some kind beside the base model, those first that promise most: the budget may end before the others.
     fn beside_base(&self, misfit: Misfit, is_of_kind: impl Fn(Effect) -> bool) -> Vec<Proposal<'_, 'a>> {
         if let Some(FrequencyMatched { base, scores }) = &self.frequency_matched {
             let of_kind = scores.iter().filter(|score| is_of_kind(score.effect));
             return of_kind.map(|score| Proposal::Scored(base, score.clone())).collect();
         }
-        let of_kind = self.effects.iter().copied().filter(|effect| is_of_kind(*effect));
-        of_kind.map(|effect| Proposal::Beside(Beside::of(self.base(), misfit, effect, &self.scores))).collect()
+        let mut of_kind: Vec<Effect> = self.effects.iter().copied().filter(|effect| is_of_kind(*effect)).collect();
+        of_kind.sort_by(|a, b| self.promised(*b).total_cmp(&self.promised(*a)));
+        let beside = |effect| Proposal::Beside(Beside::of(self.base(), misfit, effect, &self.scores));
+        of_kind.into_iter().map(beside).collect()
+    }
+
+    /// By how much an effect promises to lower the base model's χ².
+    fn promised(&self, effect: Effect) -> f64 {
+        self.scores.iter().find(|score| score.effect == effect).map_or(0.0, |score| score.gain)
     }
 
     fn begun_at_the_leader(&self) -> Vec<Proposal<'_, 'a>> {
