@@ -136,7 +136,7 @@ pub fn diagnose(
     let (posterior, held_out) = heldout::reorder_by_inclusion(&context, posterior, held_out, options.predict_from_s);
     // 9. the base model by itself, and the verdict
     let adequacy = adequacy::adequacy(&context, posterior.base(), &effects, options.bootstraps, progress);
-    let verdict = verdict::Verdict::of(&posterior, context.marks(), held_out.as_ref(), settings);
+    let verdict = verdict::Verdict::of(&posterior, context.marks(), held_out.as_ref(), learnt.as_ref(), settings);
     // 10. where, when and how
     let unknown_at = verdict.is_open().then(|| locate::place_of_unknown(&posterior, settings)).flatten();
     let findings = Findings {

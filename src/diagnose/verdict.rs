@@ -2,6 +2,7 @@
 
 use super::effect::Effect;
 use super::heldout::HeldOut;
+use super::learnt::Learnt;
 use super::posterior::{Candidate, Posterior, left_of_excess};
 use super::settings::Settings;
 
@@ -58,8 +59,14 @@ pub struct Verdict {
 }
 
 impl Verdict {
-    /// From the probabilities, and the proof of the likeliest.
-    pub fn of(posterior: &Posterior<'_>, marks: usize, proof: Option<&HeldOut>, settings: &Settings) -> Self {
+    /// From the probabilities, the proof of the likeliest, and the law that was learnt beside it.
+    pub fn of(
+        posterior: &Posterior<'_>,
+        marks: usize,
+        proof: Option<&HeldOut>,
+        learnt: Option<&Learnt<'_>>,
+        settings: &Settings,
+    ) -> Self {
         let Posterior { candidates: weighed, unknown, .. } = posterior;
         let unknown = *unknown;
         let adequate: f64 = weighed.iter().filter(|w| w.fit.hypothesis.effects.is_empty()).map(|w| w.probability).sum();
@@ -79,7 +86,12 @@ impl Verdict {
             // predict what was not fitted
             let best = posterior.best();
             let leaves_little = left_of_excess(best, posterior.base()) < settings.prior.imitated_down_to;
-            let predicts = proof.is_some_and(|proof| proof.leaves() <= settings.verdict.proven);
+            // friction that fades with speed is friction, and predicts with its own law
+            let of_law = |proof: &HeldOut| {
+                let of_names = learnt.filter(|learnt| learnt.holds(&best.hypothesis.effects));
+                of_names.map_or(f64::INFINITY, |learnt| learnt.prediction.over(&proof.baseline))
+            };
+            let predicts = proof.is_some_and(|proof| proof.leaves().min(of_law(proof)) <= settings.verdict.proven);
             let inclusions = posterior.inclusions(settings);
             let is_likely = inclusions.iter().any(|own| own.1 > settings.verdict.even);
             let stand = is_likely && replaced(posterior, settings).is_none() && (leaves_little || predicts);

@@ -28,6 +28,13 @@ pub struct Learnt<'a> {
 }
 
 impl Learnt<'_> {
+    /// Whether it only gives some names another law: each of them stands beside it, or is what one of its terms nearly is.
+    pub fn holds(&self, names: &[Effect]) -> bool {
+        let is_held =
+            |name: &Effect| self.fit.hypothesis.has(*name) || self.stand_for.iter().flatten().any(|e| e == name);
+        names.iter().all(is_held)
+    }
+
     /// Where its first term acts.
     pub fn place(&self) -> Option<Place> {
         self.terms.first().map(|term| place_of(term.law.place))
