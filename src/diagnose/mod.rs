@@ -54,6 +54,8 @@ pub mod search;
 pub mod settings;
 pub mod statements;
 pub mod stretches;
+#[cfg(test)]
+mod testing;
 pub mod torque;
 pub mod verdict;
 

@@ -348,10 +348,9 @@ impl<'a> Posterior<'a> {
     }
 
     /// How probable an effect is, over all sets of names that hold it, whatever remains beside them: as the fits of the table say, or, where laws were
-    /// sought, all descriptions.
-    fn inclusion(&self, effect: Effect, settings: &Settings) -> f64 {
+    /// sought, all descriptions. `is_untried` says that the names may stand for a law.
+    fn inclusion(&self, effect: Effect, is_untried: bool, settings: &Settings) -> f64 {
         let others = self.fits();
-        let is_untried = self.may_stand_for_a_law(settings);
         let not_imitated = |fit: &Refit<'_>| {
             let explaining = self.by_contribution(fit);
             let compared = self.compared.of(&fit.hypothesis.effects);
@@ -370,7 +369,8 @@ impl<'a> Posterior<'a> {
 
     /// How probable each effect of the table is.
     pub fn inclusions(&self, settings: &Settings) -> Vec<(Effect, f64)> {
-        Effect::ALL.into_iter().map(|effect| (effect, self.inclusion(effect, settings))).collect()
+        let is_untried = self.may_stand_for_a_law(settings);
+        Effect::ALL.into_iter().map(|effect| (effect, self.inclusion(effect, is_untried, settings))).collect()
     }
 
     /// A fit's effects, the one that explains most first: without which it would be worst.
@@ -387,26 +387,19 @@ impl<'a> Posterior<'a> {
 
 #[cfg(test)]
 mod tests {
-    use std::path::Path;
-
     use super::*;
     use crate::diagnose::base_priors::DampingAssumption;
     use crate::diagnose::hypothesis::Hypothesis;
     use crate::diagnose::preparation;
     use crate::diagnose::search::Search;
-    use crate::experiment::Experiment;
-    use crate::model::{ForwardModel, State, Trajectory};
+    use crate::diagnose::testing::{arm, swing};
     use crate::progress::Silent;
 
     #[test]
     fn a_clock_and_a_scale_that_were_held_against_no_law_are_less_probable_where_something_remains() {
-        let text = "[[specimen.links]]\nlength_m = 0.3\nmass_kg = 0.1\ncom_m = 0.2\ninertia_kg_m2 = 1e-3\n\
-                    [model]\nrelease_rad = [0.5]\n[model.effects]\nhinge_viscous = 2e-5\n";
-        let experiment = Experiment::parse(text, Path::new("arm")).unwrap();
-        let model = ForwardModel::of(&experiment).unwrap();
-        let swing = Trajectory::swing(&model, &State::released(&model, &[0.5]).unwrap(), 0.0, 10.0).unwrap();
-        let t_s: Vec<f64> = (0..300).map(|row| f64::from(row) / 30.0).collect();
-        let angles = t_s.iter().map(|t| Some(swing.at(*t).theta_rad[0])).collect();
+        let experiment = arm("hinge_viscous = 2e-5\n");
+        let (t_s, theta_rad) = swing(&experiment, 10.0, 30.0);
+        let angles = theta_rad.into_iter().map(Some).collect();
         let record = Record::uniform("made", t_s, vec![angles]);
         let settings = Settings::default();
         let prepared = preparation::prepare(&[record], &experiment, &settings).unwrap();
@@ -433,7 +426,8 @@ mod tests {
                 compared: Compared { of_any: 2, ..Compared::default() },
                 needed: Vec::new(),
             };
-            posterior.inclusion(Effect::TimeBase, &settings)
+            let inclusions = posterior.inclusions(&settings);
+            inclusions.into_iter().find(|own| own.0 == Effect::TimeBase).unwrap().1
         };
         let both = [Effect::TimeBase, Effect::AngleGain];
         assert!((inclusion(&both, 1.0) / inclusion(&both, 0.0) - settings.prior.not_compared).abs() < 1e-9);

@@ -225,40 +225,30 @@ fn chord_powers(fit: &Refit<'_>) -> Vec<Vec<Power>> {
 
 #[cfg(test)]
 mod tests {
-    use std::path::Path;
-
     use super::*;
     use crate::diagnose::base_priors::DampingAssumption;
     use crate::diagnose::preparation;
     use crate::diagnose::search::Search;
-    use crate::experiment::Experiment;
+    use crate::diagnose::testing::{arm, swing};
     use crate::fit::Record;
-    use crate::model::{ForwardModel, State, Trajectory};
     use crate::progress::Silent;
 
     const LENGTH_S: f64 = 40.0;
 
-    fn arm(effects: &str) -> Experiment {
-        let text = format!(
-            "[[specimen.links]]\nlength_m = 0.3\nmass_kg = 0.1\ncom_m = 0.2\ninertia_kg_m2 = 1e-3\n\
-             [model]\nrelease_rad = [0.5]\n[model.effects]\nhinge_viscous = 2e-4\n{effects}"
-        );
-        Experiment::parse(&text, Path::new("arm")).unwrap()
-    }
+    const DAMPED: &str = "hinge_viscous = 2e-4\n";
 
     #[test]
     fn a_support_is_found_wherever_its_frequency_stands_among_those_looked_at() {
         let settings = Settings::default();
         for part in [0.0, 0.3, 0.5, 0.7] {
             let frequency_hz = (78.0 + part) / LENGTH_S;
-            let moving =
-                format!("support_motion = {{ amplitude_m = 2e-3, frequency_hz = {frequency_hz}, phase_rad = 1.0 }}\n");
-            let model = ForwardModel::of(&arm(&moving)).unwrap();
-            let swing = Trajectory::swing(&model, &State::released(&model, &[0.5]).unwrap(), 0.0, LENGTH_S).unwrap();
-            let t_s: Vec<f64> = (0..(25.0 * LENGTH_S) as usize).map(|row| row as f64 / 25.0).collect();
-            let angles = t_s.iter().map(|t| Some(swing.at(*t).theta_rad[0])).collect();
+            let moving = format!(
+                "{DAMPED}support_motion = {{ amplitude_m = 2e-3, frequency_hz = {frequency_hz}, phase_rad = 1.0 }}\n"
+            );
+            let (t_s, theta_rad) = swing(&arm(&moving), LENGTH_S, 25.0);
+            let angles = theta_rad.into_iter().map(Some).collect();
             let record = Record::uniform("made", t_s, vec![angles]);
-            let prepared = preparation::prepare(&[record], &arm(""), &settings).unwrap();
+            let prepared = preparation::prepare(&[record], &arm(DAMPED), &settings).unwrap();
             let taken = DampingAssumption::AsStated;
             let search = Search::of_base_model(&prepared, &prepared.experiment, taken, &settings, &Silent).unwrap();
             let score = scanned(&Screen::at(&search.context, search.base()).unwrap()).unwrap();

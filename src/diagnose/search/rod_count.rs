@@ -111,7 +111,7 @@ impl<'a> Search<'a, '_> {
         }
     }
 
-    /// Whether the single effects ask for another number of rods.
+    /// Whether the fits that there are ask for another number of rods.
     pub(super) fn prefers_other_rod_count(&mut self) -> bool {
         self.rods.preferred = rods::preferred_rod_count(&self.context, &self.fits, rods::ComparedFits::Best);
         self.rods.asked_of = self.leader();

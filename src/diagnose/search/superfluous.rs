@@ -58,8 +58,6 @@ impl<'a> Search<'a, '_> {
 
 #[cfg(test)]
 mod tests {
-    use std::path::Path;
-
     use rand::SeedableRng;
     use rand::rngs::StdRng;
     use rand_distr::{Distribution, Normal};
@@ -67,30 +65,22 @@ mod tests {
     use super::*;
     use crate::diagnose::base_priors::DampingAssumption;
     use crate::diagnose::effect::Effect;
+    use crate::diagnose::testing::{arm, swing};
     use crate::diagnose::{Settings, preparation};
-    use crate::experiment::Experiment;
     use crate::fit::Record;
-    use crate::model::{ForwardModel, Parameter, State, Trajectory};
+    use crate::model::Parameter;
     use crate::progress::Silent;
 
-    fn arm(effects: &str) -> Experiment {
-        let text = format!(
-            "[[specimen.links]]\nlength_m = 0.3\nmass_kg = 0.1\ncom_m = 0.2\ninertia_kg_m2 = 1e-3\n\
-             [model]\nrelease_rad = [0.5]\n[model.effects]\nhinge_viscous = 2e-5\n{effects}"
-        );
-        Experiment::parse(&text, Path::new("arm")).unwrap()
-    }
+    const DAMPED: &str = "hinge_viscous = 2e-5\n";
 
     #[test]
     fn a_pair_of_which_one_is_nothing_leads_to_the_other_alone() {
-        let model = ForwardModel::of(&arm("hinge_coulomb = 2e-4\n")).unwrap();
-        let swing = Trajectory::swing(&model, &State::released(&model, &[0.5]).unwrap(), 0.0, 15.0).unwrap();
-        let t_s: Vec<f64> = (0..450).map(|row| f64::from(row) / 30.0).collect();
+        let (t_s, theta_rad) = swing(&arm(&format!("{DAMPED}hinge_coulomb = 2e-4\n")), 15.0, 30.0);
         let (mut random, noise) = (StdRng::seed_from_u64(2), Normal::new(0.0, 1e-3).unwrap());
-        let angles = t_s.iter().map(|t| Some(swing.at(*t).theta_rad[0] + noise.sample(&mut random))).collect();
+        let angles = theta_rad.iter().map(|theta| Some(theta + noise.sample(&mut random))).collect();
         let record = Record::uniform("made", t_s, vec![angles]);
         let settings = Settings::default();
-        let prepared = preparation::prepare(&[record], &arm(""), &settings).unwrap();
+        let prepared = preparation::prepare(&[record], &arm(DAMPED), &settings).unwrap();
         let taken = DampingAssumption::AsStated;
         let mut search = Search::of_base_model(&prepared, &prepared.experiment, taken, &settings, &Silent).unwrap();
         let pair = Hypothesis::default().and(Effect::HingeCoulomb, None).and(Effect::CameraTilt, None);
