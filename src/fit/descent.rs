@@ -53,6 +53,16 @@ impl Default for Descent {
     }
 }
 
+/// Residuals beyond this many standard deviations count linearly where outliers are expected (judgement: of normal noise one value in 16 000).
+const OUTLIER: f64 = 4.0;
+
+impl Descent {
+    /// With outliers bounded by Huber's weights.
+    pub fn robust(most_steps: usize, enough: f64) -> Self {
+        Self { huber: OUTLIER, most_steps, enough, ..Self::default() }
+    }
+}
+
 /// How it ended.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Ending {

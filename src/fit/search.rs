@@ -135,7 +135,7 @@ impl<'a> Search<'a, '_> {
         problem.integrate_below_the_noise();
         let within = problem.accuracy_of(problem.longest_s(), problem.accuracy.step_error_rad);
         problem.accuracy = within;
-        let robust = Descent { huber: 4.0, most_steps: 30, enough: 0.03, ..Descent::default() };
+        let robust = Descent::robust(30, 0.03);
         // stretches that a model cannot follow may lead astray from values that were near
         let stated = [problem.start_values()?, shot.x[self.free.len()..].to_vec()].concat();
         let from_stretches = descend(&problem, &robust, shot.x.clone());
@@ -207,10 +207,10 @@ impl<'a> Search<'a, '_> {
             let rows = |record: &Record| ((part * record.len() as f64) as usize).max(FEWEST_ROWS).min(record.len());
             let early: Vec<Record> = self.records.iter().map(|record| record.until(rows(record))).collect();
             let problem = Problem { records: &early, ..end.problem.clone() };
-            let robust = Descent { huber: 4.0, most_steps: 20, enough: 0.1, ..Descent::default() };
+            let robust = Descent::robust(20, 0.1);
             x = transformed::descend(&problem, &robust, x)?.x;
         }
-        let robust = Descent { huber: 4.0, most_steps: 30, enough: 0.03, ..Descent::default() };
+        let robust = Descent::robust(30, 0.03);
         let outcome = descend(&end.problem, &robust, x)?;
         Some(End { outcome, ..end.clone() })
     }
@@ -237,7 +237,7 @@ impl<'a> Search<'a, '_> {
                 *value = free.iter().position(|p| p == parameter).map_or(*value, |place| end.outcome.x[place]);
             }
             x.extend_from_slice(&end.outcome.x[free.len()..]);
-            let robust = Descent { huber: 4.0, most_steps: 30, enough: 0.03, damping: 1e-8, ..Descent::default() };
+            let robust = Descent { damping: 1e-8, ..Descent::robust(30, 0.03) };
             let outcome = descend(&problem, &robust, x.clone());
             let shot = ShootingResult { x, ..end.shot.clone() };
             ends.extend(outcome.map(|outcome| End { problem, outcome, shot, begun: tried }));

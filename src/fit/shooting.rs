@@ -132,7 +132,7 @@ fn close_defects(
     problem.accuracy = problem.accuracy_of(longest_s, 3e-6);
     let mut left_by_stretches = Vec::new();
     for (round, seam) in DEFECT_SDS.iter().enumerate() {
-        let descent = Descent { huber: 4.0, most_steps: STEPS_EACH, enough: 0.3, ..Descent::default() };
+        let descent = Descent::robust(STEPS_EACH, 0.3);
         let Some(outcome) =
             descent.run(x.clone(), &lower, |x| blocks(problem, stretches, x, *seam, characteristic_rad_s))
         else {

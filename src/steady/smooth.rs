@@ -1,6 +1,6 @@
 //! A picture without its noise, for choosing what of it can be found again.
 
-use super::{HALF, Luma};
+use super::luma::{HALF, Luma};
 
 /// Half the side of the square over which the picture is smoothed for its gradients, and half the distance between
 /// the two means that make one, px: farther than the noise of one pixel reaches.

@@ -12,107 +12,31 @@
 //! H_k is how well a patch shows a shift in each direction: a faint one, of which a codec keeps less than a strong one, hardly counts, nor does an edge along its own
 //! length. Interpolation and parallax give each patch an error of its own, too, here as large as that of the middle one's noise.
 
+mod camera_shift;
+mod luma;
+mod patch;
 mod smooth;
 
 use nalgebra::{Matrix2, Matrix2x3, Matrix3, Vector2, Vector3};
 
+pub use camera_shift::CameraShift;
+
 use crate::statistics::median;
 use crate::video::Picture;
-use smooth::Smooth;
+use luma::Luma;
+use patch::Patch;
 
-/// Half the side of a patch.
-const HALF: i64 = crate::area::PATCH_HALF_PX as i64;
-/// Farthest that a patch is sought, px.
-const REACH_PX: i64 = 21;
-/// Columns and rows of cells, each with one patch.
-const CELLS: [usize; 2] = [8, 6];
-/// Mean square of the weaker gradient of the smoothed picture, codes²/px², below which a patch is too plain to be found
-/// again: with noise of one code in its 961 pixels, of which four share an error, the patch is found to 0.2 px
-/// (σ² / (n g²)), and six of them to 0.08 px. Noise alone has a fiftieth of it.
-const LEAST_GRADIENT: f64 = 0.1;
 /// Fewest patches of the background that must agree, and as a share of those that are found again.
 const FEWEST_AGREEING: usize = 6;
 const AGREEING_SHARE: f64 = 0.5;
 /// Share of the picture's width that they span, at least: what swings is a smaller thing.
 const LEAST_SPAN: f64 = 0.4;
-/// Share of a patch's own variance that its difference from the picture has at most, where it is found again.
-const MOST_DIFFERENCE: f64 = 0.5;
 /// First shifts within which two patches say the same, px.
 const SAME_PX: f64 = 3.5;
 /// Residual within which a patch agrees, px, at least.
 const AGREEMENT_PX: f64 = 0.25;
 /// Fewer patches do not tell a turn from a shift.
 const FEWEST_TURNING: usize = 4;
-
-/// Where the camera looks in one picture, against the reference picture.
-#[derive(Debug, Clone, Copy, Default, PartialEq)]
-pub struct CameraShift {
-    /// What lay at p lies at p + shift, at the centre of the picture.
-    pub shift_px: [f64; 2],
-    /// Turn about the centre.
-    pub turn_rad: f64,
-    /// Centre of the picture.
-    pub centre_px: [f64; 2],
-    /// Covariance of shift (px) and turn (rad), from how far the patches disagree.
-    covariance: Matrix3<f64>,
-    /// Patches that agree.
-    pub patches: usize,
-}
-
-impl CameraShift {
-    fn at(&self, p: [f64; 2]) -> [f64; 2] {
-        let [x, y] = [p[0] - self.centre_px[0], p[1] - self.centre_px[1]];
-        [self.shift_px[0] - self.turn_rad * y, self.shift_px[1] + self.turn_rad * x]
-    }
-
-    /// Where a point of the reference picture lies in this one.
-    pub fn apply(&self, p: [f64; 2]) -> [f64; 2] {
-        let shift = self.at(p);
-        [p[0] + shift[0], p[1] + shift[1]]
-    }
-
-    /// Where a point of this picture lies in the reference picture.
-    pub fn undo(&self, p: [f64; 2]) -> [f64; 2] {
-        let shift = self.at(p);
-        [p[0] - shift[0], p[1] - shift[1]]
-    }
-
-    /// Length of the shift.
-    pub fn size_px(&self) -> f64 {
-        self.shift_px[0].hypot(self.shift_px[1])
-    }
-
-    /// Standard deviation of the shift of the picture's centre, the mean of both directions.
-    pub fn sd_px(&self) -> f64 {
-        (0.5 * (self.covariance[(0, 0)] + self.covariance[(1, 1)])).sqrt()
-    }
-
-    /// Variances along x and y, and covariance, of the shift of a point (px²).
-    pub fn variance_px2(&self, p: [f64; 2]) -> [f64; 3] {
-        let [x, y] = [p[0] - self.centre_px[0], p[1] - self.centre_px[1]];
-        let (along_x, along_y) = (Vector3::new(1.0, 0.0, -y), Vector3::new(0.0, 1.0, x));
-        let of = |a: &Vector3<f64>, b: &Vector3<f64>| (a.transpose() * self.covariance * b)[0];
-        [of(&along_x, &along_x), of(&along_y, &along_y), of(&along_x, &along_y)]
-    }
-}
-
-/// A piece of the reference picture.
-#[derive(Debug, Clone)]
-struct Patch {
-    x: i64,
-    y: i64,
-    /// Luma less its mean, and its gradients, row by row.
-    values: Vec<f32>,
-    gradients: Vec<[f32; 2]>,
-    /// Σ ∇ ∇ᵀ, which says how well it shows a shift.
-    information: Matrix2<f64>,
-    /// Its inverse.
-    inverse: Matrix2<f64>,
-    /// Mean square of the weaker gradient.
-    strength: f64,
-    /// Σ of the squares of the values.
-    squares: f64,
-}
 
 /// What stands still.
 #[derive(Debug, Clone)]
@@ -128,14 +52,7 @@ impl Background {
     pub fn of(picture: &Picture<'_>, points_px: &[[f64; 2]]) -> Self {
         let luma = Luma::of(picture);
         let centre_px = [0.5 * luma.width as f64, 0.5 * luma.height as f64];
-        let patches = if points_px.is_empty() {
-            corners(&luma)
-        } else {
-            let smooth = Smooth::of(&luma);
-            let places = points_px.iter().map(|p| (p[0].round() as i64, p[1].round() as i64));
-            let clear = places.filter(|(x, y)| smooth.weaker_gradient(&luma, *x, *y) > LEAST_GRADIENT);
-            clear.filter_map(|(x, y)| Patch::at(&luma, x, y)).collect()
-        };
+        let patches = if points_px.is_empty() { patch::clearest(&luma) } else { patch::about(points_px, &luma) };
         Self { patches, centre_px, named: !points_px.is_empty() }
     }
 
@@ -273,168 +190,6 @@ fn weights(kept: &[&Found<'_>]) -> Vec<Matrix2<f64>> {
     let usual = median(&mut kept.iter().map(|f| 0.5 * f.patch.information.trace()).collect::<Vec<_>>()).unwrap_or(1.0);
     let weight = |found: &&Found<'_>| (usual * found.patch.inverse + Matrix2::identity()).try_inverse();
     kept.iter().map(|found| weight(found).unwrap_or_default()).collect()
-}
-
-/// The best patch of every cell, the clearest first.
-fn corners(luma: &Luma<'_>) -> Vec<Patch> {
-    let smooth = Smooth::of(luma);
-    let mut patches = Vec::new();
-    let margin = HALF + REACH_PX / 2;
-    for row in 0..CELLS[1] {
-        for column in 0..CELLS[0] {
-            let range = |cell: usize, cells: usize, size: usize| {
-                let at = |c: usize| (c * size / cells) as i64;
-                (at(cell).max(margin)..at(cell + 1).min(size as i64 - margin)).step_by(9)
-            };
-            let places = range(row, CELLS[1], luma.height)
-                .flat_map(|y| range(column, CELLS[0], luma.width).map(move |x| (x, y)));
-            let clearest = places
-                .map(|(x, y)| (smooth.weaker_gradient(luma, x, y), (x, y)))
-                .max_by(|a, b| a.0.total_cmp(&b.0).then_with(|| [b.1.1, b.1.0].cmp(&[a.1.1, a.1.0])));
-            let clear = clearest.filter(|(gradient, _)| *gradient > LEAST_GRADIENT);
-            patches.extend(clear.and_then(|(_, (x, y))| Patch::at(luma, x, y)));
-        }
-    }
-    patches.sort_by(|a, b| b.strength.total_cmp(&a.strength));
-    patches
-}
-
-impl Patch {
-    fn at(luma: &Luma<'_>, x: i64, y: i64) -> Option<Self> {
-        if !luma.holds(x, y) {
-            return None;
-        }
-        let side = (2 * HALF + 1) as usize;
-        let mut values = Vec::with_capacity(side * side);
-        let mut gradients = Vec::with_capacity(side * side);
-        let mut sums = [0.0f64; 3];
-        for j in y - HALF..=y + HALF {
-            for i in x - HALF..=x + HALF {
-                values.push(luma.code(i, j));
-                let gradient = [
-                    0.5 * (luma.code(i + 1, j) - luma.code(i - 1, j)),
-                    0.5 * (luma.code(i, j + 1) - luma.code(i, j - 1)),
-                ];
-                let [gx, gy] = gradient.map(f64::from);
-                sums.iter_mut().zip([gx * gx, gx * gy, gy * gy]).for_each(|(sum, term)| *sum += term);
-                gradients.push(gradient);
-            }
-        }
-        let mean = values.iter().sum::<f32>() / values.len() as f32;
-        values.iter_mut().for_each(|v| *v -= mean);
-        let [xx, xy, yy] = sums;
-        let information = Matrix2::new(xx, xy, xy, yy);
-        let weaker = 0.5 * (xx + yy) - (0.25 * (xx - yy).powi(2) + xy * xy).sqrt();
-        Some(Self {
-            x,
-            y,
-            inverse: information.try_inverse()?,
-            information,
-            strength: weaker / values.len() as f64,
-            squares: values.iter().map(|v| f64::from(*v).powi(2)).sum(),
-            values,
-            gradients,
-        })
-    }
-
-    /// The shift with the least difference, to two pixels, every fourth pixel compared: near enough to go on from.
-    fn search(&self, luma: &Luma<'_>) -> Option<[f64; 2]> {
-        let mut best: Option<(f32, [i64; 2])> = None;
-        let side = 2 * HALF + 1;
-        let mut consider = |dx: i64, dy: i64| {
-            if !luma.holds(self.x + dx, self.y + dy) {
-                return;
-            }
-            let (mut sum, mut squares, mut count) = (0.0f32, 0.0f32, 0.0f32);
-            for j in (1..side).step_by(4) {
-                for i in (1..side).step_by(4) {
-                    let value = luma.code(self.x + dx + i - HALF, self.y + dy + j - HALF);
-                    let difference = value - self.values[(j * side + i) as usize];
-                    (sum, squares, count) = (sum + difference, squares + difference * difference, count + 1.0);
-                }
-            }
-            let variance = squares / count - (sum / count).powi(2);
-            if best.is_none_or(|(least, _)| variance < least) {
-                best = Some((variance, [dx, dy]));
-            }
-        };
-        for dy in (-REACH_PX..=REACH_PX).step_by(3) {
-            for dx in (-REACH_PX..=REACH_PX).step_by(3) {
-                consider(dx, dy);
-            }
-        }
-        best.map(|(_, shift)| shift.map(|s| s as f64))
-    }
-
-    /// The shift to a fraction of a pixel, from a first one.
-    fn find(&self, luma: &Luma<'_>, start: [f64; 2]) -> Option<[f64; 2]> {
-        let mut shift = start;
-        let mut values = Vec::with_capacity(self.values.len());
-        for _ in 0..20 {
-            luma.read(self.x as f64 + shift[0], self.y as f64 + shift[1], &mut values)?;
-            let mean = values.iter().sum::<f32>() / values.len() as f32;
-            let (mut push, mut rest) = ([0.0f64; 2], 0.0);
-            for ((value, own), gradient) in values.iter().zip(&self.values).zip(&self.gradients) {
-                let difference = f64::from(value - mean - own);
-                push[0] += f64::from(gradient[0]) * difference;
-                push[1] += f64::from(gradient[1]) * difference;
-                rest += difference * difference;
-            }
-            let step: [f64; 2] = (self.inverse * Vector2::from(push)).into();
-            (0..2).for_each(|axis| shift[axis] -= step[axis].clamp(-2.0, 2.0));
-            if (shift[0] - start[0]).hypot(shift[1] - start[1]) > 6.0 {
-                return None;
-            }
-            if step[0].hypot(step[1]) < 3e-3 {
-                return (rest < MOST_DIFFERENCE * self.squares).then_some(shift);
-            }
-        }
-        None
-    }
-}
-
-/// The luma of a picture as 8-bit codes.
-struct Luma<'a> {
-    picture: &'a Picture<'a>,
-    width: usize,
-    height: usize,
-    scale: f32,
-}
-
-impl<'a> Luma<'a> {
-    fn of(picture: &'a Picture<'a>) -> Self {
-        let layout = picture.layout;
-        let scale = 1.0 / f32::from(1u16 << (layout.bits - 8)) / f32::from(1u16 << layout.low_bits);
-        Self { picture, width: layout.width_px, height: layout.height_px, scale }
-    }
-
-    #[inline]
-    fn code(&self, x: i64, y: i64) -> f32 {
-        f32::from(self.picture.luma.code(self.picture.wide(), x as usize, y as usize)) * self.scale
-    }
-
-    /// A patch about this pixel lies inside.
-    fn holds(&self, x: i64, y: i64) -> bool {
-        x > HALF && y > HALF && x + HALF + 2 < self.width as i64 && y + HALF + 2 < self.height as i64
-    }
-
-    /// The patch about a point between pixels.
-    fn read(&self, x: f64, y: f64, values: &mut Vec<f32>) -> Option<()> {
-        let (i, j) = (x.floor() as i64, y.floor() as i64);
-        if !self.holds(i, j) {
-            return None;
-        }
-        let (s, t) = ((x - i as f64) as f32, (y - j as f64) as f32);
-        values.clear();
-        for b in j - HALF..=j + HALF {
-            for a in i - HALF..=i + HALF {
-                let upper = self.code(a, b) + s * (self.code(a + 1, b) - self.code(a, b));
-                let lower = self.code(a, b + 1) + s * (self.code(a + 1, b + 1) - self.code(a, b + 1));
-                values.push(upper + t * (lower - upper));
-            }
-        }
-        Some(())
-    }
 }
 
 #[cfg(test)]
