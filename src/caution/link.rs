@@ -47,19 +47,24 @@ pub(super) fn link_length(m: &Measurement, options: &Options, link: usize, first
     let mut off: Vec<f64> = lengths.iter().map(|l| (l - usual).abs()).collect();
     let spread = 1.4826 * median(&mut off)?;
     let expected = (spans.iter().map(|s| s[2]).sum::<f64>() / spans.len() as f64).sqrt();
-    if spread <= MOST_LENGTH_SPREAD * usual || spread <= LENGTH_SCATTERS * expected {
+    if spread <= LENGTH_SCATTERS * expected {
         return None;
     }
     let number = link + 1;
-    let per_cent = 100.0 * spread / usual;
-    if is_ellipse(&spans) {
-        let [short, long] =
-            [lengths.iter().copied().fold(f64::INFINITY, f64::min), lengths.iter().copied().fold(0.0, f64::max)];
+    let [short, long] =
+        [lengths.iter().copied().fold(f64::INFINITY, f64::min), lengths.iter().copied().fold(0.0, f64::max)];
+    // an ellipse is known by how the length goes with the swing
+    if is_ellipse(&spans) && long - short > MOST_LENGTH_SPREAD * usual {
         return Some(format!(
-            "link {number} looks longer the farther it swings, by {per_cent:.1} % of its {usual:.0} px: it swings out of the plane of the picture as well, by up to {:.0}°, in an ellipse; its frequency and damping are those of both swings together; release it without a push to the side, or hang it on two strings",
+            "link {number} looks longer the farther it swings, by up to {:.1} % of its {usual:.0} px: it swings out of the plane of the picture as well, by up to {:.0}°, in an ellipse; its frequency and damping are those of both swings together; release it without a push to the side, or hang it on two strings",
+            100.0 * (long - short) / usual,
             (short / long).acos().to_degrees()
         ));
     }
+    if spread <= MOST_LENGTH_SPREAD * usual {
+        return None;
+    }
+    let per_cent = 100.0 * spread / usual;
     if let Some(squeeze) = squeeze(&spans).filter(|s| *s < 1.0 - LEAST_SQUEEZE) {
         let aspect = options.rig.pixel_aspect.unwrap_or(m.stream.pixel_aspect) / squeeze;
         let turn_deg = squeeze.acos().to_degrees();

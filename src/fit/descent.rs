@@ -53,6 +53,10 @@ impl Default for Descent {
     }
 }
 
+/// So many variances lie between a least and one standard deviation of one variable from it: what promises less is there (statistics).
+const WITHIN_ONE_SD: f64 = 1.0;
+/// Damping that only keeps what the residuals say nothing of where it is (numerics).
+const UNDAMPED: f64 = 1e-8;
 /// Residuals beyond this many standard deviations count linearly where outliers are expected (judgement: of normal noise one value in 16 000).
 const OUTLIER: f64 = 4.0;
 
@@ -66,7 +70,7 @@ impl Descent {
 /// How it ended.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Ending {
-    /// No step promises anything more.
+    /// No step, however long, promises anything more.
     Converged,
     /// After the most steps.
     StepLimit,
@@ -106,6 +110,13 @@ struct Normals {
     gradient: DVector<f64>,
 }
 
+impl Normals {
+    /// By how much a step lowers the cost in linear approximation.
+    fn promised(&self, step: &DVector<f64>) -> f64 {
+        -2.0 * self.gradient.dot(step) - step.dot(&(&self.matrix * step))
+    }
+}
+
 impl Descent {
     /// Descends from `x`. `evaluate` gives the blocks at a place, or `None` where there are none. `lower` holds a bound each variable.
     ///
@@ -136,10 +147,11 @@ impl Descent {
             };
             let moved: Vec<f64> =
                 x.iter().zip(taken.iter()).zip(lower).map(|((x, s), low)| (x + s).max(*low)).collect();
-            let promised = -2.0 * normals.gradient.dot(&taken) - taken.dot(&(&normals.matrix * &taken));
+            let promised = normals.promised(&taken);
             let mean_square = normals.cost / blocks.iter().map(|b| b.residual.len()).sum::<usize>().max(1) as f64;
             if !(promised > self.enough * mean_square) {
-                ending = Ending::Converged;
+                ending =
+                    if self.is_at_least(&normals, &x, lower, mean_square) { Ending::Converged } else { Ending::Stuck };
                 break;
             }
             let trial = evaluate(&moved).map(|blocks| (self.normals(&blocks, x.len()), blocks));
@@ -189,6 +201,12 @@ impl Descent {
             }
         }
         normals
+    }
+
+    /// Whether a step without further damping promises next to nothing, too: a short one does everywhere.
+    fn is_at_least(&self, normals: &Normals, x: &[f64], lower: &[f64], mean_square: f64) -> bool {
+        let full = self.step_within(normals, x, lower, UNDAMPED);
+        full.is_some_and(|step| normals.promised(&step) <= self.enough.max(WITHIN_ONE_SD) * mean_square)
     }
 
     /// The damped step that stays within the bounds: variables that would cross theirs stop there, and the others follow.
@@ -251,6 +269,22 @@ mod tests {
         let settings = Descent { enough: 1e-12, ..Descent::default() };
         let outcome = settings.run(vec![-1.2, 1.0], &[f64::NEG_INFINITY; 2], valley).unwrap();
         assert!((outcome.x[0] - 1.0).abs() < 1e-6 && (outcome.x[1] - 1.0).abs() < 1e-6, "{outcome:?}");
+    }
+
+    #[test]
+    fn a_descent_that_creeps_along_a_bent_valley_has_not_converged() {
+        let steep = |x: &[f64]| {
+            let mut blocks = valley(x)?;
+            blocks[0].residual[0] *= 1e3;
+            blocks[0].slopes.row_mut(0).scale_mut(1e3);
+            Some(blocks)
+        };
+        let coarse = Descent { enough: 0.02, damping: 1e-8, ..Descent::default() };
+        let outcome = coarse.run(vec![-1.2, 1.44], &[f64::NEG_INFINITY; 2], steep).unwrap();
+        assert!(outcome.cost > 4.0 && outcome.ending == Ending::Stuck, "{outcome:?}");
+        let fine = Descent { enough: 1e-12, most_steps: 5000, ..coarse };
+        let outcome = fine.run(vec![0.9, 0.81], &[f64::NEG_INFINITY; 2], steep).unwrap();
+        assert_eq!(outcome.ending, Ending::Converged, "{outcome:?}");
     }
 
     #[test]

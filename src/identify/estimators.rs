@@ -199,6 +199,9 @@ impl Estimators {
                 Choice::of_windows(f0_hz, of_windows(envelope))
             }
             None if is_needed => {
+                // of second order in ξ, where the decay is not a linear damper's
+                let of_losses = if self.residual_excess > 1.0 { damping_ratio.value.powi(2) } else { 0.0 };
+                let over_the_record = [relatively_blurred(over_the_record[0], of_losses), over_the_record[1]];
                 let at_rad = felt.then(|| amplitudes_rad[mode] * weighed(decays).sqrt());
                 let in_windows = envelope.map(|e| (of_windows(e), e.linear_damping().is_some()));
                 Choice::of_widened_sinusoids(over_the_record, at_rad, in_windows)

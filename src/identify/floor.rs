@@ -111,22 +111,24 @@ pub fn lowest_chain_hz(chain: &Chain, gravity_m_s2: f64) -> f64 {
 /// ```text
 /// κ = g Σ hᵢsᵢ⁴ / (16 k) − Σ aᵢⱼ sᵢsⱼ (sᵢ−sⱼ)² / (8 m),   m = Σ aᵢⱼ sᵢsⱼ,   k = ω² m
 /// ```
-/// 1/16 for one link. Springs in the joints enter through the measured ω.
+/// 1/16 for one link. Springs in the joints enter through the measured ω, and only add to gravity's stiffness: where ω says less, the links are not what the file says, as a
+/// weight on a thread described as a rod, and gravity alone is taken.
 pub fn amplitude_dependence(chain: &Chain, gravity_m_s2: f64, frequency_hz: f64, shape: &[Complex<f64>]) -> f64 {
     // the part of the shape that moves together
     let largest =
         shape.iter().fold(Complex::new(0.0, 0.0), |l: Complex<f64>, s| if s.norm() > l.norm() { *s } else { l });
     let s: Vec<f64> = shape.iter().map(|v| (v / largest).re).collect();
     let a = chain.inertia_kg_m2();
-    let (mut mass, mut curve, mut quartic) = (0.0, 0.0, 0.0);
+    let (mut mass, mut curve, mut quartic, mut by_gravity) = (0.0, 0.0, 0.0, 0.0);
     for i in 0..chain.count() {
         quartic += gravity_m_s2 * chain.static_moment_kg_m(i) * s[i].powi(4);
+        by_gravity += gravity_m_s2 * chain.static_moment_kg_m(i) * s[i].powi(2);
         for j in 0..chain.count() {
             mass += a[(i, j)] * s[i] * s[j];
             curve += a[(i, j)] * s[i] * s[j] * (s[i] - s[j]).powi(2);
         }
     }
-    let stiffness = (std::f64::consts::TAU * frequency_hz).powi(2) * mass;
+    let stiffness = ((std::f64::consts::TAU * frequency_hz).powi(2) * mass).max(by_gravity);
     quartic / (16.0 * stiffness) - curve / (8.0 * mass)
 }
 
@@ -142,6 +144,20 @@ mod tests {
         assert!((rigid_strip_hz(0.2, G) - 1.3649).abs() < 5e-5);
         let rods = Chain::of(&Specimen::default()).unwrap();
         assert!((lowest_chain_hz(&rods, 9.81) - 1.3489).abs() < 5e-5);
+    }
+
+    #[test]
+    fn a_weight_described_as_a_rod_falls_behind_with_amplitude_as_every_pendulum_does() {
+        let rod = Specimen { link_lengths_m: vec![0.6], length_m: 0.6, ..Specimen::default() };
+        let chain = Chain::of(&rod).unwrap();
+        let shape = [Complex::new(1.0, 0.0)];
+        let kappa = |hz: f64| amplitude_dependence(&chain, G, hz, &shape);
+        let own_hz = rigid_strip_hz(0.6, G);
+        assert!((kappa(own_hz) - 1.0 / 16.0).abs() < 1e-3);
+        // the weight hangs lower than the rod's middle, and swings more slowly
+        assert_eq!(kappa(0.82 * own_hz), 1.0 / 16.0);
+        // a spring adds
+        assert!((kappa(1.2 * own_hz) * 1.44 - 1.0 / 16.0).abs() < 1e-3);
     }
 
     #[test]

@@ -159,7 +159,7 @@ pub fn identify(series: &AngleSeries, experiment: Option<&Experiment>) -> Result
         found.notes.push(format!("θ{} jumps by full turns, as wrapped angles do: taken out", link + 1));
     }
     found.tumbling = Tumbling::of(&signal);
-    Ok(found.with_modes(signal, body.as_ref()))
+    Ok(found.with_modes(signal, &stated_rad(series), body.as_ref()))
 }
 
 /// The part of a series in which nothing is held, until when it is held before, and from when on after it.
@@ -193,7 +193,12 @@ pub fn identify_displacement(series: &AngleSeries) -> Identification {
     let signal = Signal::of(series);
     let mut found = Identification::of_record(series, &signal, Measured::Displacement);
     found.notes.extend(unsure);
-    Identification { held_until_s, rests_from_s, ..found }.with_modes(signal, None)
+    Identification { held_until_s, rests_from_s, ..found }.with_modes(signal, &stated_rad(series), None)
+}
+
+/// The usual standard deviation of each link's values, where the table has one.
+fn stated_rad(series: &AngleSeries) -> Vec<Option<f64>> {
+    (0..series.links()).map(|link| series.usual_sd_rad(link)).collect()
 }
 
 impl Identification {
@@ -245,8 +250,9 @@ impl Identification {
         }
     }
 
-    fn with_modes(mut self, signal: Signal, body: Option<&Body>) -> Self {
-        let rests_from_s = rest::rests_from_s(&signal);
+    /// With what swings; `stated_rad` is the table's own standard deviation of each link's values.
+    fn with_modes(mut self, signal: Signal, stated_rad: &[Option<f64>], body: Option<&Body>) -> Self {
+        let rests_from_s = rest::rests_from_s(&signal, stated_rad);
         let signal = match rests_from_s {
             None => signal,
             Some(rest_s) => self.only(signal.until(rest_s)),

@@ -15,7 +15,7 @@ use super::excess::Excess;
 use super::pendulum;
 use super::signal::Signal;
 use super::sinusoids::SinusoidFit;
-use super::slow_flow::{Coefficients, SETS, SlowFlow};
+use super::slow_flow::{Coefficients, FEWEST_DELTA, SETS, SlowFlow};
 use crate::series::Measured;
 
 /// Mean and standard deviation of k where nothing is known of it: that of a swing of 70° (judgement).
@@ -53,9 +53,12 @@ impl Modulated {
     fn of_averaged(recorded: &Signal, sinusoids: &SinusoidFit, measured: Measured) -> Option<Self> {
         let best = best_flow(recorded, sinusoids, measured)?;
         best.is_weakly_nonlinear().then_some(())?;
-        let Some(until_s) = best.sticks_from_s() else { return Told::of(&best)?.modulated() };
-        let swing = recorded.between(recorded.span_s[0], until_s);
-        sinusoids.poles[0].is_resolved_oscillation(swing.duration_s()).then_some(())?;
+        let before_it_sticks = |fewest_delta: f64| {
+            let until_s = best.sticks_from_s(fewest_delta).unwrap_or(recorded.span_s[1]);
+            let swing = recorded.between(recorded.span_s[0], until_s);
+            sinusoids.poles[0].is_resolved_oscillation(swing.duration_s()).then_some(swing)
+        };
+        let swing = FEWEST_DELTA.into_iter().find_map(before_it_sticks)?;
         Told::of(&best.over(&swing)?)?.modulated()
     }
 

@@ -1,7 +1,8 @@
 //! An end in which nothing swings any more.
 //!
 //! A recording that goes on long after the swing has died away, or after friction has stopped it, has a spectrum of noise. What precedes the rest is used. It is
-//! a rest where the last fifth of the record is white noise, by its autocorrelations ρ, or one and the same value:
+//! a rest where the last fifth of the record is white noise, by its autocorrelations ρ, or scatters no more than the table's own standard deviation: a codec
+//! keeps what stands still from picture to picture, and its errors are not white.
 //!
 //! ```text
 //! Q = n Σₖ ρₖ²,   k = 1 … m,   χ² of m degrees of freedom of white noise   (Box and Pierce, J. Am. Stat. Assoc. 65 (1970) 1509)
@@ -26,15 +27,17 @@ const SHORTEST: f64 = 0.2;
 /// Fewest values that show a rest.
 const FEWEST: usize = 20;
 
-/// When a recording's last motion ends, where a rest follows.
-pub(super) fn rests_from_s(signal: &Signal) -> Option<f64> {
-    let ends: Option<Vec<f64>> = signal.links.iter().map(|link| last_motion_s(link, signal.span_s)).collect();
+/// When a recording's last motion ends, where a rest follows; `stated_rad` is the standard deviation of a value of each link, where the table has one.
+pub(super) fn rests_from_s(signal: &Signal, stated_rad: &[Option<f64>]) -> Option<f64> {
+    let stated = |link: usize| stated_rad.get(link).copied().flatten().unwrap_or(0.0);
+    let end = |(number, link): (usize, &LinkSamples)| last_motion_s(link, signal.span_s, stated(number));
+    let ends: Option<Vec<f64>> = signal.links.iter().enumerate().map(end).collect();
     let end_s = ends?.into_iter().fold(f64::NEG_INFINITY, f64::max);
     (end_s.is_finite() && signal.span_s[1] - end_s > SHORTEST * signal.duration_s()).then_some(end_s)
 }
 
 /// Of one link; `None` where it does not end at rest.
-fn last_motion_s(link: &LinkSamples, [from_s, until_s]: [f64; 2]) -> Option<f64> {
+fn last_motion_s(link: &LinkSamples, [from_s, until_s]: [f64; 2], stated_rad: f64) -> Option<f64> {
     let first = link.t_s.partition_point(|t| *t < until_s - LAST * (until_s - from_s));
     let last = &link.theta_rad[first..];
     if last.len() < FEWEST {
@@ -42,13 +45,13 @@ fn last_motion_s(link: &LinkSamples, [from_s, until_s]: [f64; 2]) -> Option<f64>
     }
     let mean = last.iter().sum::<f64>() / last.len() as f64;
     let variance = last.iter().map(|a| (a - mean).powi(2)).sum::<f64>() / last.len() as f64;
-    let is_constant = variance.sqrt() < CONSTANT * link.range_rad();
+    let is_constant = variance.sqrt() < stated_rad.max(CONSTANT * link.range_rad());
     if !is_constant && !is_white(last, mean, variance) {
         return None;
     }
     let rest_rad = median(&mut last.to_vec())?;
     // a last digit that does not change has no noise
-    let noise_rad = variance.sqrt().max(1e-4 * link.range_rad());
+    let noise_rad = variance.sqrt().max(stated_rad).max(1e-4 * link.range_rad());
     let moves = |a: &f64| (a - rest_rad).abs() > MOVES * noise_rad;
     let place = link.theta_rad.windows(2).rposition(|pair| pair.iter().all(moves))? + 1;
     Some(link.t_s[place])
@@ -82,17 +85,30 @@ mod tests {
     fn a_swing_that_is_over_is_followed_by_a_rest() {
         // friction takes the amplitude evenly
         let stopped = signal(|t| (0.1 - 0.01 * t).max(0.0) * (6.0 * t).cos());
-        assert!((9.0..10.1).contains(&rests_from_s(&stopped).unwrap()));
+        assert!((9.0..10.1).contains(&rests_from_s(&stopped, &[]).unwrap()));
         let died = signal(|t| 0.1 * (-0.4 * t).exp() * (6.0 * t).cos());
-        assert!((8.0..12.0).contains(&rests_from_s(&died).unwrap()));
+        assert!((8.0..12.0).contains(&rests_from_s(&died, &[]).unwrap()));
+    }
+
+    #[test]
+    fn a_rest_of_errors_that_last_is_known_by_the_table_s_own_standard_deviation() {
+        // friction stops the swing, and the codec keeps what stands for half a second
+        let kept = |t: f64| 3e-4 * (7.0 * (2.0 * t).floor()).sin();
+        let mut stopped = signal(|t| (0.1 - 0.01 * t).max(0.0) * (6.0 * t).cos());
+        let link = &mut stopped.links[0];
+        link.theta_rad.iter_mut().zip(&link.t_s).for_each(|(a, t)| *a += kept(*t) * 10.0);
+        assert_eq!(rests_from_s(&stopped, &[None]), None);
+        assert!((8.0..10.5).contains(&rests_from_s(&stopped, &[Some(3e-3)]).unwrap()));
+        // what still swings is no rest
+        assert_eq!(rests_from_s(&signal(|t| 0.1 * f64::exp(-0.01 * t) * f64::cos(6.0 * t)), &[Some(3e-3)]), None);
     }
 
     #[test]
     fn a_swing_that_goes_on_has_no_rest() {
         for (decay, rate) in [(0.0, 6.0), (0.01, 6.0), (0.1, 6.0), (0.02, 36.0), (0.1, 45.0)] {
-            assert_eq!(rests_from_s(&signal(|t| 0.1 * f64::exp(-decay * t) * f64::cos(rate * t))), None);
+            assert_eq!(rests_from_s(&signal(|t| 0.1 * f64::exp(-decay * t) * f64::cos(rate * t)), &[]), None);
         }
         // nothing swings at all
-        assert_eq!(rests_from_s(&signal(|_| 0.0)), None);
+        assert_eq!(rests_from_s(&signal(|_| 0.0), &[]), None);
     }
 }

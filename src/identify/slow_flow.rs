@@ -45,8 +45,9 @@ const STEPS: f64 = 200.0;
 const OVER: f64 = 1e-3;
 /// Harmonics of the oscillation.
 const HARMONICS: i32 = 3;
-/// A swing is followed down to so many δ of dry friction (judgement: the second order in δ/A is then 4 %).
-const FEWEST_DELTA: f64 = 5.0;
+/// A swing is followed down to so many δ of dry friction, to the fewer where too little of it would be left (judgement: the second order in δ/A is then 4 % and
+/// 16 %).
+pub const FEWEST_DELTA: [f64; 2] = [5.0, 2.5];
 /// κA² is at most this, either way: that of a swing of 80° (judgement: beyond it the powers of the amplitude that stand here are too few).
 const MOST_K: f64 = 0.12;
 /// A harmonic is at most this part of the fundamental (judgement: an oscillation of half the frequency has its second one alone).
@@ -312,9 +313,9 @@ impl<'a> SlowFlow<'a> {
         SlowFlow { signal: part, values, free, noise_rad, ..*self }.solved(&self.free)
     }
 
-    /// When dry friction has left so small a swing that it may stick, and what is of first order in δ/A describes it no longer.
-    pub fn sticks_from_s(&self) -> Option<f64> {
-        let least = FEWEST_DELTA * self.coefficients().shift();
+    /// When dry friction has left a swing of so many δ, which may stick soon, and what is of first order in δ/A describes it no longer.
+    pub fn sticks_from_s(&self, fewest_delta: f64) -> Option<f64> {
+        let least = fewest_delta * self.coefficients().shift();
         let link = self.longest()?;
         let place = self.course(&self.values, link).iter().position(|[a, _]| *a < least)?;
         Some(link.t_s[place])

@@ -1,7 +1,7 @@
 //! Blobs → marks: one global optimum a frame, with a gate.
 
 use super::Sighting;
-use super::follower::{Follower, GATE, MOST_AREA_COST};
+use super::follower::{Follower, GATE, MOST_AREA_COST, NEWCOMER_FRAMES};
 use pathfinding::kuhn_munkres::kuhn_munkres_min;
 use pathfinding::matrix::Matrix;
 
@@ -9,9 +9,6 @@ use pathfinding::matrix::Matrix;
 const MISS: f64 = GATE + MOST_AREA_COST;
 /// What it costs to leave a newcomer that is no mark unseen.
 const NEWCOMER_MISS: f64 = 6.0;
-/// Frames beside all marks of its hue after which something that is no mark counts as furniture. Beside them, for a
-/// newcomer that appears while a mark is missed may be that mark.
-const NEWCOMER_FRAMES: u32 = 30;
 /// Marks are in doubt where an exchange would cost less than this.
 const CLEAR_MARGIN: f64 = 6.0;
 /// Cost units in an integer of the assignment.

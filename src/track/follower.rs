@@ -18,6 +18,14 @@ pub const FORGET_S: f64 = 2.0;
 /// Most things followed that are no marks.
 pub const MOST_OTHERS: usize = 24;
 
+/// Frames beside all marks of its hue after which something that is no mark counts as furniture. Beside them, for a
+/// newcomer that appears while a mark is missed may be that mark.
+pub const NEWCOMER_FRAMES: u32 = 30;
+/// Furniture that has kept to its place within this part of its radius, or this many px, stands still, and is sought nowhere else (judgement: what swings and hides it
+/// for a while passes by it).
+const STANDS_RADII: f64 = 0.1;
+const STANDS_PX: f64 = 1.0;
+
 /// Steps between frames over which a course is straight enough to tell marks apart.
 const LONGEST_COURSE_STEPS: f64 = 3.5;
 
@@ -36,6 +44,9 @@ pub struct Follower {
     /// Frames since it was last seen, the one it waits for included.
     unseen_frames: u32,
     step_s: f64,
+    /// Where it was first seen, and how far from there it has been since.
+    first_px: Vector2<f64>,
+    farthest_px: f64,
 }
 
 impl Follower {
@@ -56,7 +67,25 @@ impl Follower {
             age: 0,
             unseen_frames: 0,
             step_s,
+            first_px: Vector2::from(sighting.measured.position_px),
+            farthest_px: 0.0,
         }
+    }
+
+    /// How far from its place what stands still may be.
+    fn still_px(&self) -> f64 {
+        (STANDS_RADII * self.radius_px()).max(STANDS_PX)
+    }
+
+    /// Whether it has stood still beside the marks for so long that it is none.
+    pub fn stands(&self) -> bool {
+        self.age >= NEWCOMER_FRAMES && self.farthest_px < self.still_px()
+    }
+
+    /// Whether a sighting of something else covers a part of it, where it stands.
+    pub fn is_covered_by(&self, sighting: &Sighting) -> bool {
+        let other_px = 0.56 * f64::from(sighting.measured.area_px2).sqrt();
+        self.hue == sighting.hue && self.stands() && self.off_px(sighting) < other_px + self.radius_px()
     }
 
     /// Waits for what is seen at `t_s`.
@@ -92,13 +121,21 @@ impl Follower {
         if sighting.hue != self.hue {
             return None;
         }
-        let (d2, _) = self.belief.distance2(&measurement(&sighting.measured, self.radius_px()))?;
+        let d2 = match self.stands() {
+            true => self.off_px(sighting).powi(2) / self.still_px().powi(2),
+            false => self.belief.distance2(&measurement(&sighting.measured, self.radius_px()))?.0,
+        };
         let ln_area = (f64::from(sighting.measured.area_px2) / self.area_px2).ln();
         if ln_area.abs() > MOST_LN_AREA {
             return None;
         }
         let cost = d2 + (ln_area / LN_AREA_SD).powi(2).min(MOST_AREA_COST);
         (d2 <= GATE).then_some(cost)
+    }
+
+    /// How far a sighting is from where it was first seen.
+    fn off_px(&self, sighting: &Sighting) -> f64 {
+        (Vector2::from(sighting.measured.position_px) - self.first_px).norm()
     }
 
     /// Takes the sighting that was assigned to it.
@@ -108,6 +145,7 @@ impl Follower {
             self.belief = belief;
         }
         self.area_px2 += 0.05 * (f64::from(sighting.measured.area_px2) - self.area_px2);
+        self.farthest_px = self.farthest_px.max(self.off_px(sighting));
         self.seen_s = self.t_s;
         self.unseen_frames = 0;
     }

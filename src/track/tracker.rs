@@ -27,6 +27,9 @@ const WINDOW: usize = 256;
 /// Frames after which the choice is made even where some mark has hardly been seen.
 const LONGEST_WINDOW: usize = 4096;
 
+/// A mark that has merged with something is off by about this part of the radius of both (judgement).
+const MERGED_RADII: f64 = 0.3;
+
 /// Turns frames of blobs into tracks, as they come.
 #[derive(Debug)]
 pub struct Tracker {
@@ -134,6 +137,10 @@ impl Tracker {
         let doubted = assigned.doubted(&rows[..marks.len()]);
         let unseen = |mark: &usize| marks.iter().position(|m| m == mark).is_none_or(|r| assigned.columns[r].is_none());
         let missed: Vec<u8> = (0..self.slots.len()).filter(unseen).map(|mark| self.slots[mark].hue).collect();
+        // what stands still and is not seen lies behind, or in front of, what passes there
+        let hidden: Vec<usize> = (marks.len()..rows.len()).filter(|row| assigned.columns[*row].is_none()).collect();
+        let covers = |sighting: &Sighting| hidden.iter().any(|row| rows[*row].is_covered_by(sighting));
+        let merged: Vec<bool> = sightings.iter().map(covers).collect();
         let mut taken = vec![false; sightings.len()];
         for (row, column) in assigned.columns.iter().enumerate() {
             if let Some(column) = column {
@@ -154,7 +161,15 @@ impl Tracker {
                 if ambiguous[row] {
                     flags.insert(Flags::AMBIGUOUS);
                 }
-                self.points[*mark][index] = (Some(sightings[column].measured), flags);
+                let mut measured = sightings[column].measured;
+                if merged[column] {
+                    flags.insert(Flags::MERGED);
+                    // anywhere within the two
+                    let extra_px2 = MERGED_RADII.powi(2) * f64::from(measured.area_px2) / std::f64::consts::PI;
+                    measured.covariance_px2[0] += extra_px2;
+                    measured.covariance_px2[1] += extra_px2;
+                }
+                self.points[*mark][index] = (Some(measured), flags);
                 if doubted[row] {
                     self.identity.doubt(*mark, index);
                 }

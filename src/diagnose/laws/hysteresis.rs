@@ -29,12 +29,12 @@ const PARTS: [f64; 2] = [0.15, 0.5];
 pub struct Hysteresis;
 
 impl Law for Hysteresis {
-    /// From every start that may lead to its minimum: where the score points, as a part of the spring where there is something to explain, and from short
+    /// From every start that may lead to its minimum: where the scores point, as a part of the spring where there is something to explain, and from short
     /// stretches, which do not know what the base model has given up, where nothing else explains it.
     fn beside<'a>(&self, sought: &FitRequest<'_, 'a>) -> Option<Refit<'a>> {
         let FitRequest { context, base, effect, score, misfit } = *sought;
         let hypothesis = base.hypothesis.and(effect, None);
-        let near = || score.and_then(|score| context.refit_below(misfit.leads, &hypothesis, base, &score.start));
+        let near = || score.and_then(|score| where_scored(context, base, score, misfit.leads));
         let softened = || (misfit.unexplained || misfit.seen).then(|| softened(context, base, misfit.leads)).flatten();
         // in every joint of a strip, and from no memory in each stretch, it is too dear
         let is_worth_it = misfit.unexplained_by_any && !context.is_strip();
@@ -47,7 +47,7 @@ impl Law for Hysteresis {
         fit_from_many_starts(context, base)
     }
 
-    /// The best of several yield angles.
+    /// The best of several yield angles, then the others.
     fn scan(&self, screen: &Screen<'_, '_>) -> Option<Score> {
         let context = screen.context;
         let yields_rad = if context.has_spring() {
@@ -60,8 +60,10 @@ impl Law for Hysteresis {
             score.start.push((Parameter::HysteresisYield, *yield_rad));
             Some(score)
         };
-        let scores: Vec<Score> = yields_rad.par_iter().with_max_len(1).filter_map(of_yield).collect();
-        scores.into_iter().max_by(|a, b| a.gain.total_cmp(&b.gain))
+        let mut scores: Vec<Score> = yields_rad.par_iter().with_max_len(1).filter_map(of_yield).collect();
+        scores.sort_by(|a, b| b.gain.total_cmp(&a.gain));
+        let further = scores.iter().skip(1).filter(|score| score.gain > 0.0).map(|score| score.start.clone()).collect();
+        Some(Score { further, ..scores.into_iter().next()? })
     }
 
     /// Any yield angle that the recording does not tell from its own.
@@ -75,6 +77,36 @@ impl Law for Hysteresis {
         let (yield_rad, sd) = of(Parameter::HysteresisYield);
         (yield_rad * settings.yields).ln().max(sd.ln())
     }
+}
+
+/// The hysteresis as large as a score says it is, the spring being softer by what it adds before it yields: from that of several yield angles whose first steps
+/// lead lowest, if that is below `bound`. From no hysteresis at all no descent finds the way: the spring must follow it to a thousandth of itself, or the second mode falls out of step.
+fn where_scored<'a>(context: &FitContext<'a>, base: &Refit<'a>, score: &Score, bound: f64) -> Option<Refit<'a>> {
+    let hypothesis = base.hypothesis.and(Effect::JointHysteretic, None);
+    let spring = base.problem.free.iter().copied().find(|parameter| parameter.is_spring());
+    let steps = &context.settings.descent;
+    let softened = |start: &Vec<(Parameter, f64)>| {
+        let of = |parameter| start.iter().find(|(own, _)| *own == parameter).map(|(_, value)| *value);
+        let added = of(Parameter::HysteresisTorque)? / of(Parameter::HysteresisYield)?;
+        let whole = spring_stiffness(base)?;
+        let share = (added / whole).min(SPRING_SHARES[1]);
+        let mut start = start.clone();
+        start.push((spring?, (1.0 - share) * base.value(spring?)?));
+        Some(start)
+    };
+    let starts: Vec<_> = std::iter::once(&score.start).chain(&score.further).filter_map(softened).collect();
+    if starts.is_empty() {
+        return context.refit_below(bound, &hypothesis, base, &score.start);
+    }
+    // each may cost far more than none at first, and lead below
+    let begun = starts.par_iter().with_max_len(1).filter_map(|start| context.begin(&hypothesis, base, start));
+    let best = begun.min_by(|a, b| a.chi2.total_cmp(&b.chi2))?;
+    if best.chi2 < bound && !best.converged { context.go_on(&best, steps.few_steps) } else { Some(best) }
+}
+
+/// Stiffness of a fit's joint.
+fn spring_stiffness(fit: &Refit<'_>) -> Option<f64> {
+    fit.problem.model(0, &fit.x[..fit.problem.free.len()]).ok()?.0.value(Parameter::JointStiffness)
 }
 
 /// The hysteresis where it makes up a part of what the base model takes for the spring: from the best of several such starts, if that leads below `bound`.
@@ -101,7 +133,7 @@ fn starts(
     stiffer: &[f64],
 ) -> Option<Vec<Vec<(Parameter, f64)>>> {
     let spring = fit.problem.free.iter().copied().find(|parameter| parameter.is_spring())?;
-    let stiffness = fit.problem.model(0, &fit.x[..fit.problem.free.len()]).ok()?.0.value(Parameter::JointStiffness)?;
+    let stiffness = spring_stiffness(fit)?;
     // a base model that has locked its joint is no guide to the damper
     let damping = fit.value(Parameter::JointDamping).unwrap_or(0.0).min(context.experiment.model.c_eq_n_m_s_per_rad);
     let mut starts = Vec::new();
