@@ -233,3 +233,54 @@ fn of_two_like_pendulums_the_one_about_the_pivot_is_followed() {
         assert!((x_px - pivot_px[0]).abs() < (x_px - other).abs(), "{x_px} about {pivot_px:?}");
     }
 }
+
+#[test]
+fn a_mark_that_passes_in_front_of_a_like_thing_that_stands_keeps_its_name() {
+    const RADIUS_PX: f64 = 14.0;
+    const KNOB_PX: [f64; 2] = [690.0, 487.0];
+    for phase in [0.0, 0.7, 2.0] {
+        let at = |frame: u32| {
+            let (sin, cos) = (0.34 * (3.6 * f64::from(frame) / 25.0 + phase).cos()).sin_cos();
+            [611.0 + 415.0 * sin, 80.0 + 415.0 * cos]
+        };
+        let mut random = Xoshiro256PlusPlus::seed_from_u64(5);
+        let mut sighting = |position_px: [f64; 2], area_px2: f64| Sighting {
+            hue: 0,
+            measured: Measured {
+                position_px: position_px.map(|v| v + random.random_range(-0.1..0.1)),
+                covariance_px2: [1e-2, 1e-2, 0.0],
+                area_px2: area_px2 as f32,
+            },
+            cut: false,
+        };
+        let area_px2 = std::f64::consts::PI * RADIUS_PX * RADIUS_PX;
+        let mut tracker = Tracker::new(vec![MarkSlot { hue: 0 }], None);
+        for frame in 0..175 {
+            let mark = at(frame);
+            let apart = (mark[0] - KNOB_PX[0]).hypot(mark[1] - KNOB_PX[1]) / (2.0 * RADIUS_PX);
+            let sightings = if apart < 1.0 {
+                // one blob, as large as both less what they cover of each other
+                let covered = std::f64::consts::FRAC_2_PI * (apart.acos() - apart * (1.0 - apart * apart).sqrt());
+                vec![sighting([0, 1].map(|k| 0.5 * (mark[k] + KNOB_PX[k])), area_px2 * (2.0 - covered))]
+            } else {
+                vec![sighting(KNOB_PX, area_px2), sighting(mark, area_px2)]
+            };
+            tracker.push(FrameBlobs { t_s: f64::from(frame) / 25.0, damaged: false, sightings });
+        }
+        let points = tracker.finish().0.marks.remove(0);
+        let (mut merged, mut lost) = (0, 0);
+        for (frame, point) in (0..).zip(&points) {
+            let mark = at(frame);
+            let Some(m) = point.measured else {
+                lost += 1;
+                continue;
+            };
+            let off_px = (m.position_px[0] - mark[0]).hypot(m.position_px[1] - mark[1]);
+            let is_merged = point.flags.contains(Flags::MERGED);
+            merged += u32::from(is_merged);
+            let sd_px = (m.covariance_px2[0] + m.covariance_px2[1]).sqrt();
+            assert!(if is_merged { off_px < 3.0 * sd_px } else { off_px < 1.0 }, "{phase} {frame}: {off_px} ± {sd_px}");
+        }
+        assert!(merged >= 10 && (20..60).contains(&(merged + lost)), "{merged} {lost}");
+    }
+}

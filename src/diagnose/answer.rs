@@ -16,7 +16,7 @@ use super::settings::CertificateSettings;
 use super::torque::MissingTorque;
 use super::verdict::Status;
 use super::{energy, evidence, locate};
-use crate::fit::{Record, recordings, rms_of_pieces};
+use crate::fit::Record;
 use crate::model::Parameter;
 
 /// Candidates written.
@@ -82,7 +82,7 @@ impl Baseline {
         Self {
             parameters: quantities(base, &base.problem.free).into_iter().map(|(p, q)| (p.id(), q)).collect(),
             rmse_rad: rmse_rad(base),
-            noise_rad: noise_rad(base, 0),
+            noise_rad: base.noise_rad(0),
             noise_correlation: noise.colour.iter().map(|colour| colour.rho).collect(),
             noise_share_correlated: noise.colour.iter().map(|colour| colour.share).collect(),
             noise_correlation_across: noise.across.strongest(),
@@ -210,7 +210,7 @@ impl HoldoutResult {
             baseline_rmse_rad: held_out.baseline.rmse_rad.clone(),
             augmented_rmse_rad: of_learnt.unwrap_or_else(|| named_rmse_rad.clone()),
             named_rmse_rad,
-            noise_rad: noise_rad(findings.posterior.base(), held_out.record),
+            noise_rad: findings.posterior.base().noise_rad(held_out.record),
         })
     }
 }
@@ -247,13 +247,6 @@ fn quantities(fit: &Refit<'_>, of: &[Parameter]) -> Vec<(Parameter, Quantity)> {
         (*p, Quantity { value: fit.value(*p), sd: covariance[(i, i)].sqrt(), unit: p.unit() })
     };
     of.iter().enumerate().map(one).collect()
-}
-
-/// Noise of the recording that begins with a record.
-fn noise_rad(fit: &Refit<'_>, first: usize) -> Vec<f64> {
-    let pieces = recordings(fit.problem.records).into_iter().find(|pieces| pieces.start == first);
-    let of_piece = |piece: usize| &fit.problem.noise[piece].sd_rad[..];
-    pieces.map(|pieces| rms_of_pieces(&pieces.map(of_piece).collect::<Vec<_>>())).unwrap_or_default()
 }
 
 fn rmse_rad(fit: &Refit<'_>) -> Vec<f64> {

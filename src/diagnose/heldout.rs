@@ -46,6 +46,15 @@ impl HeldOut {
     pub fn leaves(&self) -> f64 {
         self.augmented.over(&self.baseline)
     }
+
+    /// The part of the squares that the base model leaves beyond the noise (rad) of which the names, or another description, leave nothing.
+    pub fn explained(&self, other: Option<&Prediction>, noise_rad: &[f64]) -> f64 {
+        let square = |values: &[f64]| values.iter().map(|r| r * r).sum::<f64>();
+        let beyond = |of: &Prediction| (square(&of.rmse_rad) - square(noise_rad)).max(0.0);
+        let left = other.into_iter().chain([&self.augmented]).map(beyond).fold(f64::INFINITY, f64::min);
+        let base = beyond(&self.baseline);
+        if base > left { 1.0 - left / base } else { 0.0 }
+    }
 }
 
 impl Prediction {

@@ -134,7 +134,10 @@ pub fn diagnose(
     // 8. what they leave
     progress.begin("law", None);
     let (needed, learnt) = learnt::beside(&context, &posterior, &effects, held_out.as_ref(), options.predict_from_s);
-    let posterior = Posterior { needed, ..posterior };
+    let with_law = learnt.as_ref().map(|learnt| &learnt.prediction);
+    let explained = |proof: &heldout::HeldOut| proof.explained(with_law, &posterior.base().noise_rad(proof.record));
+    let explained = held_out.as_ref().map_or(1.0, explained);
+    let posterior = Posterior { needed, explained, ..posterior };
     let (posterior, held_out) = heldout::reorder_by_inclusion(&context, posterior, held_out, options.predict_from_s);
     // 9. the base model by itself, and the verdict
     let adequacy = adequacy::adequacy(&context, posterior.base(), &effects, options.bootstraps, progress);

@@ -52,6 +52,9 @@ pub struct Posterior<'a> {
     pub compared: Compared,
     /// How probable each effect is where any law may stand in its place; nothing where that was not asked.
     pub needed: Vec<Needed>,
+    /// The part of what the base model leaves of what was not fitted that the best description explains, laws that were learnt included: where any law may stand in its place, no
+    /// effect is surer.
+    pub explained: f64,
 }
 
 /// How probable an effect is where any law may stand in its place.
@@ -133,6 +136,7 @@ pub fn weigh<'a>(fits: Vec<Refit<'a>>, effects: usize, compared: &Compared, sett
         unknowns,
         compared: compared.clone(),
         needed: Vec::new(),
+        explained: 1.0,
     }
 }
 
@@ -364,7 +368,7 @@ impl<'a> Posterior<'a> {
         let needed = self.needed.iter().find(|own| own.effect == effect);
         let likeliest = with().next().map_or(1.0 - settings.prior.imitated, |c| not_imitated(&c.fit));
         // the descriptions hold those of the table, too
-        needed.map_or(of_table, |needed| needed.probability * likeliest)
+        needed.map_or(of_table, |needed| needed.probability * likeliest * self.explained)
     }
 
     /// How probable each effect of the table is.
@@ -425,6 +429,7 @@ mod tests {
                 unknowns: Vec::new(),
                 compared: Compared { of_any: 2, ..Compared::default() },
                 needed: Vec::new(),
+                explained: 1.0,
             };
             let inclusions = posterior.inclusions(&settings);
             inclusions.into_iter().find(|own| own.0 == Effect::TimeBase).unwrap().1

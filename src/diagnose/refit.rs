@@ -8,7 +8,7 @@ use super::hypothesis::Hypothesis;
 use super::settings::{CertificateSettings, MisfitSettings};
 use crate::fit::descent::{Ending, Outcome};
 use crate::fit::problem::stacked;
-use crate::fit::{Problem, Residuals, recordings, residuals_of};
+use crate::fit::{Problem, Residuals, recordings, residuals_of, rms_of_pieces};
 use crate::model::{Camera, ForwardModel, Parameter, State, Trajectory};
 
 /// A hypothesis fitted to the recordings, with the noise by which it was judged.
@@ -179,6 +179,13 @@ impl<'a> Refit<'a> {
     /// Number of values.
     pub fn values(&self) -> usize {
         self.problem.records.iter().map(|r| r.values(0..r.len())).sum()
+    }
+
+    /// Noise of each angle of the recording that begins with a record.
+    pub fn noise_rad(&self, first: usize) -> Vec<f64> {
+        let pieces = recordings(self.problem.records).into_iter().find(|pieces| pieces.start == first);
+        let of_piece = |piece: usize| &self.problem.noise[piece].sd_rad[..];
+        pieces.map(|pieces| rms_of_pieces(&pieces.map(of_piece).collect::<Vec<_>>())).unwrap_or_default()
     }
 
     /// Whether it counts: it has converged, enough independent starts end there, and it leaves no more than what is within it.

@@ -55,7 +55,9 @@ pub fn assign_frame(rows: &mut [&mut Follower], marks: usize, sightings: &[Sight
     let in_sight = |hue: u8| rows[..marks].iter().any(|row| row.hue == hue && !row.was_lost());
     let lost = |i: usize| i < marks && rows[i].was_lost() && in_sight(rows[i].hue);
     let any_lost = (0..marks).any(lost);
-    let waits: Vec<bool> = (0..rows.len()).map(|i| any_lost && (young(i) || lost(i))).collect();
+    // what has stood still and is not seen there may be behind a mark
+    let hidden = |i: usize| rows[i].stands() && !sightings.iter().any(|sighting| rows[i].is_at_its_place(sighting));
+    let waits: Vec<bool> = (0..rows.len()).map(|i| any_lost && (young(i) || lost(i) || hidden(i))).collect();
     let before: Vec<Vec<Option<f64>>> =
         rows.iter().map(|row| sightings.iter().map(|s| row.cost(s)).collect()).collect();
     let mut columns: Vec<Option<usize>> = vec![None; rows.len()];

@@ -21,8 +21,7 @@ pub const MOST_OTHERS: usize = 24;
 /// Frames beside all marks of its hue after which something that is no mark counts as furniture. Beside them, for a
 /// newcomer that appears while a mark is missed may be that mark.
 pub const NEWCOMER_FRAMES: u32 = 30;
-/// Furniture that has kept to its place within this part of its radius, or this many px, stands still, and is sought nowhere else (judgement: what swings and hides it
-/// for a while passes by it).
+/// What has kept to its place for so long within this part of its radius, or this many px, stands still (judgement).
 const STANDS_RADII: f64 = 0.1;
 const STANDS_PX: f64 = 1.0;
 
@@ -47,6 +46,21 @@ pub struct Follower {
     /// Where it was first seen, and how far from there it has been since.
     first_px: Vector2<f64>,
     farthest_px: f64,
+    /// It has stood still for long, and has not left its place since.
+    is_still: bool,
+    /// How well it keeps to its place once it has stood still for long.
+    pub keeping: Keeping,
+}
+
+/// How well something keeps to the place where it has stood still for long.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Keeping {
+    /// A mark moves when it is let go.
+    No,
+    /// It may be a mark.
+    Likely,
+    /// It is no mark, and is sought nowhere else.
+    Always,
 }
 
 impl Follower {
@@ -69,7 +83,24 @@ impl Follower {
             step_s,
             first_px: Vector2::from(sighting.measured.position_px),
             farthest_px: 0.0,
+            is_still: false,
+            keeping: Keeping::No,
         }
+    }
+
+    /// The same of what is no mark.
+    pub fn start_other(sighting: &Sighting, t_s: f64, step_s: f64) -> Self {
+        Self { keeping: Keeping::Always, ..Self::start(sighting, t_s, step_s) }
+    }
+
+    /// It is no mark, and stands where it was first seen.
+    pub fn into_furniture(self) -> Self {
+        Self { age: NEWCOMER_FRAMES, is_still: true, keeping: Keeping::Always, ..self }
+    }
+
+    /// Whether a sighting is where it was first seen.
+    pub fn is_at_its_place(&self, sighting: &Sighting) -> bool {
+        self.hue == sighting.hue && self.off_px(sighting) < self.still_px()
     }
 
     /// How far from its place what stands still may be.
@@ -77,15 +108,23 @@ impl Follower {
         (STANDS_RADII * self.radius_px()).max(STANDS_PX)
     }
 
-    /// Whether it has stood still beside the marks for so long that it is none.
+    /// Whether it keeps to a place where it has stood still for long.
     pub fn stands(&self) -> bool {
-        self.age >= NEWCOMER_FRAMES && self.farthest_px < self.still_px()
+        self.keeping != Keeping::No && self.is_still
+    }
+
+    /// It is known to stand at its place.
+    pub fn stand_there(&mut self) {
+        self.is_still = true;
     }
 
     /// Whether a sighting of something else covers a part of it, where it stands.
     pub fn is_covered_by(&self, sighting: &Sighting) -> bool {
         let other_px = 0.56 * f64::from(sighting.measured.area_px2).sqrt();
-        self.hue == sighting.hue && self.stands() && self.off_px(sighting) < other_px + self.radius_px()
+        self.hue == sighting.hue
+            && self.keeping == Keeping::Always
+            && self.stands()
+            && self.off_px(sighting) < other_px + self.radius_px()
     }
 
     /// Waits for what is seen at `t_s`.
@@ -101,14 +140,14 @@ impl Follower {
         place.determinant().max(f64::MIN_POSITIVE).ln()
     }
 
-    /// It was not seen in the frame before the one it waits for.
+    /// It was not seen in the frame before the one it waits for, and may have gone anywhere.
     pub fn was_lost(&self) -> bool {
-        self.unseen_frames > 1 || self.is_long_lost()
+        self.unseen_frames > 1 && !self.stands() || self.is_long_lost()
     }
 
     /// It has not been seen for so long that its course says nothing about where it is.
     pub fn is_long_lost(&self) -> bool {
-        self.t_s - self.seen_s > LONGEST_COURSE_STEPS * self.step_s
+        self.t_s - self.seen_s > LONGEST_COURSE_STEPS * self.step_s && !self.stands()
     }
 
     fn radius_px(&self) -> f64 {
@@ -121,16 +160,27 @@ impl Follower {
         if sighting.hue != self.hue {
             return None;
         }
-        let d2 = match self.stands() {
-            true => self.off_px(sighting).powi(2) / self.still_px().powi(2),
-            false => self.belief.distance2(&measurement(&sighting.measured, self.radius_px()))?.0,
-        };
+        let d2 = self.distance2(sighting)?;
         let ln_area = (f64::from(sighting.measured.area_px2) / self.area_px2).ln();
         if ln_area.abs() > MOST_LN_AREA {
             return None;
         }
         let cost = d2 + (ln_area / LN_AREA_SD).powi(2).min(MOST_AREA_COST);
         (d2 <= GATE).then_some(cost)
+    }
+
+    /// The squared Mahalanobis distance of a sighting. What has stood still in n frames leaves its place in the next one with a probability of about 1/n, −2 ln of which is added:
+    /// so what passes there does not take its name. Once it is hidden it is waited for at its place.
+    fn distance2(&self, sighting: &Sighting) -> Option<f64> {
+        let at_place = (self.off_px(sighting) / self.still_px()).powi(2);
+        if self.stands() && (self.keeping == Keeping::Always || self.unseen_frames > 1) {
+            return Some(at_place);
+        }
+        let (moved, _) = self.belief.distance2(&measurement(&sighting.measured, self.radius_px()))?;
+        if !self.stands() || moved > GATE {
+            return Some(moved);
+        }
+        Some(at_place.min(moved + 2.0 * f64::from(self.age.max(NEWCOMER_FRAMES)).ln()).min(GATE))
     }
 
     /// How far a sighting is from where it was first seen.
@@ -146,6 +196,9 @@ impl Follower {
         }
         self.area_px2 += 0.05 * (f64::from(sighting.measured.area_px2) - self.area_px2);
         self.farthest_px = self.farthest_px.max(self.off_px(sighting));
+        // what passes draws the place of both together aside, and no farther than the gate
+        let within_px = if self.is_still { GATE.sqrt() } else { 1.0 } * self.still_px();
+        self.is_still = self.farthest_px < within_px && (self.is_still || self.age >= NEWCOMER_FRAMES);
         self.seen_s = self.t_s;
         self.unseen_frames = 0;
     }

@@ -11,7 +11,7 @@ use super::choose::{Choice, choose};
 use super::follower::{FORGET_S, Follower, MOST_OTHERS};
 use super::identity::{Identity, Renaming};
 use super::noise::scatters;
-use super::tracklet::{Tracklet, link};
+use super::tracklet::{MOSTLY, Tracklet, link, standing};
 use super::{Flags, FrameBlobs, Measured, Sighting, Tracks};
 use crate::statistics::median_step_s;
 
@@ -26,9 +26,6 @@ pub struct MarkSlot {
 const WINDOW: usize = 256;
 /// Frames after which the choice is made even where some mark has hardly been seen.
 const LONGEST_WINDOW: usize = 4096;
-
-/// A mark that has merged with something is off by about this part of the radius of both (judgement).
-const MERGED_RADII: f64 = 0.3;
 
 /// Turns frames of blobs into tracks, as they come.
 #[derive(Debug)]
@@ -90,6 +87,9 @@ impl Tracker {
             return;
         }
         self.learn(&choice, &tracklets);
+        if choice.moves {
+            self.begin_furniture(&choice, &tracklets);
+        }
         self.choice = Some(choice);
         for frame in std::mem::take(&mut self.window).iter().enumerate() {
             self.start_due(frame.0, frame.1, &tracklets);
@@ -106,6 +106,18 @@ impl Tracker {
             }
         }
         seen_px.iter().for_each(|seen_px| self.identity.learn(seen_px));
+    }
+
+    /// What stands still through most of the first frames, where no mark does, is known from the first one on.
+    fn begin_furniture(&mut self, choice: &Choice, tracklets: &[Tracklet]) {
+        let is_of = |place: &Follower, tracklet: &Tracklet| {
+            let all = tracklet.sightings.iter().map(|(frame, blob)| &self.window[*frame].sightings[*blob]);
+            let there = all.filter(|own| place.is_at_its_place(own)).count() as f64;
+            there > MOSTLY * tracklet.sightings.len() as f64
+        };
+        let is_mark = |place: &Follower| choice.chosen.iter().flatten().any(|chosen| is_of(place, &tracklets[*chosen]));
+        let furniture = standing(&self.window, self.step_s).into_iter().filter(|place| !is_mark(place));
+        self.others.extend(furniture.map(Follower::into_furniture).take(MOST_OTHERS));
     }
 
     /// Starts the followers of marks that are first seen in frame `index`.
@@ -161,15 +173,10 @@ impl Tracker {
                 if ambiguous[row] {
                     flags.insert(Flags::AMBIGUOUS);
                 }
-                let mut measured = sightings[column].measured;
                 if merged[column] {
                     flags.insert(Flags::MERGED);
-                    // anywhere within the two
-                    let extra_px2 = MERGED_RADII.powi(2) * f64::from(measured.area_px2) / std::f64::consts::PI;
-                    measured.covariance_px2[0] += extra_px2;
-                    measured.covariance_px2[1] += extra_px2;
                 }
-                self.points[*mark][index] = (Some(measured), flags);
+                self.points[*mark][index] = (Some(sightings[column].measured), flags);
                 if doubted[row] {
                     self.identity.doubt(*mark, index);
                 }
@@ -181,7 +188,7 @@ impl Tracker {
         self.others.retain(|o| frame.t_s - o.seen_s < FORGET_S);
         for (sighting, _) in sightings.iter().zip(&taken).filter(|(_, taken)| !**taken) {
             if self.others.len() < MOST_OTHERS {
-                self.others.push(Follower::start(sighting, frame.t_s, self.step_s));
+                self.others.push(Follower::start_other(sighting, frame.t_s, self.step_s));
             }
         }
     }

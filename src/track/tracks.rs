@@ -9,6 +9,8 @@ use super::smooth::smooth;
 use super::{Filtered, Flags, Measured, Point};
 use crate::statistics::median;
 
+/// A mark that has merged with a like thing, of which it covers most, is off by about this part of its radius (judgement).
+const MERGED_RADII: f64 = 0.3;
 /// Frames of a speed that show how large a mark is at it, and the least difference of speeds (px a frame) that does.
 const FEWEST_OF_A_SPEED: usize = 10;
 const LEAST_SPEED_PX: f64 = 1.0;
@@ -125,6 +127,8 @@ fn flag_area_change(m: &mut Measured, flags: &mut Flags, usual_px2: f64) {
     } else if ratio > 1.35 {
         flags.insert(Flags::MERGED);
         1.0 - 1.0 / ratio
+    } else if flags.contains(Flags::MERGED) {
+        MERGED_RADII
     } else if flags.contains(Flags::CUT) {
         0.1
     } else {
