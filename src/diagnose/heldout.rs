@@ -41,19 +41,24 @@ pub struct Prediction {
     pub told: Vec<f64>,
 }
 
+/// What the base model leaves beyond the noise of what was not fitted tells what others explain where it is so many variances (judgement: twice the noise in all).
+const MUCH_BEYOND_NOISE: f64 = 3.0;
+
 impl HeldOut {
     /// What the names leave, as a part of what the base model leaves.
     pub fn leaves(&self) -> f64 {
         self.augmented.over(&self.baseline)
     }
 
-    /// The part of the squares that the base model leaves beyond the noise (rad) of which the names, or another description, leave nothing.
+    /// The part of the squares that the base model leaves beyond the noise (rad) of which the names, or another description, leave nothing; all of it where that is too little to
+    /// be told from the noise's own scatter.
     pub fn explained(&self, other: Option<&Prediction>, noise_rad: &[f64]) -> f64 {
         let square = |values: &[f64]| values.iter().map(|r| r * r).sum::<f64>();
-        let beyond = |of: &Prediction| (square(&of.rmse_rad) - square(noise_rad)).max(0.0);
+        let noise = square(noise_rad);
+        let beyond = |of: &Prediction| (square(&of.rmse_rad) - noise).max(0.0);
         let left = other.into_iter().chain([&self.augmented]).map(beyond).fold(f64::INFINITY, f64::min);
         let base = beyond(&self.baseline);
-        if base > left { 1.0 - left / base } else { 0.0 }
+        if base > MUCH_BEYOND_NOISE * noise { (1.0 - left / base).max(0.0) } else { 1.0 }
     }
 }
 
@@ -282,4 +287,26 @@ fn errors(values: &[crate::fit::predict::Value], record: &Record, from_row: usiz
             (!squares.is_empty()).then(|| (squares.iter().sum::<f64>() / squares.len() as f64).sqrt())
         })
         .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_law_beside_the_names_adds_to_what_is_explained_and_noise_counts_for_nothing() {
+        let left = |rmse_rad: f64| Prediction { rmse_rad: vec![rmse_rad; 2], left: None, told: Vec::new() };
+        let proof = |baseline, augmented| HeldOut {
+            record: 0,
+            from_s: 1.0,
+            baseline: left(baseline),
+            augmented: left(augmented),
+        };
+        let noise_rad = [1.0; 2];
+        assert!((proof(9.0, 5.0).explained(None, &noise_rad) - 0.7).abs() < 1e-12);
+        assert!((proof(9.0, 5.0).explained(Some(&left(1.0)), &noise_rad) - 1.0).abs() < 1e-12);
+        // names that make it worse explain nothing, and where the base model leaves hardly more than noise nothing is told
+        assert_eq!(proof(9.0, 10.0).explained(None, &noise_rad), 0.0);
+        assert_eq!(proof(1.05, 1.06).explained(None, &noise_rad), 1.0);
+    }
 }

@@ -368,7 +368,7 @@ impl<'a> Posterior<'a> {
         let needed = self.needed.iter().find(|own| own.effect == effect);
         let likeliest = with().next().map_or(1.0 - settings.prior.imitated, |c| not_imitated(&c.fit));
         // the descriptions hold those of the table, too
-        needed.map_or(of_table, |needed| needed.probability * likeliest * self.explained)
+        needed.map_or(of_table, |needed| (needed.probability * likeliest).min(self.explained))
     }
 
     /// How probable each effect of the table is.

@@ -176,3 +176,58 @@ fn fit_from_many_starts<'a>(context: &FitContext<'a>, fit: &Refit<'a>) -> Option
     });
     ended.min_by(|a, b| a.chi2.total_cmp(&b.chi2))
 }
+
+#[cfg(test)]
+mod tests {
+    use std::path::Path;
+
+    use super::*;
+    use crate::diagnose::base_priors::DampingAssumption;
+    use crate::diagnose::misfit::Misfit;
+    use crate::diagnose::preparation;
+    use crate::diagnose::search::Search;
+    use crate::diagnose::settings::Settings;
+    use crate::experiment::Experiment;
+    use crate::fit::Record;
+    use crate::model::{ForwardModel, State, Trajectory};
+    use crate::progress::Silent;
+
+    #[test]
+    fn one_that_makes_up_a_thousandth_of_the_spring_is_found_from_its_score() {
+        let links = "[specimen]\nmass_kg = 1.1e-3\nlength_m = 0.24\nlink_lengths_m = [0.12, 0.12]\nwidth_m = 0.028\ninertia = \"rods\"\n\
+                     [model]\nk_eq_n_m_per_rad = 1.2e-3\nc_eq_n_m_s_per_rad = 7.5e-8\nrelease_rad = [-0.57, -0.43]\n";
+        let effect = "[model.effects]\njoint_hysteretic = { torque_n_m = 6e-8, yield_rad = 0.05 }\n";
+        let parsed = |text: &str| Experiment::parse(text, Path::new("links")).unwrap();
+        let model = ForwardModel::of(&parsed(&format!("{links}{effect}"))).unwrap();
+        let release = State::released(&model, &[-0.57, -0.43]).unwrap();
+        let swing = Trajectory::swing(&model, &release, 0.0, 15.0).unwrap();
+        let t_s: Vec<f64> = (0..900).map(|row| f64::from(row) / 60.0).collect();
+        // as good as random, of 0.2 mrad
+        let noise = |row: usize, link: usize| 3e-4 * ((row * row * 7 + link * 31 + row * 13) as f64).sin();
+        let angles = |link: usize| {
+            let rows = t_s.iter().enumerate();
+            rows.map(|(row, t)| Some(swing.at(*t).theta_rad[link] + noise(row, link))).collect::<Vec<_>>()
+        };
+        let record = Record::uniform("made", t_s.clone(), vec![angles(0), angles(1)]);
+        let (settings, experiment) = (Settings::default(), parsed(links));
+        let prepared = preparation::prepare(&[record], &experiment, &settings).unwrap();
+        let taken = DampingAssumption::AsStated;
+        let search = Search::of_base_model(&prepared, &prepared.experiment, taken, &settings, &Silent).unwrap();
+        let (context, base) = (&search.context, search.base());
+        let score = Hysteresis.scan(&Screen::at(context, base).unwrap()).unwrap();
+        let fit = where_scored(context, base, &score, f64::INFINITY).unwrap();
+        let torque_n_m = fit.value(Parameter::HysteresisTorque).unwrap();
+        assert!(
+            fit.chi2 < base.chi2 - 30.0 && (torque_n_m / 6e-8 - 1.0).abs() < 0.3,
+            "{} {} {torque_n_m}",
+            base.chi2,
+            fit.chi2
+        );
+        // from none at all a descent finds next to nothing of it
+        let from_none = context.refit(&fit.hypothesis, base, &score.start).unwrap();
+        assert!(from_none.chi2 > fit.chi2 + 10.0, "{} {}", from_none.chi2, fit.chi2);
+        let misfit = Misfit::of(context, base, std::slice::from_ref(&score));
+        let sought = FitRequest { context, base, effect: Effect::JointHysteretic, score: Some(&score), misfit };
+        assert!(Hysteresis.beside(&sought).unwrap().chi2 < fit.chi2 + 1.0);
+    }
+}

@@ -161,16 +161,23 @@ impl<'a> Search<'a, '_> {
         asked.into_iter().map(|asked| Proposal::Asked(asked, self.base())).collect()
     }
 
-    /// Every effect of ordinary cost beside the base model.
+    /// Every effect of ordinary cost beside the base model, and one that promises more than all of them.
     fn singles(&self) -> Vec<Proposal<'_, 'a>> {
-        self.beside_base(self.lacking(), |effect| effect.entry().cost == Cost::Ordinary)
+        self.beside_base(self.lacking(), |effect| is_ordinary(effect) || self.promises_most(effect))
     }
 
     /// The others: the corners of a strip, or all but them.
     fn dear_singles(&self, corners: bool) -> Vec<Proposal<'_, 'a>> {
         let misfit = self.lacking().beside(&self.fits[1..]);
         let is_meant = |effect| laws::has_corners_in_every_joint(&self.context, effect) == corners;
-        self.beside_base(misfit, |effect| effect.entry().cost != Cost::Ordinary && is_meant(effect))
+        self.beside_base(misfit, |effect| !is_ordinary(effect) && !self.promises_most(effect) && is_meant(effect))
+    }
+
+    /// Whether an effect of a strip that is dear to fit promises more than every other one: the budget would end before its turn, and the others only bend to it.
+    fn promises_most(&self, effect: Effect) -> bool {
+        let is_dear = !is_ordinary(effect) && !laws::has_corners_in_every_joint(&self.context, effect);
+        let ordinary = self.effects.iter().filter(|effect| is_ordinary(**effect)).map(|effect| self.promised(*effect));
+        self.context.is_strip() && is_dear && self.promised(effect) > ordinary.fold(0.0, f64::max)
     }
 
     /// Along the motion of the best fit of the whole; where that has no effect, beside it, those first that the whole promises.
@@ -196,8 +203,9 @@ impl<'a> Search<'a, '_> {
     /// Effects of some kind beside the base model, those first that promise most: the budget may end before the others.
     fn beside_base(&self, misfit: Misfit, is_of_kind: impl Fn(Effect) -> bool) -> Vec<Proposal<'_, 'a>> {
         if let Some(FrequencyMatched { base, scores }) = &self.frequency_matched {
-            let of_kind = scores.iter().filter(|score| is_of_kind(score.effect));
-            return of_kind.map(|score| Proposal::Scored(base, score.clone())).collect();
+            let mut of_kind: Vec<&Score> = scores.iter().filter(|score| is_of_kind(score.effect)).collect();
+            of_kind.sort_by(|a, b| b.gain.total_cmp(&a.gain));
+            return of_kind.into_iter().map(|score| Proposal::Scored(base, score.clone())).collect();
         }
         let mut of_kind: Vec<Effect> = self.effects.iter().copied().filter(|effect| is_of_kind(*effect)).collect();
         of_kind.sort_by(|a, b| self.promised(*b).total_cmp(&self.promised(*a)));
@@ -207,7 +215,8 @@ impl<'a> Search<'a, '_> {
 
     /// By how much an effect promises to lower the base model's χ².
     fn promised(&self, effect: Effect) -> f64 {
-        self.scores.iter().find(|score| score.effect == effect).map_or(0.0, |score| score.gain)
+        let scores = self.frequency_matched.as_ref().map_or(&self.scores, |matched| &matched.scores);
+        scores.iter().find(|score| score.effect == effect).map_or(0.0, |score| score.gain)
     }
 
     fn begun_at_the_leader(&self) -> Vec<Proposal<'_, 'a>> {
@@ -402,6 +411,10 @@ impl<'a> Search<'a, '_> {
         };
         seeds.into_iter().flat_map(of).collect()
     }
+}
+
+fn is_ordinary(effect: Effect) -> bool {
+    effect.entry().cost == Cost::Ordinary
 }
 
 /// The fits whose effects have not yet had their turn, which then have.
