@@ -89,12 +89,12 @@ impl Verdict {
             // friction that fades with speed is friction, and predicts with its own law, where that does not explain more than the names do
             let of_law = |proof: &HeldOut| {
                 let of_names = learnt.filter(|learnt| learnt.holds(&best.hypothesis.effects));
-                let left = of_names.map(|learnt| learnt.prediction.over(&proof.baseline));
-                let (with_law, by_names) = (left?.powi(2), proof.leaves().powi(2));
-                (1.0 - by_names >= by_names - with_law).then_some(left?)
+                let left = of_names.map_or(f64::INFINITY, |learnt| learnt.prediction.over(&proof.baseline));
+                let by_names = proof.leaves().powi(2);
+                let adds_less = by_names - left.powi(2) <= 1.0 - by_names;
+                if adds_less { left } else { f64::INFINITY }
             };
-            let left = |proof: &HeldOut| of_law(proof).into_iter().fold(proof.leaves(), f64::min);
-            let predicts = proof.is_some_and(|proof| left(proof) <= settings.verdict.proven);
+            let predicts = proof.is_some_and(|proof| proof.leaves().min(of_law(proof)) <= settings.verdict.proven);
             let inclusions = posterior.inclusions(settings);
             let is_likely = inclusions.iter().any(|own| own.1 > settings.verdict.even);
             let stand = is_likely && replaced(posterior, settings).is_none() && (leaves_little || predicts);

@@ -49,7 +49,7 @@ pub struct Follower {
     /// It has stood still for long, and has not left its place since.
     is_still: bool,
     /// How well it keeps to its place once it has stood still for long.
-    pub keeping: Keeping,
+    keeping: Keeping,
 }
 
 /// How well something keeps to the place where it has stood still for long.
@@ -65,7 +65,7 @@ pub enum Keeping {
 
 impl Follower {
     /// At rest at its first sighting.
-    pub fn start(sighting: &Sighting, t_s: f64, step_s: f64) -> Self {
+    pub fn start(sighting: &Sighting, t_s: f64, step_s: f64, keeping: Keeping) -> Self {
         let area = f64::from(sighting.measured.area_px2);
         let diameter = area.sqrt() * 1.13;
         // a mark moves about its own diameter off a straight course between two frames, until more is known
@@ -84,18 +84,13 @@ impl Follower {
             first_px: Vector2::from(sighting.measured.position_px),
             farthest_px: 0.0,
             is_still: false,
-            keeping: Keeping::No,
+            keeping,
         }
     }
 
-    /// The same of what is no mark.
-    pub fn start_other(sighting: &Sighting, t_s: f64, step_s: f64) -> Self {
-        Self { keeping: Keeping::Always, ..Self::start(sighting, t_s, step_s) }
-    }
-
-    /// It is no mark, and stands where it was first seen.
+    /// It is known to be furniture that stands where it was first seen.
     pub fn into_furniture(self) -> Self {
-        Self { age: NEWCOMER_FRAMES, is_still: true, keeping: Keeping::Always, ..self }
+        Self { age: NEWCOMER_FRAMES, is_still: true, ..self }
     }
 
     /// Whether a sighting is where it was first seen.
@@ -120,11 +115,8 @@ impl Follower {
 
     /// Whether a sighting of something else covers a part of it, where it stands.
     pub fn is_covered_by(&self, sighting: &Sighting) -> bool {
-        let other_px = 0.56 * f64::from(sighting.measured.area_px2).sqrt();
-        self.hue == sighting.hue
-            && self.keeping == Keeping::Always
-            && self.stands()
-            && self.off_px(sighting) < other_px + self.radius_px()
+        let reach_px = self.radius_px() + radius_px(f64::from(sighting.measured.area_px2));
+        self.hue == sighting.hue && self.stands() && self.off_px(sighting) < reach_px
     }
 
     /// Waits for what is seen at `t_s`.
@@ -151,7 +143,7 @@ impl Follower {
     }
 
     fn radius_px(&self) -> f64 {
-        0.56 * self.area_px2.sqrt()
+        radius_px(self.area_px2)
     }
 
     /// Cost of a sighting, `None` outside the gate. The gate is never narrower than the mark itself, so that a
@@ -202,6 +194,11 @@ impl Follower {
         self.seen_s = self.t_s;
         self.unseen_frames = 0;
     }
+}
+
+/// Of a disc of this area.
+fn radius_px(area_px2: f64) -> f64 {
+    0.56 * area_px2.sqrt()
 }
 
 /// A centroid as the filter takes it, with some extra uncertainty.

@@ -2,7 +2,7 @@
 
 use super::FrameBlobs;
 use super::choose::{candidates, stretch_of};
-use super::tracklet::link;
+use super::tracklet::{link, standing};
 use crate::statistics::{median, median_step_s};
 
 /// A lasting thing in a recording, whatever it is.
@@ -106,7 +106,7 @@ impl TrackedObject {
 pub fn things(window: &[FrameBlobs]) -> Vec<TrackedObject> {
     let stamps: Vec<f64> = window.iter().map(|frame| frame.t_s).collect();
     let Some(step_s) = median_step_s(&stamps) else { return Vec::new() };
-    let tracklets = link(window, step_s);
+    let tracklets = link(window, &standing(window, step_s), step_s);
     candidates(&tracklets, window, None)
         .into_iter()
         .map(|c| TrackedObject {

@@ -8,7 +8,7 @@
 
 use super::assign::assign_frame;
 use super::choose::{Choice, choose};
-use super::follower::{FORGET_S, Follower, MOST_OTHERS};
+use super::follower::{FORGET_S, Follower, Keeping, MOST_OTHERS};
 use super::identity::{Identity, Renaming};
 use super::noise::scatters;
 use super::tracklet::{MOSTLY, Tracklet, link, standing};
@@ -81,14 +81,15 @@ impl Tracker {
     fn begin(&mut self, may_wait: bool) {
         let stamps: Vec<f64> = self.window.iter().map(|frame| frame.t_s).collect();
         self.step_s = median_step_s(&stamps).unwrap_or(self.step_s);
-        let tracklets = link(&self.window, self.step_s);
+        let standing = standing(&self.window, self.step_s);
+        let tracklets = link(&self.window, &standing, self.step_s);
         let choice = choose(&tracklets, &self.window, &self.slots, self.pivot_px);
         if may_wait && (choice.chosen.iter().any(Option::is_none) || !choice.moves) {
             return;
         }
         self.learn(&choice, &tracklets);
         if choice.moves {
-            self.begin_furniture(&choice, &tracklets);
+            self.begin_furniture(standing, &choice, &tracklets);
         }
         self.choice = Some(choice);
         for frame in std::mem::take(&mut self.window).iter().enumerate() {
@@ -109,14 +110,14 @@ impl Tracker {
     }
 
     /// What stands still through most of the first frames, where no mark does, is known from the first one on.
-    fn begin_furniture(&mut self, choice: &Choice, tracklets: &[Tracklet]) {
+    fn begin_furniture(&mut self, standing: Vec<Follower>, choice: &Choice, tracklets: &[Tracklet]) {
         let is_of = |place: &Follower, tracklet: &Tracklet| {
             let all = tracklet.sightings.iter().map(|(frame, blob)| &self.window[*frame].sightings[*blob]);
             let there = all.filter(|own| place.is_at_its_place(own)).count() as f64;
             there > MOSTLY * tracklet.sightings.len() as f64
         };
         let is_mark = |place: &Follower| choice.chosen.iter().flatten().any(|chosen| is_of(place, &tracklets[*chosen]));
-        let furniture = standing(&self.window, self.step_s).into_iter().filter(|place| !is_mark(place));
+        let furniture = standing.into_iter().filter(|place| !is_mark(place));
         self.others.extend(furniture.map(Follower::into_furniture).take(MOST_OTHERS));
     }
 
@@ -128,7 +129,7 @@ impl Tracker {
             if let Some(&(first, blob)) = tracklet.sightings.first()
                 && first == index
             {
-                *mark = Some(Follower::start(&frame.sightings[blob], frame.t_s, self.step_s));
+                *mark = Some(Follower::start(&frame.sightings[blob], frame.t_s, self.step_s, Keeping::No));
             }
         }
     }
@@ -188,7 +189,7 @@ impl Tracker {
         self.others.retain(|o| frame.t_s - o.seen_s < FORGET_S);
         for (sighting, _) in sightings.iter().zip(&taken).filter(|(_, taken)| !**taken) {
             if self.others.len() < MOST_OTHERS {
-                self.others.push(Follower::start_other(sighting, frame.t_s, self.step_s));
+                self.others.push(Follower::start(sighting, frame.t_s, self.step_s, Keeping::Always));
             }
         }
     }

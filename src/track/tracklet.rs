@@ -25,7 +25,7 @@ pub fn standing(window: &[FrameBlobs], step_s: f64) -> Vec<Follower> {
     let counted: Vec<&FrameBlobs> = every(COUNTED_FRAMES).collect();
     let mut places: Vec<Follower> = Vec::new();
     for sighting in every(SEEKING_FRAMES).flat_map(|frame| &frame.sightings) {
-        let place = Follower::start(sighting, window[0].t_s, step_s);
+        let place = Follower::start(sighting, window[0].t_s, step_s, Keeping::Always);
         let is_seen = |frame: &&&FrameBlobs| frame.sightings.iter().any(|own| place.is_at_its_place(own));
         let is_known = places.iter().any(|known| known.is_at_its_place(sighting));
         if !is_known && counted.iter().filter(is_seen).count() as f64 > MOSTLY * counted.len() as f64 {
@@ -35,9 +35,8 @@ pub fn standing(window: &[FrameBlobs], step_s: f64) -> Vec<Follower> {
     places
 }
 
-/// Links the sightings of a window into tracklets.
-pub fn link(window: &[FrameBlobs], step_s: f64) -> Vec<Tracklet> {
-    let standing = standing(window, step_s);
+/// Links the sightings of a window, in which these things stand, into tracklets.
+pub fn link(window: &[FrameBlobs], standing: &[Follower], step_s: f64) -> Vec<Tracklet> {
     let mut followers: Vec<(usize, Follower)> = Vec::new();
     let mut tracklets: Vec<Tracklet> = Vec::new();
     for (index, frame) in window.iter().enumerate() {
@@ -64,8 +63,7 @@ pub fn link(window: &[FrameBlobs], step_s: f64) -> Vec<Tracklet> {
         }
         for (column, sighting) in frame.sightings.iter().enumerate() {
             if !taken[column] && followers.len() < 4 * MOST_OTHERS {
-                let mut follower = Follower::start(sighting, frame.t_s, step_s);
-                follower.keeping = Keeping::Likely;
+                let mut follower = Follower::start(sighting, frame.t_s, step_s, Keeping::Likely);
                 if standing.iter().any(|place| place.is_at_its_place(sighting)) {
                     follower.stand_there();
                 }

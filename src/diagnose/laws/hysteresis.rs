@@ -85,7 +85,7 @@ fn where_scored<'a>(context: &FitContext<'a>, base: &Refit<'a>, score: &Score, b
     let hypothesis = base.hypothesis.and(Effect::JointHysteretic, None);
     let spring = base.problem.free.iter().copied().find(|parameter| parameter.is_spring());
     let steps = &context.settings.descent;
-    let softened = |start: &Vec<(Parameter, f64)>| {
+    let with_softer_spring = |start: &Vec<(Parameter, f64)>| {
         let of = |parameter| start.iter().find(|(own, _)| *own == parameter).map(|(_, value)| *value);
         let added = of(Parameter::HysteresisTorque)? / of(Parameter::HysteresisYield)?;
         let whole = spring_stiffness(base)?;
@@ -94,7 +94,7 @@ fn where_scored<'a>(context: &FitContext<'a>, base: &Refit<'a>, score: &Score, b
         start.push((spring?, (1.0 - share) * base.value(spring?)?));
         Some(start)
     };
-    let starts: Vec<_> = std::iter::once(&score.start).chain(&score.further).filter_map(softened).collect();
+    let starts: Vec<_> = std::iter::once(&score.start).chain(&score.further).filter_map(with_softer_spring).collect();
     if starts.is_empty() {
         return context.refit_below(bound, &hypothesis, base, &score.start);
     }
