@@ -282,6 +282,20 @@ fn a_tilted_camera_is_not_told_from_a_side_force_without_a_plumb_line() {
 }
 
 #[test]
+fn a_mark_beside_its_link_is_an_offset_of_that_angle_and_no_tilt() {
+    let folder = Folder::new();
+    let angles = folder.swing(BASE, "differential_zero = 0.01\n");
+    let report = folder.diagnosis(&angles, BASE, &[]);
+    let verdict = &report["verdict"];
+    assert_eq!(names(&verdict["effects"]), ["differential_zero"], "{verdict:#}");
+    assert!(verdict["inclusion"]["differential_zero"].as_f64().unwrap() > 0.9, "{verdict:#}");
+    assert!(verdict["statement"].as_str().unwrap().contains("A mark beside its link"), "{verdict:#}");
+    let found = &report["candidates"][0]["parameters"]["differential_zero"];
+    let [value, sd] = ["value", "sd"].map(|key| found[key].as_f64().unwrap());
+    assert!((value - 0.01).abs() < 4.0 * sd && sd < 1e-4, "{found}");
+}
+
+#[test]
 fn of_an_encoder_no_error_of_a_camera_is_named() {
     let folder = Folder::new();
     let angles = folder.swing(BASE, "angle_gain = 0.05\n");

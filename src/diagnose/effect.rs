@@ -22,6 +22,8 @@ pub enum Effect {
     CameraOblique,
     /// θ₂ is sampled later than θ₁.
     DifferentialLag,
+    /// An offset of θ₂ that θ₁ does not have.
+    DifferentialZero,
     /// Viscous friction of the hinge.
     HingeViscous,
     /// Dry friction of the hinge.
@@ -282,7 +284,7 @@ const fn velocity(entry: Entry) -> Entry {
 }
 
 /// The table, those of the camera first: an error of measurement is not to be blamed on physics.
-static TABLE: [Entry; 18] = {
+static TABLE: [Entry; 19] = {
     use Acts::{Loss, Motion, Otherwise, Pace};
     use Parameter as P;
     use Place::{Air, Camera, Hinge, Joint};
@@ -307,6 +309,10 @@ static TABLE: [Entry; 18] = {
                 Otherwise,
                 "a time offset between θ1 and the other angles",
             )))
+        },
+        Entry {
+            needs: Requires::Joint,
+            ..entry(&[P::DifferentialZero], Camera, Otherwise, "a constant offset between θ1 and the other angles")
         },
         Entry {
             shapes: PROPORTIONAL,
@@ -363,13 +369,14 @@ static TABLE: [Entry; 18] = {
 
 impl Effect {
     /// Every effect, in the order of the table.
-    pub const ALL: [Self; 18] = [
+    pub const ALL: [Self; 19] = [
         Self::TimeBase,
         Self::DroppedFrames,
         Self::CameraTilt,
         Self::AngleGain,
         Self::CameraOblique,
         Self::DifferentialLag,
+        Self::DifferentialZero,
         Self::HingeViscous,
         Self::HingeCoulomb,
         Self::HingeStiffness,
@@ -492,6 +499,7 @@ mod tests {
             "angle_gain",
             "camera_oblique",
             "differential_lag",
+            "differential_zero",
             "hinge_viscous",
             "hinge_coulomb",
             "hinge_stiffness",

@@ -4,7 +4,7 @@
 //! a · place × state × shape × modulation
 //! place       hinge, joint, strip, tip
 //! state       the angle there, its rate, the wind across the strip
-//! shape       |u|^p sgn u (p = 0 … 3), u², constant, one-sided, with play, a bump, a sign that fades with speed
+//! shape       |u|^p sgn u (p = 0 … 3), u², constant, one-sided, with play, a stop on one side, a bump, a pull near the middle, a sign that fades with speed
 //! modulation  1, growing with time, fading with time, from an instant on; of what goes with a rate also with the angle, as of a magnet at the lowest point
 //! ```
 //!
@@ -45,6 +45,19 @@ impl Term {
         Self { law, ..self.clone() }
     }
 
+    /// What it becomes where its further coefficients say nothing: a sign that fades at a speed beyond all that were seen is a sign.
+    pub fn plainer(&self) -> Option<Self> {
+        let shapes = || shapes_of(self.state);
+        let words = match self.modulation {
+            NO_MODULATION => shapes().find(|shape| shape.words == self.shape)?.plainer?,
+            _ => self.shape,
+        };
+        let shape = shapes().find(|shape| shape.words == words)?;
+        let mut plain = term(self.law.place, self.state, (shape, &[]), None);
+        plain.law.parameters.get_mut("a")?.start = self.law.parameters.get("a")?.start;
+        Some(plain)
+    }
+
     /// Its formula with the numbers of its coefficients.
     pub fn formula_with_values(&self) -> String {
         let number = |word: &str| self.law.parameters.get(word).map(|own| format!("{:.3e}", own.start));
@@ -71,12 +84,21 @@ struct Shape {
     formula: &'static str,
     /// The power of the state's unit that it has.
     power: i32,
-    /// Starts of b and c, as parts of the largest u.
+    /// Starts of b and c, as parts of the largest u. A width or a threshold has no meaning below nothing; where b is a place, it may start there.
     starts: &'static [&'static [f64]],
+    /// The shape that it becomes where b says nothing.
+    plainer: Option<&'static str>,
+}
+
+impl Shape {
+    /// Whether b is a place among the states, on either side.
+    fn has_place(&self) -> bool {
+        self.starts.iter().any(|start| start[0] <= 0.0)
+    }
 }
 
 const fn plain(words: &'static str, formula: &'static str, power: i32) -> Shape {
-    Shape { words, formula, power, starts: &[] }
+    Shape { words, formula, power, starts: &[], plainer: None }
 }
 
 /// Of any state.
@@ -88,25 +110,44 @@ const POWERS: [Shape; 5] = [
     plain("one-sided", "max(u, 0)", 1),
 ];
 /// Of an angle.
-const OF_ANGLE: [Shape; 4] = [
+const OF_ANGLE: [Shape; 7] = [
     plain("square", "u ^ 2", 2),
     plain("constant", "1", 0),
-    Shape { words: "with play", formula: "sign(u) * max(abs(u) - b, 0)", power: 1, starts: &[&[0.15], &[0.4], &[0.7]] },
     Shape {
-        words: BUMP,
+        words: "with play",
+        formula: "sign(u) * max(abs(u) - b, 0)",
+        power: 1,
+        starts: &[&[0.15], &[0.4], &[0.7]],
+        plainer: Some("in proportion"),
+    },
+    Shape { words: STOP, formula: "max(u - b, 0)", power: 1, starts: PLACES_OF_STOPS, plainer: None },
+    Shape { words: STOP, formula: "min(u + b, 0)", power: 1, starts: PLACES_OF_STOPS, plainer: None },
+    Shape {
+        words: "bump",
         formula: "exp(-((u - b) / c) ^ 2 / 2)",
         power: 0,
         starts: &[&[-0.5, 0.15], &[0.0, 0.15], &[0.5, 0.15], &[-0.5, 0.4], &[0.0, 0.4], &[0.5, 0.4]],
+        plainer: None,
+    },
+    Shape {
+        words: "a pull near the middle",
+        formula: "u * exp(-(u / b) ^ 2 / 2)",
+        power: 1,
+        starts: &[&[0.15], &[0.4]],
+        plainer: Some("in proportion"),
     },
 ];
-/// The shape whose b may be negative.
-const BUMP: &str = "bump";
+/// It may stand on either side.
+const STOP: &str = "a stop on one side";
+/// Touched before the middle, or beyond it.
+const PLACES_OF_STOPS: &[&[f64]] = &[&[-0.3], &[0.2], &[0.5], &[0.75]];
 /// Of a rate.
 const OF_RATE: [Shape; 1] = [Shape {
     words: "sign that fades with speed",
     formula: "sign(u) * exp(-abs(u) / b)",
     power: 0,
     starts: &[&[0.05], &[0.2], &[1.0], &[4.0]],
+    plainer: Some("sign"),
 }];
 
 /// How an amplitude changes.
@@ -120,6 +161,8 @@ struct Modulation {
     powers: [i32; 2],
 }
 
+/// It does not.
+const NO_MODULATION: &str = "none";
 /// With time.
 const WITH_TIME: [Modulation; 3] = [
     Modulation { words: "growing with time", formula: "t", starts: &[], powers: [0, 1] },
@@ -144,14 +187,20 @@ pub fn terms(place: LawPlace, largest: StateRange) -> Vec<Term> {
     states.iter().flat_map(|state| of_state(place, state, largest)).collect()
 }
 
-fn of_state(place: LawPlace, state: &'static str, largest: StateRange) -> Vec<Term> {
-    let (size, own): (f64, &[Shape]) = match state {
-        "angle" => (largest.angle, &OF_ANGLE),
-        "rate" => (largest.rate, &OF_RATE),
-        _ => (largest.rate, &[]),
+/// The shapes that a state may have.
+fn shapes_of(state: &str) -> impl Iterator<Item = &'static Shape> {
+    let own: &[Shape] = match state {
+        "angle" => &OF_ANGLE,
+        "rate" => &OF_RATE,
+        _ => &[],
     };
+    POWERS.iter().chain(own)
+}
+
+fn of_state(place: LawPlace, state: &'static str, largest: StateRange) -> Vec<Term> {
+    let size = if state == "angle" { largest.angle } else { largest.rate };
     let mut all = Vec::new();
-    for shape in POWERS.iter().chain(own) {
+    for shape in shapes_of(state) {
         let none: &[&[f64]] = &[&[]];
         for starts in if shape.starts.is_empty() { none } else { shape.starts } {
             let starts: Vec<f64> = starts.iter().map(|part| part * size).collect();
@@ -194,8 +243,7 @@ fn term(
     let amplitude = coefficient(0.0, None, &unit_of(place, state, shape.power, powers));
     let mut parameters = BTreeMap::from([("a".to_owned(), amplitude)]);
     for (name, start) in ["b", "c"].into_iter().zip(starts) {
-        // a width or a threshold has no meaning below nothing; the middle of a bump has
-        let least = (name == "c" || shape.words != BUMP).then_some(1e-3 * start.abs());
+        let least = (name == "c" || !shape.has_place()).then_some(1e-3 * start.abs());
         parameters.insert(name.to_owned(), coefficient(*start, least, of_state));
     }
     if let Some(d) = changes.and_then(|(_, d)| d) {
@@ -203,7 +251,7 @@ fn term(
         parameters.insert("d".to_owned(), coefficient(d, Some(1e-3 * d), unit));
     }
     let law = Law { name: "learnt".to_owned(), place, formula, parameters };
-    let modulation = changes.map_or("none", |(modulation, _)| modulation.words);
+    let modulation = changes.map_or(NO_MODULATION, |(modulation, _)| modulation.words);
     let drifts = WITH_TIME.iter().any(|own| own.words == modulation);
     Term { law, state, shape: shape.words, modulation, drifts }
 }
@@ -265,7 +313,7 @@ mod tests {
                 Formula::of(&term.law)
                     .unwrap_or_else(|| panic!("{:?}", term.law.expression()))
                     .add_torque(&chain, &motion, &mut q);
-                let one_sided_or_far = term.shape == "one-sided" || matches!(term.shape, "bump" | "with play");
+                let one_sided_or_far = matches!(term.shape, "one-sided" | "bump" | "with play" | STOP);
                 assert!(q.iter().any(|q| *q != 0.0) || one_sided_or_far, "{} does nothing", term.law.formula);
                 let starts: Vec<String> = term.law.parameters.values().map(|own| own.start.to_string()).collect();
                 formulas.push(format!("{} {starts:?}", term.law.formula));
@@ -279,7 +327,7 @@ mod tests {
 
     #[test]
     fn numbers_stand_for_the_words_that_are_coefficients_and_for_no_part_of_another() {
-        let bump = terms(LawPlace::Hinge, LARGEST).into_iter().find(|term| term.shape == BUMP).unwrap();
+        let bump = terms(LawPlace::Hinge, LARGEST).into_iter().find(|term| term.shape == "bump").unwrap();
         let of = |a: f64| {
             let mut term = bump.clone();
             term.law.parameters.get_mut("a").unwrap().start = a;
@@ -288,6 +336,36 @@ mod tests {
         assert_eq!(of(0.002), "-2.000e-3 * exp(-((angle + 2.500e-1) / 7.500e-2) ^ 2 / 2)");
         assert_eq!(of(-0.002), "2.000e-3 * exp(-((angle + 2.500e-1) / 7.500e-2) ^ 2 / 2)");
         assert_eq!(with_words("a * ab + 2", |word| (word == "a").then(|| "x".to_owned())), "x * ab + 2");
+    }
+
+    #[test]
+    fn a_term_whose_scale_says_nothing_is_a_plainer_one() {
+        let all = terms(LawPlace::Joint, LARGEST);
+        let plainer = |shape: &str, modulation: &str| {
+            let mut term = all.iter().find(|own| own.shape == shape && own.modulation == modulation).unwrap().clone();
+            term.law.parameters.get_mut("a").unwrap().start = 0.3;
+            term.plainer().map(|plain| (plain.formula_with_values(), plain.law.parameters.len()))
+        };
+        let plain = |formula: &str| Some((formula.to_owned(), 1));
+        assert_eq!(plainer("sign that fades with speed", NO_MODULATION), plain("-3.000e-1 * sign(rate)"));
+        assert_eq!(plainer("with play", NO_MODULATION), plain("-3.000e-1 * angle"));
+        assert_eq!(plainer("sign", "fading with time"), plain("-3.000e-1 * sign(angle)"));
+        assert_eq!(plainer("bump", NO_MODULATION), None);
+        assert_eq!(plainer("cube", NO_MODULATION), None);
+    }
+
+    #[test]
+    fn a_stop_stands_on_either_side_and_before_the_middle_or_beyond_it() {
+        let stops: Vec<Term> = terms(LawPlace::Joint, LARGEST).into_iter().filter(|own| own.shape == STOP).collect();
+        let touches = |stop: &Term, angle: f64| {
+            let b = stop.law.parameters["b"].start;
+            if stop.law.formula.contains("max") { angle > b } else { angle < -b }
+        };
+        for angle in [-0.45, -0.2, 0.2, 0.45] {
+            let touched = stops.iter().filter(|stop| touches(stop, angle)).count();
+            assert!(touched > 0 && touched < stops.len(), "{angle}");
+        }
+        assert!(stops.iter().all(|stop| stop.law.parameters["b"].min.is_none()));
     }
 
     #[test]

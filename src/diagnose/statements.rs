@@ -224,6 +224,11 @@ impl Findings<'_> {
                 " The joint yields at an angle close to zero: this hysteresis acts like dry friction in the joint.",
             );
         }
+        if self.verdict.effects.contains(&Effect::DifferentialZero) {
+            remark.push_str(
+                " A mark beside its link, a pivot that is not where the file says, or the zero of one sensor makes such an offset.",
+            );
+        }
         if let Some(off) = self.length_off() {
             let (percent, long) = (1e2 * off.abs(), if off > 0.0 { "long" } else { "short" });
             let _ = write!(

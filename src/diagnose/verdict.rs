@@ -231,7 +231,7 @@ fn to_decide(effects: &[Effect], class: &[Effect], marks: usize) -> Option<Strin
     }
     let has = |of: &[Effect]| of.iter().filter(|c| class.contains(c)).count() > 1;
     let mut advice: Vec<&str> = Vec::new();
-    if has(&[Effect::CameraTilt, Effect::SideForce, Effect::RestCurl]) {
+    if has(&[Effect::CameraTilt, Effect::DifferentialZero, Effect::SideForce, Effect::RestCurl]) {
         advice.push(
             "film a plumb line beside the specimen, and film the specimen again turned by 180° about its long axis",
         );

@@ -78,6 +78,8 @@ pub struct Effects {
     pub camera_oblique: Option<ObliqueView>,
     /// θ₂ sampled later than θ₁ (s).
     pub differential_lag: Option<f64>,
+    /// Offset of θ₂ over that of θ₁ (rad).
+    pub differential_zero: Option<f64>,
 }
 
 /// Start values and settings of the forward model.
@@ -167,6 +169,7 @@ impl Effects {
             ("angle_gain", self.angle_gain),
             ("camera_oblique.shear", self.camera_oblique.map(|view| view.shear)),
             ("differential_lag", self.differential_lag),
+            ("differential_zero", self.differential_zero),
         ] {
             checked(id, value, finite)?;
         }

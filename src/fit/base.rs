@@ -40,6 +40,7 @@ pub fn base_parameters(experiment: &Experiment, marks: usize) -> Vec<Parameter> 
         (effects.camera_oblique.map(|view| view.stretch), Parameter::ViewStretch),
         (effects.camera_oblique.map(|view| view.shear), Parameter::ViewShear),
         (effects.differential_lag, Parameter::DifferentialLag),
+        (effects.differential_zero, Parameter::DifferentialZero),
     ];
     let named = named.into_iter().filter_map(|(value, parameter)| value.map(|_| parameter));
     let stated = experiment.model.law.iter().flat_map(|law| law.coefficients().map(|(parameter, _)| parameter));

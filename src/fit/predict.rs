@@ -93,7 +93,12 @@ pub fn predict(model: &ForwardModel, request: &Request<'_>) -> Result<Prediction
                 row_slopes[column] += camera.slope(*parameter, t_s, link, theta, omega);
             }
             flat.extend_from_slice(&row_slopes);
-            values.push(Value { link, row, predicted_rad: camera.seen_rad(theta), rate_rad_s: seen_slope * omega });
+            values.push(Value {
+                link,
+                row,
+                predicted_rad: camera.seen_rad(theta, link),
+                rate_rad_s: seen_slope * omega,
+            });
         }
     }
     let slopes = DMatrix::from_row_slice(values.len(), columns, &flat);

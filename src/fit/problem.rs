@@ -390,6 +390,7 @@ pub fn switch_on(experiment: &mut Experiment, parameter: Parameter) {
             effects.camera_oblique.get_or_insert_default();
         }
         Parameter::DifferentialLag => on(&mut effects.differential_lag),
+        Parameter::DifferentialZero => on(&mut effects.differential_zero),
     }
 }
 

@@ -7,7 +7,7 @@ use crate::experiment::Effects;
 /// A camera that is not perfect. The angle seen of link i at stamp t is
 ///
 /// ```text
-/// φᵢ(t) = (1 + angle_gain) v(θᵢ(T(t) + [i > 1] differential_lag)) + camera_tilt
+/// φᵢ(t) = (1 + angle_gain) v(θᵢ(T(t) + [i > 1] differential_lag)) + camera_tilt + [i > 1] differential_zero
 /// T(t)  = t₀ + (1 + time_base)(t − t₀) + [t ≥ t_d] dropped_frames
 /// ```
 ///
@@ -28,6 +28,8 @@ pub struct Camera {
     pub view: View,
     /// `differential_lag`.
     pub lag_s: f64,
+    /// `differential_zero`.
+    pub zero_rad: f64,
     /// t₀: here the true time is the stamp.
     pub origin_s: f64,
 }
@@ -43,6 +45,7 @@ impl Camera {
             gain: effects.angle_gain.unwrap_or(0.0),
             view: effects.camera_oblique.map_or(View::default(), |o| View { stretch: o.stretch, shear: o.shear }),
             lag_s: effects.differential_lag.unwrap_or(0.0),
+            zero_rad: effects.differential_zero.unwrap_or(0.0),
             origin_s,
         }
     }
@@ -64,9 +67,10 @@ impl Camera {
         }
     }
 
-    /// φ of θ.
-    pub fn seen_rad(&self, theta_rad: f64) -> f64 {
-        (1.0 + self.gain) * self.view.angle_rad(theta_rad) + self.tilt_rad
+    /// φ of θ of one link.
+    pub fn seen_rad(&self, theta_rad: f64, link: usize) -> f64 {
+        let zero_rad = if link > 0 { self.zero_rad } else { 0.0 };
+        (1.0 + self.gain) * self.view.angle_rad(theta_rad) + self.tilt_rad + zero_rad
     }
 
     /// ∂φ/∂θ.
@@ -78,6 +82,7 @@ impl Camera {
     pub fn slope(&self, parameter: Parameter, t_s: f64, link: usize, theta_rad: f64, omega_rad_s: f64) -> f64 {
         match parameter {
             Parameter::CameraTilt => 1.0,
+            Parameter::DifferentialZero if link > 0 => 1.0,
             Parameter::AngleGain => self.view.angle_rad(theta_rad),
             Parameter::ViewStretch => (1.0 + self.gain) * self.view.slopes(theta_rad).stretch,
             Parameter::ViewShear => (1.0 + self.gain) * self.view.slopes(theta_rad).shear,
@@ -98,6 +103,7 @@ impl Camera {
             Parameter::ViewStretch => Some(self.view.stretch),
             Parameter::ViewShear => Some(self.view.shear),
             Parameter::DifferentialLag => Some(self.lag_s),
+            Parameter::DifferentialZero => Some(self.zero_rad),
             _ => None,
         }
     }
@@ -112,6 +118,7 @@ impl Camera {
             Parameter::ViewStretch => self.view.stretch = value,
             Parameter::ViewShear => self.view.shear = value,
             Parameter::DifferentialLag => self.lag_s = value,
+            Parameter::DifferentialZero => self.zero_rad = value,
             _ => {}
         }
     }
@@ -131,12 +138,13 @@ mod tests {
             gain: -0.03,
             view: View { stretch: 0.05, shear: -0.08 },
             lag_s: 0.004,
+            zero_rad: 0.03,
             origin_s: 0.2,
         };
         let (t_s, link, step) = (2.0, 1, 1e-6);
         let theta = |true_s: f64| 1.3 * (2.0 * true_s).sin();
         let rate = |true_s: f64| 2.6 * (2.0 * true_s).cos();
-        let seen = |camera: &Camera| camera.seen_rad(theta(camera.true_time_s(t_s, link)));
+        let seen = |camera: &Camera| camera.seen_rad(theta(camera.true_time_s(t_s, link)), link);
         let of_camera = Parameter::ALL.into_iter().filter(|parameter| camera.value(*parameter).is_some());
         let mut count = 0;
         for parameter in of_camera {
@@ -152,6 +160,6 @@ mod tests {
             assert!((slope - difference).abs() < 1e-7, "{parameter}: {slope} {difference}");
             count += 1;
         }
-        assert_eq!(count, 7);
+        assert_eq!(count, 8);
     }
 }

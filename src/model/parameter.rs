@@ -94,6 +94,8 @@ pub enum Parameter {
     ViewShear,
     /// θ₂ is sampled later than θ₁.
     DifferentialLag,
+    /// Offset of θ₂ over that of θ₁.
+    DifferentialZero,
     /// Of a law that the file states.
     Law(LawCoefficient),
 }
@@ -129,6 +131,7 @@ impl Parameter {
             Self::ViewStretch => "camera_oblique.stretch",
             Self::ViewShear => "camera_oblique.shear",
             Self::DifferentialLag => "differential_lag",
+            Self::DifferentialZero => "differential_zero",
             Self::Law(coefficient) => coefficient.id,
         }
     }
@@ -138,7 +141,7 @@ impl Parameter {
         match self {
             Self::JointStiffness | Self::HingeStiffness => "N m/rad",
             Self::JointDamping | Self::HingeViscous => "N m s/rad",
-            Self::RestCurl | Self::HysteresisYield | Self::CameraTilt => "rad",
+            Self::RestCurl | Self::HysteresisYield | Self::CameraTilt | Self::DifferentialZero => "rad",
             Self::BendingStiffness => "N m2",
             Self::JointCubicStiffness => "N m/rad3",
             Self::HysteresisTorque | Self::HingeCoulomb => "N m",
@@ -171,6 +174,7 @@ impl Parameter {
                 | Self::HysteresisTorque
                 | Self::HysteresisYield
                 | Self::DifferentialLag
+                | Self::DifferentialZero
         )
     }
 
@@ -194,6 +198,7 @@ impl Parameter {
             | Self::ViewStretch
             | Self::ViewShear
             | Self::DifferentialLag
+            | Self::DifferentialZero
             | Self::Law(_) => false,
             Self::JointStiffness
             | Self::JointDamping
@@ -224,7 +229,7 @@ impl Parameter {
     }
 
     /// Every parameter but those of links and of stated laws.
-    pub const ALL: [Self; 24] = [
+    pub const ALL: [Self; 25] = [
         Self::JointStiffness,
         Self::JointDamping,
         Self::RestCurl,
@@ -249,6 +254,7 @@ impl Parameter {
         Self::ViewStretch,
         Self::ViewShear,
         Self::DifferentialLag,
+        Self::DifferentialZero,
     ];
 }
 

@@ -51,7 +51,11 @@ impl Swing {
 
     /// φ at a stamp, top to bottom: what a perfect measurement reads.
     pub fn angles_rad(&self, t_s: f64) -> Vec<f64> {
-        self.true_angles_rad(t_s).into_iter().map(|theta_rad| self.camera.seen_rad(theta_rad)).collect()
+        self.true_angles_rad(t_s)
+            .into_iter()
+            .enumerate()
+            .map(|(link, theta)| self.camera.seen_rad(theta, link))
+            .collect()
     }
 
     /// θ at the instants at which the camera saw it.
@@ -79,9 +83,9 @@ impl Swing {
         let level_rad = view.angle_rad(FRAC_PI_2) + self.camera.tilt_rad;
         let mut node = beside(self.hinge_px, pivot_px * view.length(FRAC_PI_2), level_rad);
         let mut nodes = vec![node];
-        for (length_m, theta_rad) in self.lengths_m.iter().zip(self.true_angles_rad(t_s)) {
+        for (link, (length_m, theta_rad)) in self.lengths_m.iter().zip(self.true_angles_rad(t_s)).enumerate() {
             let length_px = length_m * self.scale_px_per_m * view.length(theta_rad);
-            node = beside(node, length_px, self.camera.seen_rad(theta_rad));
+            node = beside(node, length_px, self.camera.seen_rad(theta_rad, link));
             nodes.push(node);
         }
         nodes
@@ -147,9 +151,9 @@ mod tests {
         let plain = Swing::of(&experiment).unwrap();
         let effects = &mut experiment.model.effects;
         (effects.camera_tilt, effects.angle_gain, effects.time_base) = (Some(0.01), Some(0.02), Some(0.1));
-        effects.differential_lag = Some(0.003);
+        (effects.differential_lag, effects.differential_zero) = (Some(0.003), Some(-0.02));
         let seen = Swing::of(&experiment).unwrap().angles_rad(0.2);
         assert!((seen[0] - (1.02 * plain.angles_rad(0.22)[0] + 0.01)).abs() < 1e-8);
-        assert!((seen[1] - (1.02 * plain.angles_rad(0.223)[1] + 0.01)).abs() < 1e-8);
+        assert!((seen[1] - (1.02 * plain.angles_rad(0.223)[1] + 0.01 - 0.02)).abs() < 1e-8);
     }
 }

@@ -20,6 +20,9 @@ use crate::model::Parameter;
 /// Scales of a term's state to begin with, over those that it had beside a name.
 const SCALED: [f64; 3] = [1.0, 0.7, 1.4];
 
+/// So many descriptions are made simpler before it is asked whether the budget allows more, on every machine the same ones at once.
+const SIMPLER_AT_ONCE: usize = 2;
+
 /// Terms that were fitted beside some effects, with the length of the description.
 pub struct Description<'a> {
     /// The terms, with their coefficients.
@@ -70,9 +73,10 @@ pub fn descriptions<'a>(
     // a term that is nearly right makes superfluous what was needed without it
     let mut tried = Vec::new();
     loop {
-        let near = order[0].length + context.settings.law.alternatives;
+        // what a prediction may yet put first
+        let near = order[0].length + context.settings.law.far;
         let new = |own: &&Description<'a>| own.length < near && !own.terms.is_empty() && !tried.contains(&own.kind());
-        let shortest: Vec<&Description<'a>> = order.iter().filter(new).collect();
+        let shortest: Vec<&Description<'a>> = order.iter().filter(new).take(SIMPLER_AT_ONCE).collect();
         if shortest.is_empty() || context.work.done() > budget.until_simpler {
             break;
         }
@@ -80,6 +84,7 @@ pub fn descriptions<'a>(
         let simpler = |own: &&Description<'a>| {
             let mut simpler = without_a_name(context, own);
             simpler.extend(without_a_term(context, own));
+            simpler.extend(with_a_plainer_term(context, own));
             simpler
         };
         let simpler: Vec<Begun<'a>> = shortest.par_iter().flat_map(simpler).collect();
@@ -111,14 +116,27 @@ fn without_a_name<'a>(context: &FitContext<'a>, own: &Description<'a>) -> Vec<Be
 fn without_a_term<'a>(context: &FitContext<'a>, own: &Description<'a>) -> Vec<Begun<'a>> {
     let fewer = |out: usize| {
         let others = own.terms.iter().enumerate().filter(|(place, _)| *place != out).map(|(_, term)| term);
-        let terms: Vec<Term> = others.enumerate().map(|(place, term)| term.named(place)).collect();
-        let start: Vec<_> =
-            terms.iter().flat_map(|term| term.law.coefficients()).map(|(p, own)| (p, own.start)).collect();
-        let begun = with_laws(context, &terms).begin(&own.fit.hypothesis, &own.fit, &start)?;
-        finish_if_competitive(context, own, (terms, begun))
+        with_other_terms(context, own, others.enumerate().map(|(place, term)| term.named(place)).collect())
     };
     let several = if own.terms.len() > 1 { own.terms.len() } else { 0 };
     (0..several).into_par_iter().with_max_len(1).filter_map(fewer).collect()
+}
+
+/// A description with each of its terms in the form that it has where its further coefficients say nothing, from where it stands.
+fn with_a_plainer_term<'a>(context: &FitContext<'a>, own: &Description<'a>) -> Vec<Begun<'a>> {
+    let plainer = |place: usize| {
+        let mut terms = own.terms.clone();
+        terms[place] = own.terms[place].plainer()?.named(place);
+        with_other_terms(context, own, terms)
+    };
+    (0..own.terms.len()).into_par_iter().with_max_len(1).filter_map(plainer).collect()
+}
+
+/// A description's effects with other terms, these with the coefficients that they have.
+fn with_other_terms<'a>(context: &FitContext<'a>, own: &Description<'a>, terms: Vec<Term>) -> Option<Begun<'a>> {
+    let start: Vec<_> = terms.iter().flat_map(|term| term.law.coefficients()).map(|(p, own)| (p, own.start)).collect();
+    let begun = with_laws(context, &terms).begin(&own.fit.hypothesis, &own.fit, &start)?;
+    finish_if_competitive(context, own, (terms, begun))
 }
 
 /// The end of a simpler fit, unless it soon leaves far more than the description does.
