@@ -50,7 +50,8 @@ impl Term {
         let shapes = || shapes_of(self.state);
         let words = match self.modulation {
             NO_MODULATION => shapes().find(|shape| shape.words == self.shape)?.plainer?,
-            _ => self.shape,
+            _ if self.law.parameters.contains_key("d") => self.shape,
+            _ => return None,
         };
         let shape = shapes().find(|shape| shape.words == words)?;
         let mut plain = term(self.law.place, self.state, (shape, &[]), None);
@@ -350,6 +351,7 @@ mod tests {
         assert_eq!(plainer("sign that fades with speed", NO_MODULATION), plain("-3.000e-1 * sign(rate)"));
         assert_eq!(plainer("with play", NO_MODULATION), plain("-3.000e-1 * angle"));
         assert_eq!(plainer("sign", "fading with time"), plain("-3.000e-1 * sign(angle)"));
+        assert_eq!(plainer("sign", "growing with time"), None);
         assert_eq!(plainer("bump", NO_MODULATION), None);
         assert_eq!(plainer("cube", NO_MODULATION), None);
     }

@@ -193,7 +193,7 @@ mod tests {
     fn imports() -> BTreeMap<String, BTreeSet<String>> {
         let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("src/diagnose");
         let mut files = Vec::new();
-        for folder in ["", "laws", "learnt", "search", "stretches"] {
+        for folder in ["", "effect", "laws", "learnt", "search", "stretches"] {
             for entry in fs::read_dir(root.join(folder)).unwrap() {
                 let path = entry.unwrap().path();
                 let file = path.file_stem().unwrap().to_str().unwrap().to_owned();
