@@ -131,7 +131,7 @@ const OF_ANGLE: [Shape; 7] = [
         plainer: None,
     },
     Shape {
-        words: "a pull near the middle",
+        words: "pull near the middle",
         formula: "u * exp(-(u / b) ^ 2 / 2)",
         power: 1,
         starts: &[&[0.15], &[0.4]],
@@ -139,7 +139,7 @@ const OF_ANGLE: [Shape; 7] = [
     },
 ];
 /// It may stand on either side.
-const STOP: &str = "a stop on one side";
+const STOP: &str = "stop on one side";
 /// Touched before the middle, or beyond it.
 const PLACES_OF_STOPS: &[&[f64]] = &[&[-0.3], &[0.2], &[0.5], &[0.75]];
 /// Of a rate.
