@@ -45,13 +45,12 @@ impl Term {
         Self { law, ..self.clone() }
     }
 
-    /// What it becomes where its further coefficients say nothing: a sign that fades at a speed beyond all that were seen is a sign.
+    /// What it becomes where its further coefficients say nothing, or where it does not change: a sign that fades at a speed beyond all that were seen is a sign.
     pub fn plainer(&self) -> Option<Self> {
         let shapes = || shapes_of(self.state);
         let words = match self.modulation {
             NO_MODULATION => shapes().find(|shape| shape.words == self.shape)?.plainer?,
-            _ if self.law.parameters.contains_key("d") => self.shape,
-            _ => return None,
+            _ => self.shape,
         };
         let shape = shapes().find(|shape| shape.words == words)?;
         let mut plain = term(self.law.place, self.state, (shape, &[]), None);
@@ -351,7 +350,7 @@ mod tests {
         assert_eq!(plainer("sign that fades with speed", NO_MODULATION), plain("-3.000e-1 * sign(rate)"));
         assert_eq!(plainer("with play", NO_MODULATION), plain("-3.000e-1 * angle"));
         assert_eq!(plainer("sign", "fading with time"), plain("-3.000e-1 * sign(angle)"));
-        assert_eq!(plainer("sign", "growing with time"), None);
+        assert_eq!(plainer("sign", "growing with time"), plain("-3.000e-1 * sign(angle)"));
         assert_eq!(plainer("bump", NO_MODULATION), None);
         assert_eq!(plainer("cube", NO_MODULATION), None);
     }

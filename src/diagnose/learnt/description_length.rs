@@ -122,7 +122,7 @@ fn without_a_term<'a>(context: &FitContext<'a>, own: &Description<'a>) -> Vec<Be
     (0..several).into_par_iter().with_max_len(1).filter_map(fewer).collect()
 }
 
-/// A description with each of its terms in the form that it has where its further coefficients say nothing, from where it stands.
+/// A description with each of its terms in the form that it has where its further coefficients say nothing, or where it does not change, from where it stands.
 fn with_a_plainer_term<'a>(context: &FitContext<'a>, own: &Description<'a>) -> Vec<Begun<'a>> {
     let plainer = |place: usize| {
         let mut terms = own.terms.clone();
