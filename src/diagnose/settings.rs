@@ -315,7 +315,7 @@ pub struct LawSettings {
     pub active: f64,
     /// The shortest descriptions of which it is asked what they predict (cost).
     pub foretold: usize,
-    /// Of none that is longer than the shortest by more nats (statistics: odds are e⁻²⁵).
+    /// Of none that is longer than the shortest by more nats, nor is one that is made simpler (statistics: odds are e⁻²⁵).
     pub far: f64,
     /// Other formulas are told whose description is longer by less than so many nats (statistics: beyond it odds are e⁻⁵).
     pub alternatives: f64,
