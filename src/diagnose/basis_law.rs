@@ -19,7 +19,7 @@ use super::linearisation::{Input, Linearisation, Row};
 use super::refit::Refit;
 use super::screen::Projection;
 use crate::fit::Record;
-use crate::model::effects::air::stations;
+use crate::model::effects::{air, load};
 use crate::model::{ForwardModel, Motion};
 
 /// Below this part of the largest rate dry friction turns round, and of the largest angle play does.
@@ -129,13 +129,15 @@ impl<'s> Swing<'s> {
 
     /// The torques on the links of each function of the speed across the strip.
     fn of_air(&self, at: &Instant, largest_m_s: f64) -> Vec<[f64; OF_SPEED]> {
+        let (chain, motion) = (&self.around.chain, &at.motion);
         let mut torques = vec![[0.0; OF_SPEED]; self.around.links];
-        stations(&self.around.chain, &at.motion, |station| {
-            let f = of_speed(station.speed_m_s / largest_m_s, at.tau);
-            for (torque, arm_m) in torques.iter_mut().zip(station.arms_m) {
-                torque.iter_mut().zip(f).for_each(|(torque, f)| *torque += f * station.weight_m * arm_m);
-            }
-        });
+        let mut q = vec![0.0; self.around.links];
+        for function in 0..OF_SPEED {
+            q.fill(0.0);
+            let force = |speed_m_s: f64| of_speed(speed_m_s / largest_m_s, at.tau)[function];
+            load::add_torque(chain, motion, |link| air::load_of(link, air::points(link), force), &mut q);
+            torques.iter_mut().zip(&q).for_each(|(torque, q)| torque[function] = *q);
+        }
         torques
     }
 
@@ -151,9 +153,8 @@ impl<'s> Swing<'s> {
 
     /// The largest speed across the strip at an instant.
     pub fn fastest_m_s(&self, motion: &Motion) -> f64 {
-        let mut fastest_m_s = 0.0f64;
-        stations(&self.around.chain, motion, |station| fastest_m_s = fastest_m_s.max(station.speed_m_s.abs()));
-        fastest_m_s
+        let points = load::links(&self.around.chain, motion).flat_map(|link| air::points(&link));
+        points.fold(0.0, |fastest_m_s, at| at.speed_m_s.abs().max(fastest_m_s))
     }
 }
 

@@ -2,9 +2,9 @@
 
 use nalgebra::{DMatrix, DVector};
 
-use super::forward::balanced;
+use super::forward::{Bearers, balanced};
 use super::shapes::Shapes;
-use super::{ForwardModel, Hinge, Motion, Parameter, Partials};
+use super::{ForwardModel, Hinge, Motion, Partials};
 use crate::error::Result;
 
 /// A model at one instant, seen along its coordinates. Rates are those of the coordinates, then the laws' own variables.
@@ -117,9 +117,9 @@ impl<'a> Balance<'a> {
     }
 
     /// ∂Q/∂parameter; `partials` are those of the same instant.
-    pub fn sensitivity(&mut self, parameter: Parameter, partials: &Partials, q: &mut [f64]) {
-        let Some(shapes) = self.shapes else { return self.model.sensitivity(parameter, &self.motion, partials, q) };
-        self.model.sensitivity(parameter, &self.motion, &self.of_links, &mut self.torque);
+    pub fn sensitivity(&mut self, of: &Bearers, partials: &Partials, q: &mut [f64]) {
+        let Some(shapes) = self.shapes else { return self.model.sensitivity_of(of, &self.motion, partials, q) };
+        self.model.sensitivity_of(of, &self.motion, &self.of_links, &mut self.torque);
         shapes.reduce(&self.torque, q);
         if self.motion.hinge == Hinge::Sticks {
             q[0] = 0.0;

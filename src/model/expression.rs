@@ -8,7 +8,7 @@
 //! ```
 //!
 //! Functions: `abs sign step max min exp sin cos sqrt tanh`. `sign` and `step` rise within ±10⁻³ of the unit of what they are of, as tanh does: an integrator
-//! cannot step over a jump, unless it is told on which side it is ([`Expression::with_sign_given`]). Derivatives are taken forward, with all variables at once.
+//! cannot step over a jump, unless it is told on which side it is ([`Expression::with_sign_given`]). Derivatives are taken forward, with some variables at once.
 
 use smallvec::SmallVec;
 
@@ -37,6 +37,8 @@ enum Node {
     Multiply,
     Divide,
     Power,
+    /// To a small whole power.
+    Raise(i32),
     Call(Function),
 }
 
@@ -67,19 +69,23 @@ const FUNCTIONS: [(&str, Function, usize); 10] = [
     ("tanh", Function::Tanh, 1),
 ];
 
+/// Largest whole power that is multiplied out.
+const MOST_MULTIPLIED: f64 = 8.0;
+
 /// A value with its derivatives.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Dual {
+pub struct Dual<const K: usize> {
     /// The value.
     pub value: f64,
-    /// With each variable.
-    pub slopes: [f64; MOST_VALUES],
+    /// With each of some variables.
+    pub slopes: [f64; K],
 }
 
 /// What a formula is evaluated with: values alone, or values with derivatives.
 trait Number: Copy {
     fn constant(value: f64) -> Self;
 
+    /// A variable; its place among those with which derivatives are taken, of which it need not be.
     fn variable(place: usize, value: f64) -> Self;
 
     fn value(self) -> f64;
@@ -113,15 +119,13 @@ impl Number for f64 {
     }
 }
 
-impl Number for Dual {
+impl<const K: usize> Number for Dual<K> {
     fn constant(value: f64) -> Self {
-        Self { value, slopes: [0.0; MOST_VALUES] }
+        Self { value, slopes: [0.0; K] }
     }
 
     fn variable(place: usize, value: f64) -> Self {
-        let mut slopes = [0.0; MOST_VALUES];
-        slopes[place] = 1.0;
-        Self { value, slopes }
+        Self { value, slopes: std::array::from_fn(|own| f64::from(u8::from(own == place))) }
     }
 
     fn value(self) -> f64 {
@@ -158,6 +162,11 @@ impl Expression {
         Ok(Self { nodes: parser.nodes, variables: variables.len() })
     }
 
+    /// How many numbers, variables, operators and functions it has.
+    pub fn operations(&self) -> usize {
+        self.nodes.len()
+    }
+
     /// Whether a variable occurs.
     pub fn uses(&self, variable: usize) -> bool {
         self.nodes.contains(&Node::Variable(variable))
@@ -176,21 +185,24 @@ impl Expression {
 
     /// The value.
     pub fn value(&self, variables: &[f64]) -> f64 {
-        self.evaluate(variables)
+        self.evaluate(variables, 0)
     }
 
-    /// The value and its derivatives with every variable.
-    pub fn at(&self, variables: &[f64]) -> Dual {
-        self.evaluate(variables)
+    /// The value and its derivatives with K variables from one on.
+    pub fn at<const K: usize>(&self, variables: &[f64], from: usize) -> Dual<K> {
+        self.evaluate(variables, from)
     }
 
-    fn evaluate<N: Number>(&self, variables: &[f64]) -> N {
+    fn evaluate<N: Number>(&self, variables: &[f64], from: usize) -> N {
         let mut stack: Stack<N> = Stack::new();
         for node in &self.nodes {
             let result = match *node {
                 Node::Number(value) => N::constant(value),
-                Node::Variable(i) => N::variable(i, variables.get(i).copied().unwrap_or(f64::NAN)),
+                Node::Variable(i) => N::variable(i.wrapping_sub(from), variables.get(i).copied().unwrap_or(f64::NAN)),
                 Node::Negate => of_one(pop(&mut stack), |v| (-v, -1.0)),
+                Node::Raise(power) => {
+                    of_one(pop(&mut stack), |v| (v.powi(power), f64::from(power) * v.powi(power - 1)))
+                }
                 Node::Call(function) if function.takes_one() => of_one(pop(&mut stack), |v| function.of(v)),
                 two => {
                     let (b, a) = (pop(&mut stack), pop(&mut stack));
@@ -319,11 +331,23 @@ impl Parser<'_> {
             self.value()?;
             if self.one_of(&['^']).is_some() {
                 self.power()?;
-                self.nodes.push(Node::Power);
+                self.raise();
             }
         }
         self.depth -= 1;
         Ok(())
+    }
+
+    /// To the power that was read last.
+    fn raise(&mut self) {
+        let is_small = |power: f64| power == power.trunc() && (1.0..=MOST_MULTIPLIED).contains(&power);
+        match self.nodes.last() {
+            Some(&Node::Number(power)) if is_small(power) => {
+                self.nodes.pop();
+                self.nodes.push(Node::Raise(power as i32));
+            }
+            _ => self.nodes.push(Node::Power),
+        }
     }
 
     fn value(&mut self) -> Result<(), String> {
@@ -435,8 +459,9 @@ mod tests {
         let names = ["angle", "rate", "a", "b", "c"];
         let formula = Expression::parse(text, &names).unwrap();
         for at in [[0.3, 0.7, 2.0, 0.5, 0.2], [-0.4, -0.9, 1.0, -2.0, 0.6], [0.002, 0.0012, 1.0, 1.0, 1.0]] {
-            let exact = formula.at(&at);
+            let exact = formula.at::<5>(&at, 0);
             assert_eq!(formula.value(&at), exact.value);
+            assert_eq!(formula.at::<2>(&at, 1).slopes, exact.slopes[1..3]);
             for variable in 0..names.len() {
                 let step = 1e-7;
                 let moved = |by: f64| {
@@ -456,9 +481,9 @@ mod tests {
         let formula =
             Expression::parse("-a * sign(rate) * exp(-abs(rate)) + sign(angle)", &["angle", "rate", "a"]).unwrap();
         let given = formula.with_sign_given(1).unwrap();
-        assert_eq!(given.at(&[1.0, 1e-9, 2.0, -1.0]).value, 2.0 * (-1e-9f64).exp() + 1.0);
-        assert_eq!(given.at(&[1.0, 0.0, 2.0, 0.0]).value, 1.0);
-        assert_eq!(given.at(&[1.0, 0.0, 2.0, 1.0]).slopes[2], -1.0);
+        assert_eq!(given.value(&[1.0, 1e-9, 2.0, -1.0]), 2.0 * (-1e-9f64).exp() + 1.0);
+        assert_eq!(given.value(&[1.0, 0.0, 2.0, 0.0]), 1.0);
+        assert_eq!(given.at::<1>(&[1.0, 0.0, 2.0, 1.0], 2).slopes[0], -1.0);
         assert_eq!(formula.with_sign_given(2), None);
     }
 

@@ -28,6 +28,16 @@ pub struct ForwardModel {
     work: Work,
 }
 
+/// A parameter, and what of a model has it: looked up once for a motion, and asked at every stage of every step.
+#[derive(Debug, Clone)]
+pub struct Bearers {
+    parameter: Parameter,
+    of_chain: bool,
+    of_support: bool,
+    /// By their places among the model's.
+    effects: Vec<usize>,
+}
+
 impl ForwardModel {
     /// The model an experiment describes. `distributed_flexibility` makes the strip a chain of `pieces` rods between marks.
     ///
@@ -75,6 +85,11 @@ impl ForwardModel {
     /// What its integrations have cost.
     pub fn work(&self) -> &Work {
         &self.work
+    }
+
+    /// What a step costs in which so many rates are sought, in the unit of [`Work`].
+    pub fn work_of_step(&self, sought: usize) -> u64 {
+        Work::of_step(self.rates(), sought) + self.effects.iter().map(|e| e.work(&self.chain)).sum::<u64>()
     }
 
     /// The links.
@@ -192,15 +207,32 @@ impl ForwardModel {
 
     /// ∂Q/∂parameter; `partials` are those of the same instant.
     pub fn sensitivity(&self, parameter: Parameter, motion: &Motion, partials: &Partials, q: &mut [f64]) {
+        self.sensitivity_of(&self.bearers(parameter), motion, partials, q);
+    }
+
+    /// What of the model has a parameter.
+    pub fn bearers(&self, parameter: Parameter) -> Bearers {
+        let has = |effect: &dyn Effect| effect.parameters().iter().any(|(own, _)| *own == parameter);
+        let effects: Vec<usize> = (0..self.effects.len()).filter(|e| has(self.effects[*e].as_ref())).collect();
+        Bearers {
+            parameter,
+            of_chain: self.chain.value(parameter).is_some(),
+            of_support: effects.iter().any(|e| self.effects[*e].pivot().is_some()),
+            effects,
+        }
+    }
+
+    /// The same of a parameter whose bearers are known.
+    pub(super) fn sensitivity_of(&self, of: &Bearers, motion: &Motion, partials: &Partials, q: &mut [f64]) {
         q.fill(0.0);
-        if self.chain.value(parameter).is_some() {
+        if of.of_chain {
             let of_effects: f64 = self.effects.iter().map(|e| e.sideways_m_s2(motion)).sum();
             let sideways_m_s2 = of_effects - motion.pivot_m_s2;
-            self.chain.add_sensitivity(parameter, [sideways_m_s2, self.gravity_m_s2], motion, q);
+            self.chain.add_sensitivity(of.parameter, [sideways_m_s2, self.gravity_m_s2], motion, q);
         }
-        self.effects.iter().for_each(|e| e.add_sensitivity(parameter, &self.chain, motion, q));
-        if let Some(support) = self.support() {
-            let [velocity, acceleration] = support.slopes(parameter, motion.t_s);
+        of.effects.iter().for_each(|e| self.effects[*e].add_sensitivity(of.parameter, &self.chain, motion, q));
+        if let Some(support) = self.support().filter(|_| of.of_support) {
+            let [velocity, acceleration] = support.slopes(of.parameter, motion.t_s);
             for (row, q) in q.iter_mut().enumerate() {
                 *q += velocity * partials.pivot_velocity[row] + acceleration * partials.pivot_acceleration[row];
             }

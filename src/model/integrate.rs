@@ -4,6 +4,7 @@ use nalgebra::{DMatrix, DVector};
 
 use super::balance::Balance;
 use super::collocation::{RADAU, STAGES};
+use super::forward::Bearers;
 use super::step::{Slopes, Stages, Start, Step};
 use super::{ForwardModel, Hinge, Parameter};
 use crate::error::{Error, Result};
@@ -62,7 +63,7 @@ pub(super) fn integrate(
     let mut run = Run::new(model, place, directions, accuracy)?;
     let columns = run.slopes.as_ref().map_or(0, |(theta, _)| theta.ncols());
     let ended = run.go_to(until_s, visit);
-    model.work().add(run.steps, (model.rates(), run.balance.rates()), columns);
+    model.work().add(run.steps, model.work_of_step(run.balance.rates()), columns);
     ended
 }
 
@@ -86,7 +87,7 @@ struct Run<'a> {
     last: Option<Step>,
     /// Attempts at a step so far.
     steps: usize,
-    parameters: Vec<Parameter>,
+    parameters: Vec<Bearers>,
     /// ∂θ and ∂rate at the place.
     slopes: Option<(DMatrix<f64>, DMatrix<f64>)>,
 }
@@ -136,7 +137,7 @@ impl<'a> Run<'a> {
             length_s: 0.1 * accuracy.longest_step_s,
             last: None,
             steps: 0,
-            parameters: directions.map(|d| d.parameters.clone()).unwrap_or_default(),
+            parameters: directions.map_or_else(Vec::new, |d| d.parameters.iter().map(|p| model.bearers(*p)).collect()),
             slopes,
         };
         run.hinge = run.hinge_at_start()?;

@@ -5,8 +5,9 @@ use nalgebra::{DMatrix, DVector};
 use super::balance::Balance;
 use super::collocation::{RADAU, STAGES, Weights};
 use super::elimination::Elimination;
+use super::forward::Bearers;
 use super::shapes::Shapes;
-use super::{ForwardModel, Hinge, Parameter, Partials};
+use super::{ForwardModel, Hinge, Partials};
 
 /// Newton's iterations before a step is shortened.
 const MOST_ITERATIONS: usize = 12;
@@ -260,7 +261,7 @@ impl<'a> Stages<'a> {
         start: &Start<'_>,
         length_s: f64,
         k: &DVector<f64>,
-        parameters: &[Parameter],
+        parameters: &[Bearers],
         (theta, rate): (&DMatrix<f64>, &DMatrix<f64>),
     ) -> Option<DMatrix<f64>> {
         let (n, m, columns) = (theta.nrows(), rate.nrows(), theta.ncols());
@@ -274,7 +275,7 @@ impl<'a> Stages<'a> {
             let partials = &self.partials[stage];
             let own = &mut right[stage * m * columns..(stage + 1) * m * columns];
             for (column, parameter) in parameters.iter().enumerate() {
-                self.balance.sensitivity(*parameter, partials, &mut q);
+                self.balance.sensitivity(parameter, partials, &mut q);
                 for row in 0..m {
                     own[row * columns + column] = -q[row] * self.scale[row];
                 }

@@ -1,5 +1,6 @@
 //! A law that a file states by a formula (`[[model.law]]`).
 
+use super::load::{self, Load, LoadSlopes, MovingLink};
 use super::{Effect, air};
 use crate::experiment::{Law, LawPlace};
 use crate::model::expression::{Expression, MOST_VALUES};
@@ -19,17 +20,12 @@ pub struct Formula {
 /// The rate among the variables of a law at the hinge.
 const RATE: usize = 1;
 
-/// The value of a formula, or the value with its derivatives.
-type Evaluate<N> = fn(&Expression, &[f64]) -> N;
-
-/// What a formula gives at one place, and how it acts there.
-enum Acts<'s> {
+/// How what a formula gives acts, where it is no force along the strip.
+enum Acts {
     /// A torque on the first link.
     Hinge,
     /// A torque between a link and the next.
     Joint(usize),
-    /// A force per length, or a force.
-    Across(&'s air::Station<'s>),
     /// An acceleration of the pivot.
     Support,
 }
@@ -53,7 +49,7 @@ impl Formula {
     }
 
     /// Evaluated in a state; the hinge moves at a rate with this sign.
-    fn at<N>(&self, evaluate: Evaluate<N>, state: &[f64], sign: f64) -> N {
+    fn at<N>(&self, evaluate: impl Fn(&Expression, &[f64]) -> N, state: &[f64], sign: f64) -> N {
         let mut all = [0.0; MOST_VALUES];
         let values = &mut all[..self.values.len()];
         values.copy_from_slice(&self.values);
@@ -70,66 +66,117 @@ impl Formula {
         Some(self.place.variables().len() + index)
     }
 
-    /// The formula at every place of the chain where it acts.
-    fn visit<N>(&self, evaluate: Evaluate<N>, chain: &Chain, motion: &Motion, mut each: impl FnMut(&Acts<'_>, N)) {
+    /// The formula at every place of the chain where it acts, of a law that is no force along the strip.
+    fn visit<N>(
+        &self,
+        evaluate: impl Fn(&Expression, &[f64]) -> N,
+        chain: &Chain,
+        motion: &Motion,
+        mut each: impl FnMut(&Acts, N),
+    ) {
         let (theta, rate, t_s) = (&motion.theta_rad, &motion.rate, motion.t_s);
-        let at = |state: &[f64]| self.at(evaluate, state, motion.hinge.sign());
+        let at = |state: &[f64]| self.at(&evaluate, state, motion.hinge.sign());
         match self.place {
             LawPlace::Hinge => each(&Acts::Hinge, at(&[theta[0], rate[0], t_s])),
             LawPlace::Joint => (1..chain.count()).for_each(|i| {
                 each(&Acts::Joint(i), at(&[theta[i] - theta[i - 1], rate[i] - rate[i - 1], t_s]));
             }),
-            LawPlace::Strip => {
-                air::fine_stations(chain, motion, |own| each(&Acts::Across(own), at(&[own.speed_m_s, t_s])));
-            }
-            LawPlace::Tip => air::tip(chain, motion, |own| each(&Acts::Across(own), at(&[own.speed_m_s, t_s]))),
             LawPlace::Support => each(&Acts::Support, at(&[t_s])),
+            LawPlace::Strip | LawPlace::Tip => {}
         }
     }
 
-    /// Adds what a value of the formula exerts at a place.
-    fn exert(acts: &Acts<'_>, value: f64, chain: &Chain, motion: &Motion, q: &mut [f64]) {
-        match acts {
+    /// What it exerts on a link, as a force along the strip or at its tip.
+    fn load(&self, chain: &Chain, link: &MovingLink, force: impl Fn(f64) -> f64) -> Load {
+        match self.place {
+            LawPlace::Strip => air::load_of(link, air::fine_points(link), force),
+            LawPlace::Tip => air::load_of(link, air::tip(chain, link), force),
+            LawPlace::Hinge | LawPlace::Joint | LawPlace::Support => Load::zeros(),
+        }
+    }
+
+    /// The same with its derivatives.
+    fn slopes(&self, chain: &Chain, link: &MovingLink, force: impl Fn(f64) -> [f64; 2]) -> LoadSlopes {
+        match self.place {
+            LawPlace::Strip => air::slopes_of(link, air::fine_points(link), force),
+            LawPlace::Tip => air::slopes_of(link, air::tip(chain, link), force),
+            LawPlace::Hinge | LawPlace::Joint | LawPlace::Support => LoadSlopes::default(),
+        }
+    }
+
+    /// Adds the torques of a value that is taken of the formula.
+    fn add(&self, value: impl Fn(&Expression, &[f64]) -> f64, chain: &Chain, motion: &Motion, q: &mut [f64]) {
+        if self.is_along_the_strip() {
+            let force = |speed: f64| self.at(&value, &[speed, motion.t_s], 0.0);
+            return load::add_torque(chain, motion, |link| self.load(chain, link, force), q);
+        }
+        self.visit(value, chain, motion, |acts, value| match acts {
             Acts::Hinge => q[0] += value,
             Acts::Joint(i) => {
                 q[i - 1] -= value;
                 q[*i] += value;
             }
-            Acts::Across(station) => station.add_force(value, q),
             Acts::Support => {
                 (0..chain.count()).for_each(|i| q[i] -= value * chain.static_moment_kg_m(i) * motion.cos[i]);
             }
-        }
+        });
+    }
+
+    fn is_along_the_strip(&self) -> bool {
+        matches!(self.place, LawPlace::Strip | LawPlace::Tip)
     }
 }
 
 impl Effect for Formula {
     fn add_torque(&self, chain: &Chain, motion: &Motion, q: &mut [f64]) {
-        self.visit(Expression::value, chain, motion, |acts, value| Self::exert(acts, value, chain, motion, q));
+        self.add(Expression::value, chain, motion, q);
     }
 
     fn add_partials(&self, chain: &Chain, motion: &Motion, partials: &mut Partials) {
-        self.visit(Expression::at, chain, motion, |acts, dual| {
-            let [with_angle, with_rate] = [dual.slopes[0], dual.slopes[1]];
-            match acts {
-                Acts::Hinge => {
-                    partials.theta[(0, 0)] += with_angle;
-                    partials.rate[(0, 0)] += with_rate;
-                }
-                Acts::Joint(i) => {
-                    for (own, sign) in [(*i, 1.0), (i - 1, -1.0)] {
-                        for (other, along) in [(*i, 1.0), (i - 1, -1.0)] {
-                            partials.theta[(own, other)] += sign * along * with_angle;
-                            partials.rate[(own, other)] += sign * along * with_rate;
+        if self.is_along_the_strip() {
+            let force = |speed: f64| {
+                let dual = self.at(|formula, values| formula.at::<1>(values, 0), &[speed, motion.t_s], 0.0);
+                [dual.value, dual.slopes[0]]
+            };
+            return load::add_partials(chain, motion, |link| self.slopes(chain, link, force), partials);
+        }
+        self.visit(
+            |formula, values| formula.at::<2>(values, 0),
+            chain,
+            motion,
+            |acts, dual| {
+                let [with_angle, with_rate] = dual.slopes;
+                match acts {
+                    Acts::Hinge => {
+                        partials.theta[(0, 0)] += with_angle;
+                        partials.rate[(0, 0)] += with_rate;
+                    }
+                    Acts::Joint(i) => {
+                        for (own, sign) in [(*i, 1.0), (i - 1, -1.0)] {
+                            for (other, along) in [(*i, 1.0), (i - 1, -1.0)] {
+                                partials.theta[(own, other)] += sign * along * with_angle;
+                                partials.rate[(own, other)] += sign * along * with_rate;
+                            }
                         }
                     }
+                    Acts::Support => (0..chain.count()).for_each(|i| {
+                        partials.theta[(i, i)] += dual.value * chain.static_moment_kg_m(i) * motion.sin[i];
+                    }),
                 }
-                Acts::Across(station) => station.add_force_partials(dual.value, dual.slopes[0], partials),
-                Acts::Support => (0..chain.count()).for_each(|i| {
-                    partials.theta[(i, i)] += dual.value * chain.static_moment_kg_m(i) * motion.sin[i];
-                }),
-            }
-        });
+            },
+        );
+    }
+
+    /// Half a unit for each operation, four points a link of a strip.
+    fn work(&self, chain: &Chain) -> u64 {
+        let n = chain.count() as u64;
+        let (evaluations, way) = match self.place {
+            LawPlace::Hinge | LawPlace::Support => (1, 0),
+            LawPlace::Joint => (n - 1, 0),
+            LawPlace::Strip => (4 * n, load::work(chain)),
+            LawPlace::Tip => (1, load::work(chain)),
+        };
+        way + evaluations * self.expression.operations() as u64 / 2
     }
 
     fn friction_n_m(&self, motion: &Motion) -> Option<f64> {
@@ -154,9 +201,7 @@ impl Effect for Formula {
 
     fn add_sensitivity(&self, parameter: Parameter, chain: &Chain, motion: &Motion, q: &mut [f64]) {
         if let Some(place) = self.slope_of(parameter) {
-            self.visit(Expression::at, chain, motion, |acts, dual| {
-                Self::exert(acts, dual.slopes[place], chain, motion, q);
-            });
+            self.add(|formula, values| formula.at::<1>(values, place).slopes[0], chain, motion, q);
         }
     }
 }

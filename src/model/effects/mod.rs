@@ -15,6 +15,7 @@ pub mod air;
 pub mod formula;
 pub mod hinge;
 pub mod joint;
+pub mod load;
 pub mod outside;
 
 use super::{Chain, Motion, Parameter, Partials};
@@ -61,6 +62,11 @@ pub trait Effect: std::fmt::Debug + Send + Sync {
         0
     }
 
+    /// What it adds to the cost of a step, where that is not next to nothing, in the unit of [`Work`](crate::model::Work).
+    fn work(&self, _chain: &Chain) -> u64 {
+        0
+    }
+
     /// Instants at which it changes suddenly.
     fn discontinuities_s(&self) -> Vec<f64> {
         Vec::new()
@@ -99,6 +105,11 @@ pub trait Law: std::fmt::Debug + Send + Sync {
     /// The sideways acceleration that all masses feel from it (m/s²).
     fn sideways_m_s2(&self, _coefficient: f64) -> f64 {
         0.0
+    }
+
+    /// What it adds to the cost of a step, where that is not next to nothing.
+    fn work(&self, _chain: &Chain) -> u64 {
+        0
     }
 }
 
@@ -146,6 +157,10 @@ impl<L: Law> Effect for Proportional<L> {
 
     fn sideways_m_s2(&self, _: &Motion) -> f64 {
         self.law.sideways_m_s2(self.coefficient)
+    }
+
+    fn work(&self, chain: &Chain) -> u64 {
+        self.law.work(chain)
     }
 }
 
