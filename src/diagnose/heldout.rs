@@ -81,8 +81,9 @@ impl Prediction {
     }
 }
 
-/// The posterior, or that with fewer effects unless a further one predicts what was not fitted much better; and its proof. Where the model's own error is far
-/// above the noise, that of what was fitted always falls.
+/// The posterior and its proof; where the model's own error is far above the noise, of those sets of effects that also predict what was not fitted: what was fitted
+/// always falls with one more effect, and there a set that fits a tenth better may predict six times worse. Of each number of effects the likeliest sets are asked,
+/// and one more effect must predict much better than fewer do.
 pub fn borne_out<'a>(
     context: &FitContext<'a>,
     posterior: Posterior<'a>,
@@ -90,21 +91,39 @@ pub fn borne_out<'a>(
     effects: usize,
     from_s: Option<f64>,
 ) -> (Posterior<'a>, Option<HeldOut>) {
-    let settings = context.settings;
-    let most = settings.search.main_effects;
-    let best = posterior.best();
-    let fewer = (best.hypothesis.effects.len() > most && is_beyond_noise(best, &settings.noise)).then(|| {
-        let few = fits.into_iter().filter(|fit| fit.hypothesis.effects.len() <= most);
-        weigh(few.collect(), effects, &posterior.compared, settings)
-    });
-    let named: Vec<&Refit<'a>> = std::iter::once(&posterior).chain(&fewer).map(Posterior::best).collect();
-    let mut proofs = held_out(context, posterior.base(), &named, from_s).into_iter();
-    let proof = proofs.next().flatten();
-    let leaves = |proof: &Option<HeldOut>| proof.as_ref().map_or(f64::INFINITY, HeldOut::leaves);
-    match (fewer, proofs.next().flatten()) {
-        (Some(fewer), other) if leaves(&proof) > settings.verdict.borne_out * leaves(&other) => (fewer, other),
-        _ => (posterior, proof),
+    let (verdict, best) = (&context.settings.verdict, posterior.best());
+    if !is_beyond_noise(best, &context.settings.noise) {
+        let proof = held_out(context, posterior.base(), &[best], from_s).into_iter().next().flatten();
+        return (posterior, proof);
     }
+    let asked: Vec<&Refit<'a>> = (1..=best.hypothesis.effects.len())
+        .flat_map(|size| {
+            let of_size = |c: &&Candidate<'a>| c.fit.hypothesis.effects.len() == size && c.ln_posterior.is_finite();
+            let mut sets: Vec<&Candidate<'a>> = posterior.candidates.iter().filter(of_size).collect();
+            sets.sort_by(|a, b| b.ln_posterior.total_cmp(&a.ln_posterior));
+            sets.into_iter().take(verdict.sets_asked).map(|candidate| &candidate.fit)
+        })
+        .collect();
+    let proofs = held_out(context, posterior.base(), &asked, from_s);
+    let size = |place: usize| asked[place].hypothesis.effects.len();
+    let leaves: Vec<f64> = proofs.iter().map(|own| own.as_ref().map_or(f64::INFINITY, HeldOut::leaves)).collect();
+    let better = |led: Option<usize>, place: usize| match led {
+        Some(led) if size(led) < size(place) && leaves[place] > verdict.borne_out * leaves[led] => Some(led),
+        Some(led) if leaves[place] >= leaves[led] => Some(led),
+        _ => Some(place),
+    };
+    let led = (0..asked.len()).filter(|place| leaves[*place].is_finite()).fold(None, better);
+    let Some(led) = led else { return (posterior, None) };
+    let fails = |fit: &Refit<'a>| {
+        let place = asked.iter().position(|asked| asked.hypothesis == fit.hypothesis);
+        place.is_some_and(|place| verdict.borne_out * leaves[place] > leaves[led])
+    };
+    let stands = |fit: &Refit<'a>| fit.hypothesis.effects.len() <= size(led) && !fails(fit);
+    let standing: Vec<Refit<'a>> = fits.into_iter().filter(stands).collect();
+    let hypothesis = asked[led].hypothesis.clone();
+    let weighed = weigh(standing, effects, &posterior.compared, context.settings);
+    let place = weighed.candidates.iter().position(|candidate| candidate.fit.hypothesis == hypothesis);
+    (weighed.led_by(place.unwrap_or(0)), proofs.into_iter().nth(led).flatten())
 }
 
 /// The posterior led by the effects that are more probable than not each by itself, where a law that was learnt has put one of them in the place of a name; and

@@ -271,8 +271,10 @@ pub struct VerdictSettings {
     /// Where the best of the table leaves far more than noise, its names stand if they leave at most this part of what the base model leaves of what was not
     /// fitted (judgement: half)…
     pub proven: f64,
-    /// There a further effect must leave at most this part of what the others do of what was not fitted (training bank: the double arm's third passes).
+    /// There a further effect must leave at most this part of what fewer do of what was not fitted (training bank: the double arm's third passes)…
     pub borne_out: f64,
+    /// … of so many sets of each number of effects, the likeliest (cost).
+    pub sets_asked: usize,
     /// Part of a recording that is fitted; the rest is predicted (judgement).
     pub fitted: f64,
     /// Places are told from one another by this much in ln-likelihood (statistics: 20 to 1).
@@ -307,7 +309,8 @@ pub struct LawSettings {
     pub in_place: usize,
     /// After so many that promise more beside each set of names (cost).
     pub in_place_after: usize,
-    /// Short stretches of the recordings are asked, too, where the budget allows so many motions with derivatives (cost).
+    /// Short stretches of the recordings are asked first where the budget allows so many motions with derivatives, twice what that took of the dearest recording; elsewhere
+    /// with what is left of it (cost).
     pub asked: f64,
     /// The foremost fits are begun along the motion that names follow, too, where it allows so many (cost).
     pub along: f64,
@@ -362,9 +365,9 @@ impl Default for MisfitSettings {
 impl Default for SearchSettings {
     fn default() -> Self {
         Self {
-            budget: 90_000_000,
+            budget: 160_000_000,
             shares: BudgetShares { usual: 0.45, restarts: 0.6, certified: 0.7, further: 0.9, law: 1.2, simpler: 1.5 },
-            evaluations: 3000.0,
+            evaluations: 6400.0,
             early_swings: 12.0,
             part_worth: 0.6,
             piece_swings: 8.0,
@@ -465,6 +468,7 @@ impl Default for VerdictSettings {
             told_apart: 0.05,
             proven: 0.5,
             borne_out: 0.9,
+            sets_asked: 4,
             fitted: 2.0 / 3.0,
             places: 3.0,
             seen: 4.0,
@@ -485,7 +489,7 @@ impl Default for LawSettings {
             begun: 0.6,
             in_place: 2,
             in_place_after: 2,
-            asked: 1000.0,
+            asked: 8000.0,
             along: 400.0,
             active: 0.1,
             foretold: 12,

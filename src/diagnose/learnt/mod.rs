@@ -66,7 +66,7 @@ pub fn beside<'a>(
     let Some((order, along)) = found else { return (Vec::new(), None) };
     let needed = |order: &[Description<'_>]| needed(context, order, posterior, effects, &along);
     let Some(proof) = proof else { return (needed(&order), None) };
-    let foretold = foretold(context, order, from_s);
+    let foretold = foretold(context, order, (posterior.best(), proof), from_s);
     let learnt = proven(context, &foretold, proof, &along);
     let order: Vec<Description<'a>> = foretold.into_iter().map(|own| own.0).collect();
     // where no motion could be integrated, that says nothing of any effect

@@ -59,8 +59,12 @@ pub fn fitted<'a>(
         let fit = begun_fit(context, best, &candidate, (bound, budget.motions > law.along))?;
         Some((candidate.terms, fit))
     };
-    // their fits begin far away, and cost as much as all others
-    let mut begun = if budget.motions > law.asked { asked_for(posterior.base()) } else { Vec::new() };
+    // their fits begin far away, and each costs as much as many others
+    let mut asked_for = Some(asked_for);
+    let mut begun = match asked_for.take_if(|_| budget.motions > law.asked) {
+        Some(asked_for) => asked_for(posterior.base()),
+        None => Vec::new(),
+    };
     let mut candidates = candidates.into_iter().peekable();
     let mut made = Vec::new();
     loop {
@@ -69,8 +73,12 @@ pub fn fitted<'a>(
         begun.extend(within(context, to_begin, (BEGUN_AT_ONCE, &mut candidates), along_best));
         made.extend(halved(context, std::mem::take(&mut begun), until));
         // what the budget leaves when the best have come to their end is for more of them
-        if candidates.peek().is_none() || context.work.done() >= until {
+        if context.work.done() >= until {
             return made;
+        }
+        if candidates.peek().is_none() {
+            let Some(asked_for) = asked_for.take() else { return made };
+            begun = asked_for(posterior.base());
         }
     }
 }

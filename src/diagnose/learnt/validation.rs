@@ -6,6 +6,7 @@ use super::super::context::FitContext;
 use super::super::effect::{Effect, Phase, Place};
 use super::super::grammar::Term;
 use super::super::heldout::{self, HeldOut, Prediction};
+use super::super::misfit::is_beyond_noise;
 use super::super::refit::Refit;
 use super::description_length::Description;
 use super::term_fitting::with_laws;
@@ -71,19 +72,25 @@ fn formula_of(terms: &[Term]) -> String {
 /// ```
 ///
 /// An error that grows along a motion is one of its amplitude and one of its phase: two numbers, of unknown size, however many values show them. (Describing what
-/// comes later by what was learnt before is Dawid's prequential description, Journal of the Royal Statistical Society A 147 (1984) 278.)
+/// comes later by what was learnt before is Dawid's prequential description, Journal of the Royal Statistical Society A 147 (1984) 278.) Where the model's own error is
+/// far above the noise, what predicts clearly worse than the names that have been `proven` is left out, however short it is.
 pub fn foretold<'a>(
     context: &FitContext<'a>,
     mut order: Vec<Description<'a>>,
+    (names, proof): (&Refit<'a>, &HeldOut),
     from_s: Option<f64>,
 ) -> Vec<(Description<'a>, Prediction)> {
-    let (law, told) = (&context.settings.law, context.settings.prior.min_significance);
+    let settings = context.settings;
+    let (law, told) = (&settings.law, settings.prior.min_significance);
+    let is_proof = is_beyond_noise(names, &settings.noise);
+    let fails = |of: &Prediction| is_proof && settings.verdict.borne_out * of.over(&proof.augmented) > 1.0;
     let predict = |mut own: Description<'a>| {
         let prediction = heldout::predicted(&with_laws(context, &own.terms), &own.fit, from_s)?;
         let missed = prediction.rmse_rad.iter().map(|error| error.max(f64::MIN_POSITIVE).ln());
         own.length += 2.0 * missed.sum::<f64>();
         // a law that sets in later was not learnt from what was fitted
-        prediction.told.iter().all(|deviations| *deviations > told).then_some((own, prediction))
+        let is_told = prediction.told.iter().all(|deviations| *deviations > told);
+        (is_told && !fails(&prediction)).then_some((own, prediction))
     };
     let mut foretold: Vec<(Description<'a>, Prediction)> = Vec::new();
     let mut asked = 0;
