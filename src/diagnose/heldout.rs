@@ -105,25 +105,33 @@ pub fn borne_out<'a>(
         })
         .collect();
     let proofs = held_out(context, posterior.base(), &asked, from_s);
-    let size = |place: usize| asked[place].hypothesis.effects.len();
     let leaves: Vec<f64> = proofs.iter().map(|own| own.as_ref().map_or(f64::INFINITY, HeldOut::leaves)).collect();
-    let better = |led: Option<usize>, place: usize| match led {
-        Some(led) if size(led) < size(place) && leaves[place] > verdict.borne_out * leaves[led] => Some(led),
-        Some(led) if leaves[place] >= leaves[led] => Some(led),
-        _ => Some(place),
-    };
-    let led = (0..asked.len()).filter(|place| leaves[*place].is_finite()).fold(None, better);
-    let Some(led) = led else { return (posterior, None) };
+    let sizes = asked.iter().map(|fit| fit.hypothesis.effects.len());
+    let sets: Vec<(usize, f64)> = sizes.zip(leaves.iter().copied()).collect();
+    let Some(led) = leader(&sets, verdict.borne_out) else { return (posterior, None) };
     let fails = |fit: &Refit<'a>| {
         let place = asked.iter().position(|asked| asked.hypothesis == fit.hypothesis);
         place.is_some_and(|place| verdict.borne_out * leaves[place] > leaves[led])
     };
-    let stands = |fit: &Refit<'a>| fit.hypothesis.effects.len() <= size(led) && !fails(fit);
+    let stands = |fit: &Refit<'a>| fit.hypothesis.effects.len() <= sets[led].0 && !fails(fit);
     let standing: Vec<Refit<'a>> = fits.into_iter().filter(stands).collect();
     let hypothesis = asked[led].hypothesis.clone();
     let weighed = weigh(standing, effects, &posterior.compared, context.settings);
     let place = weighed.candidates.iter().position(|candidate| candidate.fit.hypothesis == hypothesis);
     (weighed.led_by(place.unwrap_or(0)), proofs.into_iter().nth(led).flatten())
+}
+
+/// Of sets of so many effects each, fewer first, that leave such parts of what was not fitted, the one that leaves least, where one with more effects leaves at most so
+/// much of what fewer do; `None` where none predicts anything.
+fn leader(sets: &[(usize, f64)], borne_out: f64) -> Option<usize> {
+    let is_better = |(size, leaves): (usize, f64), (led_size, led_leaves): (usize, f64)| {
+        if size > led_size { leaves <= borne_out * led_leaves } else { leaves < led_leaves }
+    };
+    let better = |led: Option<usize>, place: usize| match led {
+        Some(led) if !is_better(sets[place], sets[led]) => Some(led),
+        _ => Some(place),
+    };
+    (0..sets.len()).filter(|place| sets[*place].1.is_finite()).fold(None, better)
 }
 
 /// The posterior led by the effects that are more probable than not each by itself, where a law that was learnt has put one of them in the place of a name; and
@@ -311,6 +319,15 @@ fn errors(values: &[crate::fit::predict::Value], record: &Record, from_row: usiz
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn more_effects_lead_only_where_they_predict_clearly_better() {
+        assert_eq!(leader(&[(1, 0.8), (1, 0.7), (2, 0.66), (2, 0.6), (3, 0.58)], 0.9), Some(3));
+        // what was fitted always falls with one more, what is predicted may rise
+        assert_eq!(leader(&[(1, 0.24), (2, 0.30), (3, 0.26)], 0.9), Some(0));
+        assert_eq!(leader(&[(1, f64::INFINITY), (2, 0.9), (3, f64::INFINITY)], 0.9), Some(1));
+        assert_eq!(leader(&[(1, f64::INFINITY)], 0.9), None);
+    }
 
     #[test]
     fn a_law_beside_the_names_adds_to_what_is_explained_and_noise_counts_for_nothing() {
