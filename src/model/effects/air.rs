@@ -6,7 +6,7 @@
 //! vₙ(s) = u·v + s θ̇        v̇ₙ(s) = u·a + θ̇ w·v + s θ̈
 //! ```
 //!
-//! with the link's directions u, w and its upper pivot's velocity v and acceleration a (see [`load`](super::load)). A force per length f(s) across the
+//! with the link's directions u, w and its upper pivot's velocity v and acceleration a (see [`load`]). A force per length f(s) across the
 //! strip is the load F = u∫f ds, M = ∫f s ds, taken by Gauss–Legendre quadrature. vₙ is linear in s, so that of a drag f s is a polynomial, of the third power
 //! at most – on either side of the point where the link turns about itself and |vₙ|vₙ has its corner. There the link is cut, and the quadrature is exact.
 
