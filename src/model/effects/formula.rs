@@ -1,6 +1,6 @@
 //! A law that a file states by a formula (`[[model.law]]`).
 
-use super::load::{self, Load, LoadSlopes, MovingLink};
+use super::load::{self, MovingLink};
 use super::{Effect, air};
 use crate::experiment::{Law, LawPlace};
 use crate::model::expression::{Expression, MOST_VALUES};
@@ -86,29 +86,18 @@ impl Formula {
         }
     }
 
-    /// What it exerts on a link, as a force along the strip or at its tip.
-    fn load(&self, chain: &Chain, link: &MovingLink, force: impl Fn(f64) -> f64) -> Load {
-        match self.place {
-            LawPlace::Strip => air::load_of(link, air::fine_points(link), force),
-            LawPlace::Tip => air::load_of(link, air::tip(chain, link), force),
-            LawPlace::Hinge | LawPlace::Joint | LawPlace::Support => Load::zeros(),
-        }
-    }
-
-    /// The same with its derivatives.
-    fn slopes(&self, chain: &Chain, link: &MovingLink, force: impl Fn(f64) -> [f64; 2]) -> LoadSlopes {
-        match self.place {
-            LawPlace::Strip => air::slopes_of(link, air::fine_points(link), force),
-            LawPlace::Tip => air::slopes_of(link, air::tip(chain, link), force),
-            LawPlace::Hinge | LawPlace::Joint | LawPlace::Support => LoadSlopes::default(),
-        }
+    /// The points of a link at which it acts across the strip; none of a law that acts elsewhere.
+    fn points(&self, chain: &Chain, link: &MovingLink) -> impl Iterator<Item = air::Point> + use<> {
+        let along = (self.place == LawPlace::Strip).then(|| air::fine_points(link));
+        let tip = (self.place == LawPlace::Tip).then(|| air::tip(chain, link));
+        along.into_iter().flatten().chain(tip.into_iter().flatten())
     }
 
     /// Adds the torques of a value that is taken of the formula.
     fn add(&self, value: impl Fn(&Expression, &[f64]) -> f64, chain: &Chain, motion: &Motion, q: &mut [f64]) {
         if self.is_along_the_strip() {
             let force = |speed: f64| self.at(&value, &[speed, motion.t_s], 0.0);
-            return load::add_torque(chain, motion, |link| self.load(chain, link, force), q);
+            return load::add_torque(chain, motion, |link| air::load_of(link, self.points(chain, link), force), q);
         }
         self.visit(value, chain, motion, |acts, value| match acts {
             Acts::Hinge => q[0] += value,
@@ -138,7 +127,12 @@ impl Effect for Formula {
                 let dual = self.at(|formula, values| formula.at::<1>(values, 0), &[speed, motion.t_s], 0.0);
                 [dual.value, dual.slopes[0]]
             };
-            return load::add_partials(chain, motion, |link| self.slopes(chain, link, force), partials);
+            return load::add_partials(
+                chain,
+                motion,
+                |link| air::slopes_of(link, self.points(chain, link), force),
+                partials,
+            );
         }
         self.visit(
             |formula, values| formula.at::<2>(values, 0),
