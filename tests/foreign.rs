@@ -7,6 +7,7 @@ use std::collections::HashMap;
 use std::path::Path;
 use std::process::Command;
 
+use freeswing::look::{Finding, look};
 use freeswing::measure::{Measurement, Options, measure};
 use freeswing::progress::Silent;
 
@@ -54,6 +55,14 @@ fn render(folder: &Path, seconds: f64, names: &[&str]) {
     if !names.is_empty() {
         command.args(["--only", &names.join(",")]);
     }
+    assert!(command.status().unwrap().success());
+}
+
+/// Films as strangers make them, the first seconds of each.
+fn films(folder: &Path, seconds: f64, names: &[&str]) {
+    let script = Path::new(env!("CARGO_MANIFEST_DIR")).join("fixtures/foreign/films.py");
+    let mut command = Command::new(python());
+    command.arg(script).args(names).arg("--out").arg(folder).args(["--seconds", &seconds.to_string()]);
     assert!(command.status().unwrap().success());
 }
 
@@ -181,4 +190,20 @@ fn variants() -> Vec<String> {
     let script = Path::new(env!("CARGO_MANIFEST_DIR")).join("fixtures/foreign/render.py");
     let output = Command::new(python()).arg(script).args(["--out", ".", "--list"]).output().unwrap();
     String::from_utf8(output.stdout).unwrap().split_whitespace().map(str::to_owned).collect()
+}
+
+#[test]
+fn dark_marks_before_a_dark_wall_are_found_and_a_dark_clamp_behind_a_strip_is_none() {
+    let folder = tempfile::tempdir().unwrap();
+    films(folder.path(), 4.0, &["dark_dots_dark", "dark_bracket"]);
+    let found = |name: &str| {
+        let film = folder.path().join(format!("{name}.mp4"));
+        look(&film, &Options::default(), Path::new(""), &Silent).unwrap()
+    };
+    let colours = |found: &Finding| found.marks.iter().map(|mark| mark.colour.clone()).collect::<Vec<_>>();
+    let dots = found("dark_dots_dark");
+    assert_eq!(colours(&dots), ["dark"; 3]);
+    assert!(dots.hinge_marked);
+    let blue = colours(&found("dark_bracket"));
+    assert!(blue.len() == 2 && blue.iter().all(|colour| colour.starts_with('#')), "{blue:?}");
 }

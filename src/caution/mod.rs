@@ -36,7 +36,7 @@ const STILL_DEVIATIONS: f64 = 4.0;
 /// Things that are listed one by one.
 const LISTED: usize = 4;
 /// Rates at which cameras record slow motion, and rates at which they play it.
-const SLOW_MOTION: [(f64, f64); 8] = [
+const SLOW_MOTION: [(f64, f64); 12] = [
     (120.0, 30.0),
     (240.0, 30.0),
     (120.0, 60.0),
@@ -45,6 +45,10 @@ const SLOW_MOTION: [(f64, f64); 8] = [
     (240.0, 25.0),
     (960.0, 30.0),
     (480.0, 30.0),
+    (120.0, 24.0),
+    (240.0, 24.0),
+    (120.0, 50.0),
+    (240.0, 50.0),
 ];
 
 /// Every caution about a measurement.

@@ -244,11 +244,18 @@ fn plain<'a>(fit: &Refit<'a>) -> Refit<'a> {
     fit
 }
 
+/// A hypothesis near another fit, as far as steps lead: what a fit predicts that is still on its way is not what its hypothesis does.
+fn refit_to_its_end<'a>(context: &FitContext<'a>, hypothesis: &Hypothesis, near: &Refit<'_>) -> Option<Refit<'a>> {
+    let begun = context.refit(hypothesis, near, &[])?;
+    let further = (!begun.converged).then(|| context.go_on(&begun, context.settings.descent.most_steps)).flatten();
+    Some(further.unwrap_or(begun))
+}
+
 fn along(context: &FitContext<'_>, fit: &Refit<'_>, rows: usize, is_continued: bool) -> Option<Prediction> {
     let record = &context.records[0];
     let early = [record.until(rows)];
     let part = context.on(&early);
-    let refitted = part.refit(&fit.hypothesis, fit, &[])?;
+    let refitted = refit_to_its_end(&part, &fit.hypothesis, fit)?;
     // what leaves far more than noise may have lost step between here and there
     let is_continued = is_continued && leaves_more_than_noise(&refitted, &context.settings.noise);
     let grown = is_continued.then(|| continue_one(&part, &refitted)).flatten();
@@ -266,7 +273,7 @@ fn beyond(context: &FitContext<'_>, fit: &Refit<'_>, pieces: usize) -> Option<Pr
     near.x.truncate(free + pieces * starts);
     let within = |pieces: usize| fit.hypothesis.dropped.filter(move |dropped| dropped.0 < pieces);
     near.hypothesis = Hypothesis { dropped: within(pieces), ..fit.hypothesis.clone() };
-    let fitted = early.refit(&near.hypothesis, &near, &[])?;
+    let fitted = refit_to_its_end(&early, &near.hypothesis, &near)?;
     let last = pieces - 1;
     let rest = [Record::joined(&context.records[last..])?];
     let onwards = context.on(&rest);
@@ -287,7 +294,7 @@ fn across(context: &FitContext<'_>, fit: &Refit<'_>, last: usize) -> Option<Pred
     let hypothesis = Hypothesis { dropped: fit.hypothesis.dropped.filter(|d| d.0 < last), ..fit.hypothesis.clone() };
     let mut near = fit.clone();
     near.x.truncate(fit.problem.start_of(last));
-    let fitted = others.refit(&hypothesis, &near, &[])?;
+    let fitted = refit_to_its_end(&others, &hypothesis, &near)?;
     // on the last one only the start is free
     let frozen: Vec<Belief> = (fitted.problem.free.iter().zip(&fitted.x))
         .map(|(p, value)| Belief { parameter: *p, value: *value, sd: FROZEN * value.abs().max(1e-12) })

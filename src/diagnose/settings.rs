@@ -366,7 +366,7 @@ impl Default for SearchSettings {
     fn default() -> Self {
         Self {
             budget: 160_000_000,
-            shares: BudgetShares { usual: 0.45, restarts: 0.6, certified: 0.7, further: 0.9, law: 1.2, simpler: 1.5 },
+            shares: BudgetShares { usual: 0.45, restarts: 0.6, certified: 0.7, further: 0.9, law: 0.9, simpler: 1.1 },
             evaluations: 6400.0,
             early_swings: 12.0,
             part_worth: 0.6,

@@ -1,6 +1,7 @@
 //! What is fitted to what: the recordings, the model with its free parameters, the noise.
 
 use nalgebra::{DMatrix, DVector};
+use rayon::prelude::*;
 
 use super::descent::Block;
 use super::noise::least_noise_rad;
@@ -223,7 +224,7 @@ impl<'a> Problem<'a> {
         predict(&model, &request)
     }
 
-    /// The residuals of all recordings, each as one motion from its first row, then of the beliefs; `None` where it cannot be integrated.
+    /// The residuals of all recordings, each as one motion from its first row, then of the beliefs; `None` where one cannot be integrated.
     pub fn blocks(&self, x: &[f64]) -> Option<Vec<Block>> {
         let of = |record: usize| {
             let prediction = self.predict(record, x, true).ok()?;
@@ -231,7 +232,7 @@ impl<'a> Problem<'a> {
             let columns = (0..self.free.len()).chain(start..start + 2 * self.shapes()).collect();
             Some(self.block(record, &prediction, columns))
         };
-        (0..self.records.len()).map(of).chain(self.known_blocks(x).map(Some)).collect()
+        self.of_each_recording(of).into_iter().chain(self.known_blocks(x).map(Some)).collect()
     }
 
     /// All that is known beforehand: of the parameters, and of how much of further shapes there may be at each start.
@@ -258,7 +259,12 @@ impl<'a> Problem<'a> {
             Some(self.block(record, &prediction, Vec::new()).residual.norm_squared())
         };
         self.known_blocks(x).map(|block| block.residual.norm_squared()).sum::<f64>()
-            + (0..self.records.len()).map(|record| of(record).unwrap_or(f64::INFINITY)).sum::<f64>()
+            + self.of_each_recording(of).into_iter().map(|own| own.unwrap_or(f64::INFINITY)).sum::<f64>()
+    }
+
+    /// What each recording gives. All of them are asked, also where one gives nothing, so that the work done does not depend on which thread comes first.
+    fn of_each_recording<T: Send>(&self, of: impl Fn(usize) -> T + Sync + Send) -> Vec<T> {
+        (0..self.records.len()).into_par_iter().with_max_len(1).map(of).collect()
     }
 
     /// The residuals of a prediction in units of their noise ([`super::whitening`]).

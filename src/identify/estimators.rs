@@ -244,7 +244,7 @@ impl Choice {
             frequency_hz: own.frequency.f0_hz,
             damping_ratio: own.damping_ratio,
             frequency_at_rad: None,
-            basis: "one oscillation whose frequency and damping go with its amplitude: f and ξ at small amplitude"
+            basis: "one oscillation whose frequency and damping go with its amplitude: f at small amplitude, ξ over the record"
                 .to_owned(),
             at_small_amplitude: true,
         }

@@ -299,10 +299,13 @@ impl Identification {
 
     fn add_modes(&mut self, recorded: &Signal, chosen: Chosen, body: Option<&Body>) {
         let Chosen { fit, count, third_rad } = chosen;
+        let modulated = Modulated::of(recorded, &fit, self.record.measured);
+        // a wide swing is no sinusoid of one frequency, and slow terms beside one make up for that
+        let needs_no_drift = modulated.as_ref().is_some_and(|own| own.drift_terms == 0);
+        let fit = if needs_no_drift { fit.with_drift_terms(recorded, 0) } else { fit };
         self.drift_rad = fit.drift_ranges_rad(recorded);
         let signal = &fit.without_drift(recorded);
         let windows = Windows::of(signal, &fit);
-        let modulated = Modulated::of(recorded, &fit, self.record.measured);
         self.record.noise_rad = match (&windows, &modulated) {
             (_, Some(modulated)) => modulated.noise_rad.clone(),
             (Ok(windows), _) => windows.noise_rad.clone(),

@@ -71,9 +71,9 @@ pub struct Mode {
     pub expected_kappa_per_rad2: Option<f64>,
     /// What the reader should know.
     pub notes: Vec<String>,
-    /// Whether a constant ξ is meant at small amplitude.
+    /// The amplitude down to which a constant ξ was seen, where it is one of no single sinusoid.
     #[serde(skip)]
-    pub at_small_amplitude: bool,
+    pub seen_down_to_rad: Option<f64>,
     /// Whether it lies on the third harmonic of the slowest mode, and is no larger than that may be.
     #[serde(skip)]
     pub may_be_harmonic: bool,
@@ -118,7 +118,7 @@ impl Mode {
             frequency_at_amplitude_rad: choice.frequency_at_rad,
             damping: Damping::of(choice.damping_ratio, &raw[1], duration_s),
             basis: choice.basis,
-            at_small_amplitude: choice.at_small_amplitude,
+            seen_down_to_rad: choice.at_small_amplitude.then(|| whole.fit.last_amplitude_rad(mode, duration_s)),
             may_be_harmonic: may_be_harmonic(whole, mode),
             shape,
             residual_excess: estimators.residual_excess,

@@ -142,10 +142,7 @@ fn one_mode(signal: &Signal, near_hz: f64) -> Option<SinusoidFit> {
     let most = MOST_DRIFT_TERMS.min((cycles - 1.0).max(0.0) as usize);
     let fit = best(signal, &starts, most, |_| true).or_else(|| best(signal, &starts, 0, |_| true))?;
     let wanted = fit.wanted_drift(signal);
-    if wanted == fit.links.first().map_or(0, |l| l.drift_rad.len()) {
-        return Some(fit);
-    }
-    SinusoidFit::with_drift(signal, fit.origin_s, &fit.poles, wanted).or(Some(fit))
+    Some(fit.with_drift_terms(signal, wanted))
 }
 
 fn best(

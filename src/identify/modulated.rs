@@ -37,6 +37,9 @@ pub struct Modulated {
     pub trend: Option<Trend>,
     /// Standard deviation of each link's residual.
     pub noise_rad: Vec<f64>,
+    /// Terms of drift that it has beside it.
+    #[serde(skip)]
+    pub drift_terms: usize,
 }
 
 impl Modulated {
@@ -256,6 +259,7 @@ impl<'f, 'a> Told<'f, 'a> {
             },
             trend,
             noise_rad: self.flow.noise_rad.clone(),
+            drift_terms: self.flow.drift_terms,
         };
         let law = &modulated.frequency;
         let numbers = [&law.f0_hz, &law.kappa_per_rad2, &modulated.damping_ratio];
@@ -309,6 +313,23 @@ mod tests {
                     assert_eq!(mode.damping_trend, trend, "{case}");
                 }
             }
+        }
+    }
+
+    #[test]
+    fn a_wide_swing_has_a_drift_only_where_its_resting_angle_does() {
+        for (cycles, amplitude_rad) in [(5.0, 0.5), (7.0, 0.8), (7.0, 1.1), (12.0, 0.8)] {
+            let still = swing(cycles, amplitude_rad, |v| 0.01 * v + 0.02 * v * v.abs());
+            let found = identify(&still, None).unwrap();
+            assert_eq!(found.drift_rad, [0.0], "{found}");
+            // it ends as wide as 17°, or wider
+            assert!(!found.summary.contains("small amplitude"), "{}", found.summary);
+            let mut moved = still.clone();
+            let of_row = moved.t_s.iter().zip(moved.theta_rad[0].iter_mut().flatten());
+            of_row.for_each(|(t, theta)| *theta += 0.01 * t);
+            let found = identify(&moved, None).unwrap();
+            let went_rad = 0.01 * still.t_s.last().unwrap();
+            assert!((found.drift_rad[0] / went_rad - 1.0).abs() < 0.2, "{went_rad}: {found}");
         }
     }
 

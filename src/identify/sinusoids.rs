@@ -201,6 +201,15 @@ impl SinusoidFit {
         }
     }
 
+    /// The same with so many terms of drift; as it is where that leads to no fit.
+    #[must_use]
+    pub fn with_drift_terms(self, signal: &Signal, terms: usize) -> Self {
+        if self.links.first().is_none_or(|link| link.drift_rad.len() == terms) {
+            return self;
+        }
+        Self::with_drift(signal, self.origin_s, &self.poles, terms).unwrap_or(self)
+    }
+
     /// A link's drift, its offset not included.
     pub fn drift_at_rad(&self, signal: &Signal, link: usize, t_s: f64) -> f64 {
         let turn = drift_phase(t_s - self.origin_s, signal.duration_s());
@@ -274,6 +283,11 @@ impl SinusoidFit {
     /// Largest amplitude of a mode among the links at the origin.
     pub fn amplitude_rad(&self, mode: usize) -> f64 {
         self.links.iter().map(|l| l.amplitudes_rad[mode].norm()).fold(0.0, f64::max)
+    }
+
+    /// The same so long after the origin.
+    pub fn last_amplitude_rad(&self, mode: usize, duration_s: f64) -> f64 {
+        self.amplitude_rad(mode) * (-self.poles[mode].decay_per_s * duration_s).exp()
     }
 
     /// The Bayesian information criterion, up to a constant.

@@ -65,7 +65,7 @@ pub struct SlowFlow<'a> {
     /// Angles, or a displacement.
     pub measured: Measured,
     /// Of each link.
-    drift_terms: usize,
+    pub drift_terms: usize,
     /// Of each link, that of its residual.
     pub noise_rad: Vec<f64>,
     /// ω₀, k, β₀, β₁, β₂ over [`Self::units`].

@@ -4,7 +4,10 @@ use super::Identification;
 use super::damping::Damping;
 use super::estimate::Estimate;
 use super::mode::Mode;
+use crate::series::Measured;
 
+/// An amplitude below this is a small one (judgement: 10°, at which a pendulum swings slower by two parts in a thousand).
+const SMALL_RAD: f64 = 0.1745;
 /// How the note begins that says why there is no mode.
 pub(super) const NOTHING: &str = "no oscillation is identifiable: ";
 
@@ -45,7 +48,7 @@ fn of_mode(mode: &Mode) -> String {
                 format!("ξ{index} = {low} to {high} % over the record, {}", trend.words())
             }
             None => {
-                let at = if mode.at_small_amplitude { " at small amplitude" } else { "" };
+                let at = mode.seen_down_to_rad.map_or(String::new(), |rad| seen_down_to(rad, mode.measured));
                 format!("ξ{index} = {} %{at}", rounded(xi, 100.0))
             }
         },
@@ -68,6 +71,14 @@ fn rounded(estimate: &Estimate, factor: f64) -> String {
     }
     let digits = if half > 0.0 { (1.0 - half.log10().floor()).clamp(0.0, 9.0) as usize } else { 6 };
     format!("{value:.digits$} ± {half:.digits$}")
+}
+
+/// Where a constant ξ was seen.
+fn seen_down_to(last_rad: f64, measured: Measured) -> String {
+    if measured == Measured::Displacement || last_rad < SMALL_RAD {
+        return " at small amplitude".to_owned();
+    }
+    format!(" at amplitudes down to {}", measured.show(last_rad, 0))
 }
 
 /// Two significant digits.

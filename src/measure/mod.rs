@@ -131,6 +131,9 @@ pub fn measure(path: &Path, options: &Options, folder: &Path, progress: &dyn Pro
 
 /// Pictures that tell whether a thing makes a difference where it is, at least (judgement: of one or two chance decides).
 const FEWEST_TELLING: usize = 3;
+/// So many points around a thing are looked at, so far from its middle in its radii (judgement: what it is painted on reaches so far beyond it).
+const AROUND: u32 = 8;
+const OUTSIDE: f64 = 1.5;
 
 /// A recording that is about to be measured: what is sought is known.
 pub struct Session<'a> {
@@ -233,7 +236,8 @@ impl<'a> Session<'a> {
     }
 
     /// Whether a thing, whose path goes through frames of these stamps, makes a difference where it is: in most of the pictures spread over the recording, against those
-    /// that show it elsewhere. What is still there, and only covered now and then, does not. `None` where no pictures tell.
+    /// that show it elsewhere. What is still there, and only covered now and then, does not. A mark as dark as the wall behind it makes one by what it is painted on:
+    /// around it. `None` where no pictures tell.
     pub fn makes_a_difference(&self, t_s: &[f64], thing: &TrackedObject) -> Option<bool> {
         let stream = &self.stream;
         let of_picture = |stamp_s: &f64| thing.path[t_s.iter().position(|t| t == stamp_s)?];
@@ -243,8 +247,19 @@ impl<'a> Session<'a> {
             let is_elsewhere = |other: &[f64; 2]| (other[0] - x).hypot(other[1] - y) > 2.0 * thing.radius_px();
             let others: Vec<usize> =
                 (0..places.len()).filter(|k| places[*k].as_ref().is_some_and(is_elsewhere)).collect();
-            let stored_px = stream.orientation.stored_point([x / stream.pixel_aspect, y], stream.stored_size_px);
-            self.album.differs(picture, stored_px, &others)
+            let differs = |[x, y]: [f64; 2]| {
+                let stored_px = stream.orientation.stored_point([x / stream.pixel_aspect, y], stream.stored_size_px);
+                self.album.differs(picture, stored_px, &others)
+            };
+            let around = (0..AROUND).map(|k| {
+                let (sin, cos) = (std::f64::consts::TAU * f64::from(k) / f64::from(AROUND)).sin_cos();
+                [cos, sin].map(|part| OUTSIDE * thing.radius_px() * part)
+            });
+            let of_what_moves = || {
+                let seen: Vec<bool> = around.filter_map(|[dx, dy]| differs([x + dx, y + dy])).collect();
+                2 * seen.iter().filter(|own| **own).count() > seen.len()
+            };
+            differs([x, y]).map(|own| own || of_what_moves())
         };
         let seen: Vec<bool> = places.iter().enumerate().filter_map(makes_one).collect();
         let told = !self.camera.taken_out || !self.album.camera.is_empty();

@@ -174,10 +174,10 @@ fn hangs_against(things: &[TrackedObject], marks: &[usize]) -> Option<Arc> {
     hangs(things, marks)?.filter(|arc| shows_centre(arc, first) && marks.iter().all(together))
 }
 
-/// A still thing that something covers from time to time seems to move as well: by less than a quarter of its radius; or by less than its radius, about no clear
-/// centre or about a point within itself, and mostly in the middle of its way, where what swings seldom is until it has decayed.
+/// A still thing that something covers from time to time seems to move as well: by no more than its area changes for; by less than a quarter of its radius; or by less
+/// than its radius, about no clear centre or about a point within itself, and mostly in the middle of its way, where what swings seldom is until it has decayed.
 fn is_covered(thing: &TrackedObject) -> bool {
-    if thing.travel_px < LEAST_TRAVEL * thing.radius_px() {
+    if !thing.moves_whole || thing.travel_px < LEAST_TRAVEL * thing.radius_px() {
         return true;
     }
     let path = thing.places_px();
@@ -195,7 +195,8 @@ fn shows_centre(arc: &Arc, thing: &TrackedObject) -> bool {
 fn without_covered(things: &[TrackedObject], mut marks: Vec<usize>) -> Vec<usize> {
     let farthest = marks.iter().copied().max_by(|a, b| things[*a].travel_px.total_cmp(&things[*b].travel_px));
     let Some(farthest) = farthest.map(|i| &things[i]).filter(|thing| !is_covered(thing)) else { return Vec::new() };
-    marks.retain(|i| !is_covered(&things[*i]) || things[*i].correlation(farthest).abs() > MOVES_WITH);
+    let moves_with = |thing: &TrackedObject| thing.moves_whole && thing.correlation(farthest).abs() > MOVES_WITH;
+    marks.retain(|i| !is_covered(&things[*i]) || moves_with(&things[*i]));
     marks
 }
 
@@ -339,7 +340,7 @@ mod tests {
         let x: Vec<f64> = path.iter().flatten().map(|p| p[0]).collect();
         let travel_px = 0.5 * (x.iter().copied().fold(f64::MIN, f64::max) - x.iter().copied().fold(f64::MAX, f64::min));
         let steadiness = if moves { steadiness(&path) } else { STILL };
-        TrackedObject { hue, presence: 1.0, area_px2: 300.0, travel_px, moves, steadiness, path }
+        TrackedObject { hue, presence: 1.0, area_px2: 300.0, travel_px, moves, moves_whole: moves, steadiness, path }
     }
 
     fn joint(t: f64) -> [f64; 2] {

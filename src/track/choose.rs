@@ -69,7 +69,7 @@ pub(super) struct Candidate {
     pub travel_px: f64,
     pub moves: bool,
     /// It moves while it is seen whole, too.
-    moves_whole: bool,
+    pub(super) moves_whole: bool,
     /// See [`steadiness`].
     pub steadiness: f64,
     /// How much its distance from the pivot changes; see [`stretch`].

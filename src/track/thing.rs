@@ -18,6 +18,8 @@ pub struct TrackedObject {
     pub travel_px: f64,
     /// It swings.
     pub moves: bool,
+    /// It does so by more than it would seem to where it stands still and something covers it in part.
+    pub moves_whole: bool,
     /// How well its past foretells its place, 0 to 1 (`steadiness`).
     pub steadiness: f64,
     /// Position by frame.
@@ -115,6 +117,7 @@ pub fn things(window: &[FrameBlobs]) -> Vec<TrackedObject> {
             area_px2: c.ln_area.exp(),
             travel_px: c.travel_px,
             moves: c.moves,
+            moves_whole: c.moves_whole,
             steadiness: c.steadiness,
             path: c.path,
         })

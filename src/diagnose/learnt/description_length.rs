@@ -20,9 +20,6 @@ use crate::model::Parameter;
 /// Scales of a term's state to begin with, over those that it had beside a name.
 const SCALED: [f64; 3] = [1.0, 0.7, 1.4];
 
-/// So many descriptions are made simpler before it is asked whether the budget allows more, on every machine the same ones at once.
-const SIMPLER_AT_ONCE: usize = 2;
-
 /// Terms that were fitted beside some effects, with the length of the description.
 pub struct Description<'a> {
     /// The terms, with their coefficients.
@@ -76,18 +73,15 @@ pub fn descriptions<'a>(
         // what a prediction may yet put first
         let near = order[0].length + context.settings.law.far;
         let new = |own: &&Description<'a>| own.length < near && !own.terms.is_empty() && !tried.contains(&own.kind());
-        let shortest: Vec<&Description<'a>> = order.iter().filter(new).take(SIMPLER_AT_ONCE).collect();
-        if shortest.is_empty() || context.work.done() > budget.until_simpler {
+        let Some(shortest) = order.iter().find(new).filter(|_| context.work.done() <= budget.until_simpler) else {
             break;
-        }
-        tried.extend(shortest.iter().map(|own| own.kind()));
-        let simpler = |own: &&Description<'a>| {
-            let mut simpler = without_a_name(context, own);
-            simpler.extend(without_a_term(context, own));
-            simpler.extend(with_a_plainer_term(context, own));
-            simpler
         };
-        let simpler: Vec<Begun<'a>> = shortest.par_iter().flat_map(simpler).collect();
+        tried.push(shortest.kind());
+        let (mut simpler, (without_a_term, plainer)) = rayon::join(
+            || without_a_name(context, shortest),
+            || rayon::join(|| without_a_term(context, shortest), || with_a_plainer_term(context, shortest)),
+        );
+        simpler.extend(without_a_term.into_iter().chain(plainer));
         order = described(order.into_iter().map(|own| (own.terms, own.fit)).chain(simpler).collect(), &prior)?;
     }
     Some((order, prior.along))
