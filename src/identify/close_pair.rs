@@ -34,7 +34,7 @@ const DAMPING_RATIOS: [f64; 2] = [-1e-3, 0.2];
 /// The pair that is in the place of this one damped sinusoid, if there is one.
 pub(super) fn close_pair(signal: &Signal, one: &SinusoidFit, measured: Measured) -> Option<SinusoidFit> {
     let [pole] = one.poles[..] else { return None };
-    let drift_terms = one.links.first()?.drift_rad.len();
+    let drift_terms = one.drift_terms();
     let averaged = &signal.averaged(pole.omega_rad_s);
     let fit = |start: Vec<Pole>| SinusoidFit::with_drift(averaged, one.origin_s, &start, drift_terms);
     let line_rad_s = std::f64::consts::TAU / signal.duration_s();

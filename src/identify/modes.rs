@@ -56,7 +56,7 @@ const LINES_TRIED: usize = 4;
 /// In words, when nothing oscillates.
 pub fn choose_modes(signal: &Signal, spectrum: &Spectrum, measured: Measured) -> Result<Chosen, String> {
     let one = strongest(signal, spectrum)?;
-    let drift_terms = one.links.first().map_or(0, |l| l.drift_rad.len());
+    let drift_terms = one.drift_terms();
     let highest_hz = spectrum.significant().map(|p| p.frequency_hz.value).fold(0.0, f64::max);
     let f1_hz = one.poles[0].frequency_hz();
     let guard_hz = (4.0 * spectrum.resolution_hz).max(0.12 * f1_hz);
@@ -191,7 +191,7 @@ fn single_oscillation_suffices(signal: &Signal, one: &SinusoidFit, two: &Sinusoi
         return false;
     }
     let averaged = &signal.averaged(one.poles[0].omega_rad_s);
-    let drift_terms = two.links.first().map_or(0, |l| l.drift_rad.len());
+    let drift_terms = two.drift_terms();
     let of_two = SinusoidFit::with_drift(averaged, two.origin_s, &two.poles, drift_terms);
     let of_two = of_two.map(|fit| fit.criterion(averaged));
     Modulated::criterion(averaged, one, measured).is_some_and(|own| of_two.is_none_or(|two| own <= two))
@@ -247,7 +247,7 @@ fn decide(signal: &Signal, spectrum: &Spectrum, measured: Measured, one: Sinusoi
 fn sorted(fit: SinusoidFit, signal: &Signal) -> SinusoidFit {
     let mut poles = fit.poles.clone();
     poles.sort_by(|a, b| a.omega_rad_s.total_cmp(&b.omega_rad_s));
-    let drift_terms = fit.links.first().map_or(0, |l| l.drift_rad.len());
+    let drift_terms = fit.drift_terms();
     if poles == fit.poles {
         return fit;
     }

@@ -79,7 +79,7 @@ fn best_flow<'a>(recorded: &'a Signal, sinusoids: &SinusoidFit, measured: Measur
     let [pole] = sinusoids.poles[..] else { return None };
     let prior = prior_of_k(recorded, sinusoids.amplitude_rad(0), measured);
     let noise_rad: Vec<f64> = sinusoids.links.iter().map(|link| link.noise_rad).collect();
-    let drifts = sinusoids.links.first().map_or(0, |link| link.drift_rad.len());
+    let drifts = sinusoids.drift_terms();
     let of_terms = |terms| SlowFlow::at(recorded, pole, (prior, measured), terms, &noise_rad).solved(SETS[0]);
     let viscous = iter::once(0).chain((drifts > 0).then_some(drifts)).filter_map(of_terms);
     let best = viscous.flat_map(with_others).min_by(|a, b| a.criterion().total_cmp(&b.criterion()))?;

@@ -201,10 +201,15 @@ impl SinusoidFit {
         }
     }
 
+    /// Terms of drift, of each link.
+    pub fn drift_terms(&self) -> usize {
+        self.links.first().map_or(0, |link| link.drift_rad.len())
+    }
+
     /// The same with so many terms of drift; as it is where that leads to no fit.
     #[must_use]
     pub fn with_drift_terms(self, signal: &Signal, terms: usize) -> Self {
-        if self.links.first().is_none_or(|link| link.drift_rad.len() == terms) {
+        if self.drift_terms() == terms {
             return self;
         }
         Self::with_drift(signal, self.origin_s, &self.poles, terms).unwrap_or(self)
@@ -242,7 +247,7 @@ impl SinusoidFit {
     /// How many terms of drift, up to those fitted, the Bayesian information criterion wants at these poles: the columns of the drift stand last, so
     /// that one orthogonalisation gives the residual of every number of them.
     pub fn wanted_drift(&self, signal: &Signal) -> usize {
-        let most = self.links.first().map_or(0, |l| l.drift_rad.len());
+        let most = self.drift_terms();
         let problem = Projection::new(signal, self.origin_s, &self.poles, most);
         let values = signal.values() as f64;
         let criterion = |terms: usize| {
@@ -260,7 +265,7 @@ impl SinusoidFit {
 
     /// The deviance that offsets and drifts alone would have.
     pub fn deviance_without_modes(&self, signal: &Signal) -> f64 {
-        let terms = self.links.first().map_or(0, |l| l.drift_rad.len());
+        let terms = self.drift_terms();
         let problem = Projection::new(signal, self.origin_s, &[], terms);
         let deviance = problem.links.iter().map(|link| {
             let n = link.tau_s.len() as f64;
@@ -297,7 +302,7 @@ impl SinusoidFit {
 
     /// Number of parameters: poles, amplitudes, offsets.
     pub fn parameters(&self) -> usize {
-        let drift = self.links.first().map_or(0, |l| l.drift_rad.len());
+        let drift = self.drift_terms();
         2 * self.poles.len() + self.links.len() * (1 + drift + 2 * self.poles.len())
     }
 }

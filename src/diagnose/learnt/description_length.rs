@@ -69,13 +69,11 @@ pub fn descriptions<'a>(
     let mut order = described(with_laws.into_iter().chain(of_table).collect(), &prior)?;
     // a term that is nearly right makes superfluous what was needed without it
     let mut tried = Vec::new();
-    loop {
+    while context.work.done() <= budget.until_simpler {
         // what a prediction may yet put first
         let near = order[0].length + context.settings.law.far;
         let new = |own: &&Description<'a>| own.length < near && !own.terms.is_empty() && !tried.contains(&own.kind());
-        let Some(shortest) = order.iter().find(new).filter(|_| context.work.done() <= budget.until_simpler) else {
-            break;
-        };
+        let Some(shortest) = order.iter().find(new) else { break };
         tried.push(shortest.kind());
         let (mut simpler, (without_a_term, plainer)) = rayon::join(
             || without_a_name(context, shortest),
