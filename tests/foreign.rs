@@ -47,11 +47,17 @@ fn python() -> &'static str {
     ["python3", "/usr/bin/python3"].into_iter().find(|p| has_numpy(p)).expect("no numpy: run scripts/setup")
 }
 
+/// A program of `fixtures/foreign`.
+fn script(name: &str) -> Command {
+    let mut command = Command::new(python());
+    command.arg(Path::new(env!("CARGO_MANIFEST_DIR")).join("fixtures/foreign").join(name));
+    command
+}
+
 /// Renders variants of the bank into a folder.
 fn render(folder: &Path, seconds: f64, names: &[&str]) {
-    let script = Path::new(env!("CARGO_MANIFEST_DIR")).join("fixtures/foreign/render.py");
-    let mut command = Command::new(python());
-    command.arg(script).arg("--out").arg(folder).args(["--seconds", &seconds.to_string()]);
+    let mut command = script("render.py");
+    command.arg("--out").arg(folder).args(["--seconds", &seconds.to_string()]);
     if !names.is_empty() {
         command.args(["--only", &names.join(",")]);
     }
@@ -60,9 +66,8 @@ fn render(folder: &Path, seconds: f64, names: &[&str]) {
 
 /// Films as strangers make them, the first seconds of each.
 fn films(folder: &Path, seconds: f64, names: &[&str]) {
-    let script = Path::new(env!("CARGO_MANIFEST_DIR")).join("fixtures/foreign/films.py");
-    let mut command = Command::new(python());
-    command.arg(script).args(names).arg("--out").arg(folder).args(["--seconds", &seconds.to_string()]);
+    let mut command = script("films.py");
+    command.args(names).arg("--out").arg(folder).args(["--seconds", &seconds.to_string()]);
     assert!(command.status().unwrap().success());
 }
 
@@ -187,8 +192,7 @@ fn every_foreign_rendering_is_measured_within_its_limits() {
 
 /// Names of the bank's variants.
 fn variants() -> Vec<String> {
-    let script = Path::new(env!("CARGO_MANIFEST_DIR")).join("fixtures/foreign/render.py");
-    let output = Command::new(python()).arg(script).args(["--out", ".", "--list"]).output().unwrap();
+    let output = script("render.py").args(["--out", ".", "--list"]).output().unwrap();
     String::from_utf8(output.stdout).unwrap().split_whitespace().map(str::to_owned).collect()
 }
 
