@@ -83,7 +83,9 @@ impl FitArgs {
         let bar = console.bar_of_fits(self.quiet);
         bar.begin("fitting", Some(fit::stages(&[]) + fit::stages(&free)));
         let side = |free: &[Parameter]| Ok(Side::of(fit::fit_watched(&records, &experiment, free, &bar)?, window_s));
+        let of_links = Chain::of(&experiment.specimen)?.parameters();
         let report = Report {
+            links_taken: !experiment.specimen.links.is_empty() && !free.iter().any(|p| of_links.contains(p)),
             given: side(&[])?,
             fitted: side(&free)?,
             start: free.iter().map(|p| model.value(*p).unwrap_or(0.0)).collect(),
@@ -162,6 +164,8 @@ struct Report<'a> {
     paces: Vec<Option<Pace>>,
     records: &'a [Record],
     specimen: &'a str,
+    /// General links of which nothing is free.
+    links_taken: bool,
 }
 
 impl Report<'_> {
@@ -222,7 +226,8 @@ impl Report<'_> {
         if self.fitted.fit.coloured {
             text.push_str(&paragraph("  ", "The residuals are correlated in time; the intervals are widened for it."));
         }
-        let line = match self.fitted.verdicts.iter().all(Verdict::is_reproduced) {
+        let is_reproduced = self.fitted.verdicts.iter().all(Verdict::is_reproduced);
+        let line = match is_reproduced {
             true => {
                 "The intervals are valid only if nothing else acts: the fitted parameters would take up a missing force."
             }
@@ -230,7 +235,13 @@ impl Report<'_> {
                 "The intervals are not valid: the recording is not reproduced, and the fitted parameters take up what the model lacks."
             }
         };
-        let line = &format!("{line} `freeswing diagnose` searches for missing effects.");
+        let links = match self.links_taken && !is_reproduced {
+            true => {
+                " Centres of mass and inertias are kept as the file has them, to all digits: free those that are known to a percent only (--free links.1.com_m)."
+            }
+            false => "",
+        };
+        let line = &format!("{line}{links} `freeswing diagnose` searches for missing effects.");
         text.push_str(&paragraph("  ", line));
     }
 

@@ -49,8 +49,8 @@ pub struct Detectable {
 /// What [`adequacy`] says.
 #[derive(Debug, Clone)]
 pub struct Adequacy {
-    /// How often chance alone leaves residuals as conspicuous as these.
-    pub p_value: f64,
+    /// How often chance alone leaves residuals as conspicuous as these; `None` where the motion cannot be integrated.
+    pub p_value: Option<f64>,
     /// What could have been seen.
     pub detectable: Vec<Detectable>,
 }
@@ -65,7 +65,7 @@ pub fn adequacy(
     bootstraps: usize,
     progress: &dyn Progress,
 ) -> Adequacy {
-    let nothing = Adequacy { p_value: 0.0, detectable: Vec::new() };
+    let nothing = Adequacy { p_value: None, detectable: Vec::new() };
     let Some(screen) = Screen::at(context, null) else { return nothing };
     let scores = laws::scores(&screen, &laws::cheap_to_score(context, effects));
     let basis = &screen.projection.basis;
@@ -112,7 +112,10 @@ pub fn adequacy(
         (0..REPLICATES as u64).into_par_iter().map(of).collect()
     };
     let own = statistics(&screen.projection.residual);
-    Adequacy { p_value: ranked(&own, &replicates), detectable: detectable(&scores, effects, &context.settings.verdict) }
+    Adequacy {
+        p_value: Some(ranked(&own, &replicates)),
+        detectable: detectable(&scores, effects, &context.settings.verdict),
+    }
 }
 
 /// The residuals, over the noise, of the base model fitted to a recording that it made itself, with noise as it was found.
@@ -127,8 +130,13 @@ fn replicate(context: &FitContext<'_>, null: &Refit<'_>, seed: u64) -> Option<DV
             record.theta_rad[value.link][value.row] = Some(value.predicted_rad + noise_rad);
         }
     }
-    let again = context.on(&records).refit(&null.hypothesis, null, &[])?;
-    again.linearised().map(|(residual, _)| residual.rows(0, context.values()).into_owned())
+    // what was measured beforehand would have come out otherwise, too
+    let mut measured = context.on(&records);
+    for belief in &mut measured.beliefs {
+        let error: f64 = StandardNormal.sample(&mut random);
+        belief.value = null.value(belief.parameter).unwrap_or(belief.value) + belief.sd * error;
+    }
+    measured.refit(&null.hypothesis, null, &[])?.linearised().map(|(residual, _)| residual)
 }
 
 /// The share of replicates whose least rank is as small as the recording's.
@@ -178,4 +186,45 @@ fn together(one: &Score, other: &Score) -> f64 {
     let along = other.columns.tr_mul(&column);
     let Some(inverse) = gram.try_inverse() else { return 0.0 };
     (along.dot(&(inverse * &along)) / column.norm_squared().max(1e-300)).sqrt()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::diagnose::base_priors::DampingAssumption;
+    use crate::diagnose::preparation;
+    use crate::diagnose::search::Search;
+    use crate::diagnose::settings::Settings;
+    use crate::diagnose::testing::{arm, swing};
+    use crate::fit::Record;
+    use crate::progress::Silent;
+
+    /// The p-value of an arm's swing with something added to its angles, with so many bootstrap recordings.
+    fn p_value(added_rad: impl Fn(f64) -> f64, bootstraps: usize) -> f64 {
+        let experiment = arm("hinge_viscous = 2e-5\n");
+        let (t_s, theta_rad) = swing(&experiment, 20.0, 30.0);
+        let mut random = StdRng::seed_from_u64(5);
+        let angles = t_s.iter().zip(theta_rad).map(|(t, theta_rad)| {
+            let noise: f64 = StandardNormal.sample(&mut random);
+            Some(theta_rad + added_rad(*t) + 5e-4 * noise)
+        });
+        let record = Record::uniform("made", t_s.clone(), vec![angles.collect()]);
+        let settings = Settings::default();
+        let prepared = preparation::prepare(&[record], &experiment, &settings).unwrap();
+        let taken = DampingAssumption::AsStated;
+        let search = Search::of_base_model(&prepared, &prepared.experiment, taken, &settings, &Silent).unwrap();
+        adequacy(&search.context, search.base(), &search.effects, bootstraps, &Silent).p_value.unwrap()
+    }
+
+    #[test]
+    fn a_line_that_dies_away_is_not_left_by_chance() {
+        let line = |t: f64| 1.5e-3 * (-t / 4.0).exp() * (std::f64::consts::TAU * 7.0 * t).sin();
+        assert!(p_value(line, 0) < Settings::default().verdict.chance);
+        assert!(p_value(|_| 0.0, 0) > 0.05);
+    }
+
+    #[test]
+    fn recordings_of_links_whose_masses_are_believed_are_made_anew() {
+        assert!(p_value(|_| 0.0, 12) > 0.1);
+    }
 }

@@ -53,12 +53,16 @@ impl HeldOut {
     /// The part of the squares that the base model leaves beyond the noise (rad) of which the names, or another description, leave nothing; all of it where that is too little to
     /// be told from the noise's own scatter.
     pub fn explained(&self, other: Option<&Prediction>, noise_rad: &[f64]) -> f64 {
-        let square = |values: &[f64]| values.iter().map(|r| r * r).sum::<f64>();
-        let noise = square(noise_rad);
-        let beyond = |of: &Prediction| (square(&of.rmse_rad) - noise).max(0.0);
+        let noise = squares(noise_rad);
+        let beyond = |of: &Prediction| (squares(&of.rmse_rad) - noise).max(0.0);
         let left = other.into_iter().chain([&self.augmented]).map(beyond).fold(f64::INFINITY, f64::min);
         let base = beyond(&self.baseline);
         if base > MUCH_BEYOND_NOISE * noise { (1.0 - left / base).max(0.0) } else { 1.0 }
+    }
+
+    /// Whether the names leave so much beyond the noise (rad) of what was not fitted that it tells which description does better.
+    pub fn tells(&self, noise_rad: &[f64]) -> bool {
+        squares(&self.augmented.rmse_rad) > (1.0 + MUCH_BEYOND_NOISE) * squares(noise_rad)
     }
 }
 
@@ -76,9 +80,17 @@ impl Prediction {
 
     /// What it leaves, as a part of what another one does: root mean squares of all angles.
     pub fn over(&self, other: &Self) -> f64 {
-        let square = |of: &Self| of.rmse_rad.iter().map(|r| r * r).sum::<f64>();
-        (square(self) / square(other).max(1e-300)).sqrt()
+        (squares(&self.rmse_rad) / squares(&other.rmse_rad).max(1e-300)).sqrt()
     }
+
+    /// What its errors add to the length of a description that makes it: 2 Σ ln e over the angles ([`super::learnt`]).
+    pub fn length(&self) -> f64 {
+        2.0 * self.rmse_rad.iter().map(|error| error.max(f64::MIN_POSITIVE).ln()).sum::<f64>()
+    }
+}
+
+fn squares(values: &[f64]) -> f64 {
+    values.iter().map(|value| value * value).sum()
 }
 
 /// The posterior and its proof; where the model's own error is far above the noise, of those sets of effects that also predict what was not fitted: what was fitted

@@ -6,7 +6,7 @@
 //! | 2 | the base model is fitted | [`base_priors`], [`base`], [`context`], [`refit`], [`fitting`], [`noise`], [`residual_noise`] |
 //! | 3 | what it lacks is sought: effects are proposed, fitted, kept | [`mod@search`], [`screen`], [`stretches`], [`misfit`], [`laws`] |
 //! | 4 | a strip's rods are counted; where two links are found to be a strip, what it lacks is sought | [`rods`], [`mod@search`] |
-//! | 5 | the hypotheses are weighed, beside something that is not in the table | [`posterior`], [`evidence`], [`bagging`], [`latent_forces`], [`rounding`], [`latent`], [`basis_law`] |
+//! | 5 | the hypotheses are weighed, beside something that is not in the table, and the base model by chance | [`adequacy`], [`posterior`], [`evidence`], [`bagging`], [`latent_forces`], [`rounding`], [`latent`], [`basis_law`] |
 //! | 6 | in doubt the search goes on, in pieces of the recordings where these are long enough, and they are weighed again | [`mod@search`], [`preparation`], [`search::horizon`] |
 //! | 7 | what was not fitted is predicted | [`heldout`] |
 //! | 8 | what the names leave is learnt, as a law that no table holds | [`learnt`], [`grammar`] |
@@ -64,10 +64,11 @@ use std::sync::OnceLock;
 use crate::error::Result;
 use crate::experiment::Experiment;
 use crate::fit::Record;
-use crate::progress::Progress;
+use crate::progress::{Progress, Silent};
 use findings::Findings;
 use posterior::Posterior;
 use preparation::Prepared;
+use refit::Refit;
 use search::Search;
 
 pub use adequacy::Detectable;
@@ -170,7 +171,9 @@ fn weighed<'a, 'p>(
 ) -> (Search<'a, 'p>, Posterior<'a>) {
     let weigh = |search: &Search<'a, 'p>| {
         progress.begin("weighing", None);
-        posterior::weigh(search.fits.clone(), search.effects.len(), &search.compared(), settings)
+        let posterior = posterior::weigh(search.fits.clone(), search.effects.len(), &search.compared(), settings);
+        let p_value = |base: &Refit<'a>| adequacy::adequacy(&search.context, base, &search.effects, 0, &Silent).p_value;
+        posterior.beside_chance(p_value, settings.verdict.chance)
     };
     let at_once = (!search.leaves_more_than_noise()).then(|| weigh(&search));
     match at_once {

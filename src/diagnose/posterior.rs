@@ -318,6 +318,19 @@ impl<'a> Posterior<'a> {
         self
     }
 
+    /// The same where the base model is likeliest, and chance leaves residuals as conspicuous as its own so rarely that something is missing, whatever it is; `p_value`
+    /// says how often, where that can be told.
+    #[must_use]
+    pub fn beside_chance(mut self, p_value: impl FnOnce(&Refit<'a>) -> Option<f64>, chance: f64) -> Self {
+        let is_base = self.best().hypothesis.effects.is_empty();
+        if let Some(p_value) = is_base.then(|| p_value(self.best())).flatten().filter(|p| *p < chance) {
+            let named = (1.0 - self.unknown).max(f64::MIN_POSITIVE);
+            self.candidates.iter_mut().for_each(|candidate| candidate.probability *= p_value / named);
+            (self.unknown, self.remains) = (1.0 - p_value, 1.0 - p_value);
+        }
+        self
+    }
+
     /// Whether a name of the likeliest fit often stands for something else, or two of them may together: a frequency, and how it goes with amplitude, is what any
     /// nonlinear spring changes.
     pub fn may_be_imitation(&self, settings: &Settings) -> bool {

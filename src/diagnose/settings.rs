@@ -279,6 +279,8 @@ pub struct VerdictSettings {
     pub fitted: f64,
     /// Places are told from one another by this much in ln-likelihood (statistics: 20 to 1).
     pub places: f64,
+    /// Residuals of the base model that chance leaves less often are not only noise (statistics: of recordings that lack nothing one in 200).
+    pub chance: f64,
     /// An effect is seen at this many standard deviations (statistics)…
     pub seen: f64,
     /// … and named when it is this many from its nearest rival (judgement: what the concealed benchmark counts as strong).
@@ -468,6 +470,7 @@ impl Default for VerdictSettings {
             told_apart: 0.05,
             proven: 0.5,
             borne_out: 0.9,
+            chance: 0.005,
             sets_asked: 4,
             fitted: 2.0 / 3.0,
             places: 3.0,

@@ -14,6 +14,8 @@ use crate::model::Parameter;
 
 /// A change of a probability that is worth a sentence (judgement: a percent).
 const SLIGHT_CHANGE: f64 = 0.01;
+/// Rivals that are named in a sentence (judgement).
+const MOST_RIVALS: usize = 3;
 /// Ratios of frequencies that differ by less are one: the swing is slower at large angles (physics: by so much at 80°).
 const SAME_FREQUENCY: f64 = 0.12;
 /// A joint that yields before this part of the bend that every joint reaches is dry (judgement).
@@ -83,7 +85,13 @@ impl Findings<'_> {
     /// What further starts could change: of rivals whose fits are not certified, or of the named fit.
     fn reservation(&self) -> String {
         let [low, high] = self.probability_interval();
-        let rivals: Vec<String> = self.posterior.uncertified.iter().map(|rival| names(rival, "no effect")).collect();
+        let told = self.posterior.uncertified.iter().take(MOST_RIVALS);
+        let mut rivals: Vec<String> = told.map(|rival| names(rival, "no effect")).collect();
+        match self.posterior.uncertified.len().saturating_sub(MOST_RIVALS) {
+            0 => {}
+            1 => rivals.push("one other set".to_owned()),
+            others => rivals.push(format!("one of {others} other sets")),
+        }
         if high - low >= SLIGHT_CHANGE && !rivals.is_empty() {
             return format!(
                 " The fit with {} is not certified: if it fitted as well as the best one, the probability of the answer would be {}.",

@@ -173,14 +173,16 @@ fn shape(seen: &Seen, experiment: &Experiment) -> Option<String> {
     })
 }
 
-/// A swing of this angle in radians would be slower by T/T₀ = 1/agm(1, cos A/2).
+/// A swing of this angle in radians would be slower by T/T₀ = 1/agm(1, cos A/2). One whose frequency is seen to fall with its amplitude is not of degrees: of these it is
+/// small.
 fn degrees(seen: &Seen, model_hz: f64) -> Option<String> {
     let amplitude_rad = seen.slow.amplitude_rad.min(3.0);
     let slowed = agm(1.0, (0.5 * amplitude_rad).cos());
     let as_small = (seen.slow.mean_frequency_hz / model_hz - 1.0).abs();
-    (1.0 - slowed > 0.03 && as_small < 0.2 * (1.0 - slowed)).then(|| {
+    let falls_with_amplitude = seen.slow.frequency_hz - seen.slow.mean_frequency_hz > seen.slow.frequency_half_hz;
+    (1.0 - slowed > 0.03 && as_small < 0.2 * (1.0 - slowed) && !falls_with_amplitude).then(|| {
         format!(
-            "The recording swings at {:.4} Hz as small angles do, although they reach {amplitude_rad:.1}: in radians it would be {:.4} Hz. The angles look like degrees; multiply them by π/180.",
+            "The recording swings at {:.4} Hz as small angles do, although they reach {amplitude_rad:.1}: in radians it would be {:.4} Hz. The angles look like degrees, if lengths and time base are right; multiply them by π/180.",
             seen.slow.mean_frequency_hz,
             slowed * model_hz
         )

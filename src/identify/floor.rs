@@ -68,10 +68,17 @@ impl Floor {
                 "{:.4} Hz is below the floor of {floor_hz:.4} Hz ({body}), but a weight on a thread of {length_m} m swings at {weight_hz:.4} Hz: if that is what hangs there, describe it with [[specimen.links]], its com_m from the hinge",
                 frequency_hz.value
             ),
-            Some(r) => format!(
-                "{:.4} Hz is below the floor of {floor_hz:.4} Hz ({body}): time base, length or gravity is wrong; mended by time × {:.3}, or length × {:.3}, or gravity × {:.3}",
-                frequency_hz.value, r.time, r.length, r.gravity
-            ),
+            Some(r) => {
+                let other = if specimen.links.is_empty() {
+                    "it is no strip of even mass (weights at the joints, a rigid body that goes on below its last mark: describe these with [[specimen.links]])"
+                } else {
+                    "a centre of mass or an inertia is"
+                };
+                format!(
+                    "{:.4} Hz is below the floor of {floor_hz:.4} Hz ({body}): time base, length or gravity is wrong, or {other}; mended by time × {:.3}, or length × {:.3}, or gravity × {:.3}",
+                    frequency_hz.value, r.time, r.length, r.gravity
+                )
+            }
             None if frequency_hz.high < floor_hz => format!(
                 "{:.4} Hz is {:.2} % below the floor of {floor_hz:.4} Hz ({body}): no more than an error of {:.2} % in length or gravity",
                 frequency_hz.value,

@@ -44,9 +44,16 @@ impl Display for Identification {
             writeln!(f, "  C_eq  = 2Mωₙξ    {c_eq} N·s/m      (Eq. 30; the paper's N·m·s/rad is a slip)")?;
             writeln!(
                 f,
-                "  K_rot = ωₙ²I     {} N·m/rad    (gravity makes {:.4e} of it)",
+                "  K_rot = ωₙ²I     {} N·m/rad    ({})",
                 scientific(&e.k_rot_n_m_per_rad),
-                e.k_gravity_n_m_per_rad
+                if e.k_gravity_n_m_per_rad > e.k_rot_n_m_per_rad.high {
+                    format!(
+                        "gravity alone makes {:.4e} of a straight body: it does not swing as one of this inertia",
+                        e.k_gravity_n_m_per_rad
+                    )
+                } else {
+                    format!("gravity makes {:.4e} of it", e.k_gravity_n_m_per_rad)
+                }
             )?;
             let c_rot = e.c_rot_n_m_s_per_rad.as_ref().map_or_else(absent, scientific);
             writeln!(f, "  C_rot = 2Iωₙξ    {c_rot} N·m·s/rad")?;

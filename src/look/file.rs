@@ -171,7 +171,7 @@ fn pivot(text: &mut String, finding: &Finding) {
         let _ = writeln!(text, "pivot_px = [{x:.2}, {y:.2}]    # centre of the first arc{beside}");
         let _ = writeln!(
             text,
-            "pivot_sd_px = [{sx:.2}, {sy:.2}]      # its standard deviation, with that of a lens nobody has calibrated, if the camera faces the swing"
+            "pivot_sd_px = [{sx:.2}, {sy:.2}]      # its standard deviation, with that of a lens nobody has calibrated and of a camera that was set up by eye"
         );
         let _ = writeln!(text, "# the first mark is {:.1} px below it", arc.radius_px);
     } else {

@@ -226,7 +226,7 @@ fn measured(
     let stream = session.stream();
     let (width, height) = stream.orientation.size(stream.stored_size_px);
     let size_px = [aspect * width as f64, height as f64];
-    let arc = chain.arc.map(|arc| arc.through_a_lens(&first.places_px(), first.radius_px(), size_px));
+    let arc = chain.arc.map(|arc| arc.through_a_camera(&first.places_px(), first.radius_px(), size_px));
     let in_file = |thing: &TrackedObject| thing.clone().widened(aspect.recip());
     Ok(Some(Finding {
         held_until_s,

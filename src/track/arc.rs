@@ -18,6 +18,10 @@ const INDEPENDENT_PLACES: f64 = 10.0;
 /// What a lens that nobody has calibrated moves a point in the picture's corner, as a share of its distance from the middle: one standard deviation (judgement:
 /// ordinary lenses stay below 1 to 2 %; a wide-angle one has to be calibrated).
 const LENS: f64 = 0.01;
+/// How far a camera that was set up by eye is turned from the plane of the swing, to either side, and up or down: one standard deviation (judgement).
+const FACES_RAD: f64 = 1.5 * std::f64::consts::PI / 180.0;
+/// The focal length of an ordinary camera, over the diagonal of its picture (judgement: 26 mm of a telephone's 43 mm is 0.6, 50 mm is 1.2).
+const FOCAL_LENGTH: f64 = 0.8;
 /// Points below which there is no arc.
 const FEWEST_POINTS: usize = 8;
 
@@ -93,23 +97,38 @@ impl Arc {
 }
 
 impl Arc {
-    /// With the deviation that a lens adds of which nothing is known: a point at a distance r from the middle of the picture, its corner at R, is seen moved towards
-    /// it by k r (r/R)². `points`, `mark_radius_px` as for [`Arc::of`].
+    /// With the deviations that a lens adds of which nothing is known, and a camera that was set up by eye. With p the place of a point from the middle of the picture,
+    /// R its corner's, f the camera's focal length:
+    ///
+    /// ```text
+    /// lens               p ← p (1 + k |p|²/R²)
+    /// camera turned      p ← p (1 + ψ pₓ/f),  p ← p (1 + ψ p_y/f)      to first order
+    /// ```
+    ///
+    /// `points`, `mark_radius_px` as for [`Arc::of`].
     #[must_use]
-    pub fn through_a_lens(self, points: &[[f64; 2]], mark_radius_px: f64, size_px: [f64; 2]) -> Self {
+    pub fn through_a_camera(self, points: &[[f64; 2]], mark_radius_px: f64, size_px: [f64; 2]) -> Self {
         let middle = size_px.map(|size| 0.5 * size);
-        let corner2 = middle[0].powi(2) + middle[1].powi(2);
-        let straight = |p: &[f64; 2]| {
-            let off = [p[0] - middle[0], p[1] - middle[1]];
-            let moved = 1.0 + LENS * (off[0].powi(2) + off[1].powi(2)) / corner2;
-            [middle[0] + moved * off[0], middle[1] + moved * off[1]]
+        let corner_px = middle[0].hypot(middle[1]);
+        let turned = FACES_RAD / (FOCAL_LENGTH * 2.0 * corner_px);
+        let lens = |off: [f64; 2]| LENS * (off[0].hypot(off[1]) / corner_px).powi(2);
+        let aside = |off: [f64; 2]| turned * off[0];
+        let tilted = |off: [f64; 2]| turned * off[1];
+        let moves: [&dyn Fn([f64; 2]) -> f64; 3] = [&lens, &aside, &tilted];
+        let off = |by: &dyn Fn([f64; 2]) -> f64| {
+            let straight = |p: &[f64; 2]| {
+                let off = [p[0] - middle[0], p[1] - middle[1]];
+                [0, 1].map(|k| middle[k] + (1.0 + by(off)) * off[k])
+            };
+            let points: Vec<[f64; 2]> = points.iter().map(straight).collect();
+            let other = Self::of(&points, mark_radius_px)?;
+            // where that centre would be seen, to first order
+            let beyond = straight(&other.centre_px);
+            Some([0, 1].map(|k| 2.0 * other.centre_px[k] - beyond[k] - self.centre_px[k]))
         };
-        let points: Vec<[f64; 2]> = points.iter().map(straight).collect();
-        let Some(other) = Self::of(&points, mark_radius_px) else { return self };
-        // where that centre would be seen, to first order
-        let beyond = straight(&other.centre_px);
-        let off = |k: usize| 2.0 * other.centre_px[k] - beyond[k] - self.centre_px[k];
-        Self { sd_px: [0, 1].map(|k| self.sd_px[k].hypot(off(k))), ..self }
+        let sd_px =
+            moves.into_iter().filter_map(off).fold(self.sd_px, |sd, off| [sd[0].hypot(off[0]), sd[1].hypot(off[1])]);
+        Self { sd_px, ..self }
     }
 }
 
@@ -186,10 +205,25 @@ mod tests {
             let path: Vec<[f64; 2]> = swing.map(|a| seen(318.0 + 400.0 * a.sin(), 10.0 + 400.0 * a.cos())).collect();
             let (arc, pivot) = (Arc::of(&path, 15.0).unwrap(), seen(318.0, 10.0));
             let off_px = (arc.centre_px[1] - pivot[1]).abs();
-            let sd_px = arc.through_a_lens(&path, 15.0, size_px).sd_px[1];
+            let sd_px = arc.through_a_camera(&path, 15.0, size_px).sd_px[1];
             assert!(off_px > 3.0 * arc.sd_px[1], "{off_px}, {arc:?}");
             assert!(off_px < 3.0 * sd_px && sd_px < off_px, "{off_px}, {sd_px}");
         }
+    }
+
+    #[test]
+    fn a_camera_turned_by_two_degrees_leaves_the_pivot_within_its_deviation() {
+        let (size_px, focal_px, turned) = ([640.0, 480.0], 700.0, 2.0f64.to_radians());
+        let seen = |x: f64, y: f64| {
+            let depth = 1.0 + x * turned.sin() / focal_px;
+            [320.0 + x * turned.cos() / depth, 240.0 + y / depth]
+        };
+        let angles = (0..400).map(|i| 0.3 * (0.13 * f64::from(i)).sin());
+        let path: Vec<[f64; 2]> = angles.map(|a| seen(-40.0 + 400.0 * a.sin(), -230.0 + 400.0 * a.cos())).collect();
+        let (arc, pivot) = (Arc::of(&path, 8.0).unwrap(), seen(-40.0, -230.0));
+        let off_px = (arc.centre_px[0] - pivot[0]).abs();
+        let sd_px = arc.through_a_camera(&path, 8.0, size_px).sd_px[0];
+        assert!(off_px > 3.0 * arc.sd_px[0] && off_px < 3.0 * sd_px, "{off_px}, {sd_px}, {arc:?}");
     }
 
     #[test]

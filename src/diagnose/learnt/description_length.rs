@@ -188,7 +188,9 @@ fn described<'a>(fitted: Vec<Begun<'a>>, prior: &Prior) -> Option<Vec<Descriptio
     let scatter = Scatter::of(least, least.values());
     let together = (scatter.of_all / scatter.of_values).max(1.0);
     let length = |terms: &[Term], fit: &Refit<'_>| {
-        let count = fit.added().len() + terms.iter().map(|term| term.law.parameters.len()).sum::<usize>();
+        // the instant of a jump costs ln n, twice what another number does (Zhang and Siegmund, Biometrics 63 (2007) 22)
+        let of_instant = 2 * usize::from(fit.hypothesis.dropped.is_some());
+        let count = fit.added().len() + of_instant + terms.iter().map(|own| own.law.parameters.len()).sum::<usize>();
         0.5 * fit.chi2 / scatter.of_all
             + 0.5 * count as f64 * (fit.values() as f64 / together).ln()
             + prior.of_description(terms, &fit.hypothesis)

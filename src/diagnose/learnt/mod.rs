@@ -22,7 +22,8 @@
 //! ```
 //!
 //! A term that has the shape of an effect's law, and nearly its torque along the motion, is that law: dry friction that reverses smoothly is dry friction.
-//! The shortest is the law, if it leaves clearly less of what was not fitted than the names do.
+//! The shortest is the law, if it leaves clearly less of what was not fitted than the names do, or where these leave only noise there, if it is far shorter than any
+//! description without a law.
 //!
 //! | file | holds |
 //! |---|---|
@@ -66,8 +67,11 @@ pub fn beside<'a>(
     let Some((order, along)) = found else { return (Vec::new(), None) };
     let needed = |order: &[Description<'_>]| needed(context, order, posterior, effects, &along);
     let Some(proof) = proof else { return (needed(&order), None) };
+    let without_law = order.iter().filter(|own| own.terms.is_empty()).map(|own| own.length);
+    let long = without_law.reduce(f64::min);
     let foretold = foretold(context, order, (posterior.best(), proof), from_s);
-    let learnt = proven(context, &foretold, proof, &along);
+    let noise_rad = posterior.best().noise_rad(proof.record);
+    let learnt = proven(context, &foretold, (proof, &noise_rad), long, &along);
     let order: Vec<Description<'a>> = foretold.into_iter().map(|own| own.0).collect();
     // where no motion could be integrated, that says nothing of any effect
     let needed = if order.is_empty() { Vec::new() } else { needed(&order) };

@@ -86,8 +86,7 @@ pub fn foretold<'a>(
     let fails = |of: &Prediction| is_proof && settings.verdict.borne_out * of.over(&proof.augmented) > 1.0;
     let predict = |mut own: Description<'a>| {
         let prediction = heldout::predicted(&with_laws(context, &own.terms), &own.fit, from_s)?;
-        let missed = prediction.rmse_rad.iter().map(|error| error.max(f64::MIN_POSITIVE).ln());
-        own.length += 2.0 * missed.sum::<f64>();
+        own.length += prediction.length();
         // a law that sets in later was not learnt from what was fitted
         let is_told = prediction.told.iter().all(|deviations| *deviations > told);
         (is_told && !fails(&prediction)).then_some((own, prediction))
@@ -106,16 +105,22 @@ pub fn foretold<'a>(
     foretold
 }
 
-/// The law of the shortest of these descriptions, if it leaves clearly less of what was not fitted than the names do.
+/// The law of the shortest of these descriptions, if it leaves clearly less of what was not fitted than the names do; where the names leave hardly more than the noise
+/// (rad) there, as of a swing that has died away, if it leaves no more, and its description is far shorter than any without a law, of which the shortest is so
+/// `long` before it predicts.
 pub fn proven<'a>(
     context: &FitContext<'a>,
     foretold: &[(Description<'a>, Prediction)],
-    proof: &HeldOut,
+    (proof, noise_rad): (&HeldOut, &[f64]),
+    long: Option<f64>,
     along: &Along,
 ) -> Option<Learnt<'a>> {
     let settings = context.settings;
     let (own, prediction) = foretold.first().filter(|(own, _)| !own.terms.is_empty())?;
-    (prediction.over(&proof.augmented) < settings.verdict.borne_out).then_some(())?;
+    let left = prediction.over(&proof.augmented);
+    let is_far_shorter = || long.is_some_and(|long| own.length + settings.law.far < long + proof.augmented.length());
+    let is_proven = left < settings.verdict.borne_out || (!proof.tells(noise_rad) && left <= 1.0 && is_far_shorter());
+    is_proven.then_some(())?;
     let near = foretold[1..].iter().map(|(other, _)| other).filter(|other| !other.terms.is_empty());
     let near = near.filter(|other| other.length < own.length + settings.law.alternatives);
     Some(Learnt {
