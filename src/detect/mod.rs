@@ -146,7 +146,10 @@ impl Detector {
     pub fn detect(&self, picture: &Picture<'_>) -> Result<Vec<Blob>> {
         let Some(siting) = &self.siting else { return self.detect_by(picture, Channels::All) };
         let layout = Layout { chroma_site_px: siting.used_px, ..picture.layout };
-        let mut blobs = self.detect_by(&Picture { layout, ..*picture }, Channels::All)?;
+        // a mark without a hue has luma alone
+        let by_colour = |axis: HueAxis| siting.contradicted && !axis.is_luma();
+        let channels = |axis| if by_colour(axis) { Channels::Chroma } else { Channels::All };
+        let mut blobs = self.detect_each_by(&Picture { layout, ..*picture }, channels)?;
         for centroid in blobs.iter_mut().map(|b| &mut b.centroid) {
             for axis in 0..2 {
                 centroid.variance_px2[axis] += (centroid.chroma_share * siting.sd_px[axis]).powi(2);
@@ -160,6 +163,11 @@ impl Detector {
     /// # Errors
     /// As [`Detector::detect`].
     pub fn detect_by(&self, picture: &Picture<'_>, channels: Channels) -> Result<Vec<Blob>> {
+        self.detect_each_by(picture, |_| channels)
+    }
+
+    /// The same, each hue by channels of its own.
+    fn detect_each_by(&self, picture: &Picture<'_>, channels: impl Fn(HueAxis) -> Channels) -> Result<Vec<Blob>> {
         let (mut blobs, mut planes) = (Vec::new(), Planes::default());
         let site = picture.layout.chroma_site_px;
         let is_alike = |layout: &Layout| Layout { chroma_site_px: site, ..*layout } == picture.layout;
@@ -168,7 +176,7 @@ impl Detector {
         for (index, hue) in self.hues.iter().enumerate() {
             let target = self.target(index, hue, picture);
             let (shading, mixing, scene) = (target.shading, self.mixing, scene.as_ref());
-            let conditions = Conditions { channels, shading, mixing, scene };
+            let conditions = Conditions { channels: channels(target.axis), shading, mixing, scene };
             blobs::find(picture, &target, &conditions, &mut planes, &mut blobs)?;
         }
         Ok(blobs)

@@ -21,6 +21,9 @@ pub struct Siting {
     pub sd_px: [f64; 2],
     /// What the marks showed along each axis, with its standard deviation; `None` where chroma has every sample.
     pub seen_px: [Option<[f64; 2]>; 2],
+    /// Luma and colour differ by more than any site explains: a shaded mark before a wall as bright as its dark side ends for luma where the light does, for its colour at
+    /// its edge.
+    pub contradicted: bool,
 }
 
 /// Gathers differences between luma and colour.
@@ -38,6 +41,9 @@ const COMMON_ERROR_PX: f64 = 0.04;
 const RARE_SITE: f64 = 0.1;
 /// The same of one on the right, which no standard knows (ITU-T H.273, chroma sample locations 0 to 5): a picture was mirrored.
 const MIRRORED_SITE: f64 = 0.01;
+/// Luma and colour contradict each other beyond every site by so many px (judgement: more than colour alone errs by), and by so many standard deviations (statistics).
+const CONTRADICTED_PX: f64 = 0.5;
+const CONTRADICTED_DEVIATIONS: f64 = 3.0;
 /// Fewest marks that tell a site.
 const LEAST_MARKS: usize = 4;
 
@@ -81,6 +87,7 @@ impl SitingSurvey {
             used_px: layout.chroma_site_px,
             sd_px: [0.0; 2],
             seen_px: [None; 2],
+            contradicted: false,
         };
         for (axis, shift) in [layout.chroma_shift_x, layout.chroma_shift_y].into_iter().enumerate() {
             if shift == 0 {
@@ -92,10 +99,18 @@ impl SitingSurvey {
                 [siting.stated_px[axis] + d, sd.hypot(of_shading)]
             });
             siting.seen_px[axis] = seen;
+            siting.contradicted |= seen.is_some_and(|seen| is_contradiction(shift, seen));
             [siting.used_px[axis], siting.sd_px[axis]] = posterior(axis, siting.stated_px[axis], shift, seen);
         }
         Some(siting)
     }
+}
+
+/// Whether what was seen lies beyond every site.
+fn is_contradiction(shift: u32, [at, sd]: [f64; 2]) -> bool {
+    let last = f64::from((1u32 << shift) - 1);
+    let beyond = (-at).max(at - last);
+    beyond > CONTRADICTED_PX.max(CONTRADICTED_DEVIATIONS * sd)
 }
 
 /// Mean and standard deviation over the sites that a pair (or four, with 4:1:1) of luma samples allows, each with its
@@ -179,6 +194,15 @@ mod tests {
     fn what_lies_between_sites_leaves_them_open() {
         let siting = survey([&[1.27, 1.25, 1.29, 1.26, 1.28], &[]], [0.0, 0.5]);
         assert!(siting.used_px[0] < 0.8 && siting.sd_px[0] > 0.15, "{siting:?}");
+    }
+
+    #[test]
+    fn luma_that_is_pixels_from_the_colour_contradicts_it() {
+        let x = [-2.9, -2.5, -2.7, -3.0, -2.4, -2.6];
+        assert!(survey([&x, &[]], [0.0, 0.5]).contradicted);
+        let scattered = [-2.9, 2.5, -0.7, 3.0, -2.4, 1.6];
+        assert!(!survey([&scattered, &[]], [0.0, 0.5]).contradicted);
+        assert!(!survey([&[1.27, 1.25, 1.29, 1.26, 1.28], &[]], [0.0, 0.5]).contradicted);
     }
 
     #[test]
