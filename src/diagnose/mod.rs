@@ -173,7 +173,7 @@ fn weighed<'a, 'p>(
         progress.begin("weighing", None);
         let posterior = posterior::weigh(search.fits.clone(), search.effects.len(), &search.compared(), settings);
         let p_value = |base: &Refit<'a>| adequacy::adequacy(&search.context, base, &search.effects, 0, &Silent).p_value;
-        posterior.beside_chance(p_value, settings.verdict.chance)
+        posterior.beside_chance(p_value, settings)
     };
     let at_once = (!search.leaves_more_than_noise()).then(|| weigh(&search));
     match at_once {

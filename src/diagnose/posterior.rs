@@ -318,12 +318,15 @@ impl<'a> Posterior<'a> {
         self
     }
 
-    /// The same where the base model is likeliest, and chance leaves residuals as conspicuous as its own so rarely that something is missing, whatever it is; `p_value`
-    /// says how often, where that can be told.
+    /// The same where the base model is likeliest and leaves more than the noise, and chance leaves residuals as conspicuous as its own so rarely that something is missing,
+    /// whatever it is; `p_value` says how often, where that can be told. An encoder's rounding is conspicuous, and no larger than the noise.
     #[must_use]
-    pub fn beside_chance(mut self, p_value: impl FnOnce(&Refit<'a>) -> Option<f64>, chance: f64) -> Self {
-        let is_base = self.best().hypothesis.effects.is_empty();
-        if let Some(p_value) = is_base.then(|| p_value(self.best())).flatten().filter(|p| *p < chance) {
+    pub fn beside_chance(mut self, p_value: impl FnOnce(&Refit<'a>) -> Option<f64>, settings: &Settings) -> Self {
+        let (base, values) = (self.best(), self.best().values());
+        let squares = || base.over_noise().powi(2) * values as f64;
+        let is_more = base.hypothesis.effects.is_empty() && squares() > chi2_noise_limit(values, &settings.misfit);
+        let p_value = is_more.then(|| p_value(base)).flatten();
+        if let Some(p_value) = p_value.filter(|p| *p < settings.verdict.chance) {
             let named = (1.0 - self.unknown).max(f64::MIN_POSITIVE);
             self.candidates.iter_mut().for_each(|candidate| candidate.probability *= p_value / named);
             (self.unknown, self.remains) = (1.0 - p_value, 1.0 - p_value);
