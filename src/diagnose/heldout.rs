@@ -363,5 +363,7 @@ mod tests {
         // names that make it worse explain nothing, and where the base model leaves hardly more than noise nothing is told
         assert_eq!(proof(9.0, 10.0).explained(None, &noise_rad), 0.0);
         assert_eq!(proof(1.05, 1.06).explained(None, &noise_rad), 1.0);
+        // where the names leave hardly more than the noise, what is predicted tells no description from another
+        assert!(proof(9.0, 5.0).tells(&noise_rad) && !proof(9.0, 1.02).tells(&noise_rad));
     }
 }
