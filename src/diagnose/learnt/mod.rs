@@ -11,7 +11,7 @@
 //!    of n values of which τ go together,
 //!
 //! ```text
-//! L = χ²/(2vτ) + ½ k ln(n/τ) + Σ ln N − ln p     k: coefficients; N: out of how many effects, or terms, each was chosen
+//! L = χ²/(2vτ) + ½ k ln(n/τ) + Σ ln N − ln p     k: coefficients, two for the instant of a jump; N: out of how many effects, or terms, each was chosen
 //!                                                p: odds of a term, that something outside the table is at work; and of one that gives energy
 //! ```
 //!    A term that exerts the torque of an effect of the table is that effect.
