@@ -173,18 +173,21 @@ fn shape(seen: &Seen, experiment: &Experiment) -> Option<String> {
     })
 }
 
-/// A swing of this angle in radians would be slower by T/T₀ = 1/agm(1, cos A/2). One whose frequency is seen to fall with its amplitude is not of degrees: of these it is
-/// small.
+/// A swing of this angle in radians would be slower by T/T₀ = 1/agm(1, cos A/2). Where the frequency is seen to fall with the amplitude, and by nearer that than
+/// what as many degrees do (in ratio), the angles are no degrees.
 fn degrees(seen: &Seen, model_hz: f64) -> Option<String> {
     let amplitude_rad = seen.slow.amplitude_rad.min(3.0);
-    let slowed = agm(1.0, (0.5 * amplitude_rad).cos());
+    let slowed = |amplitude_rad: f64| agm(1.0, (0.5 * amplitude_rad).cos());
+    let (in_radians, in_degrees) = (1.0 - slowed(amplitude_rad), 1.0 - slowed(amplitude_rad.to_radians()));
     let as_small = (seen.slow.mean_frequency_hz / model_hz - 1.0).abs();
-    let falls_with_amplitude = seen.slow.frequency_hz - seen.slow.mean_frequency_hz > seen.slow.frequency_half_hz;
-    (1.0 - slowed > 0.03 && as_small < 0.2 * (1.0 - slowed) && !falls_with_amplitude).then(|| {
+    let fall_hz = seen.slow.frequency_hz - seen.slow.mean_frequency_hz;
+    let falls_as_radians =
+        fall_hz > seen.slow.frequency_half_hz && (fall_hz / seen.slow.frequency_hz).powi(2) > in_radians * in_degrees;
+    (in_radians > 0.03 && as_small < 0.2 * in_radians && !falls_as_radians).then(|| {
         format!(
             "The recording swings at {:.4} Hz as small angles do, although they reach {amplitude_rad:.1}: in radians it would be {:.4} Hz. The angles look like degrees, if lengths and time base are right; multiply them by π/180.",
             seen.slow.mean_frequency_hz,
-            slowed * model_hz
+            slowed(amplitude_rad) * model_hz
         )
     })
 }
