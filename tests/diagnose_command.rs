@@ -323,6 +323,24 @@ fn a_camera_that_looks_askew_is_named_with_its_stretch_and_its_shear() {
 }
 
 #[test]
+fn an_encoder_off_its_axis_is_named_beside_friction_and_where_it_sits_well_it_is_not() {
+    let folder = Folder::new();
+    let of = |effects: &str| {
+        let recorded: &[&str] = &["--duration", "30", "--rate", "60", "--noise-rad", "3e-4"];
+        let angles = folder.simulated(ONE_LINK, effects, recorded);
+        folder.diagnosis(&angles, &format!("{ONE_LINK}[rig]\nsensor = \"encoder\"\n"), &[])
+    };
+    let report = of("hinge_coulomb = 4e-3\nencoder_error = { sine_rad = 0.008, sine_2_rad = 0.01 }\n");
+    assert_eq!(names(&report["verdict"]["effects"]), ["encoder_error", "hinge_coulomb"], "{:#}", report["verdict"]);
+    let found = &report["candidates"][0]["parameters"]["hinge_coulomb"];
+    let [value, sd] = ["value", "sd"].map(|key| found[key].as_f64().unwrap());
+    assert!((value - 4e-3).abs() < 4.0 * sd, "{found}");
+    let report = of("hinge_coulomb = 4e-3\n");
+    assert_eq!(names(&report["verdict"]["effects"]), ["hinge_coulomb"], "{:#}", report["verdict"]);
+    assert!(report["verdict"]["inclusion"]["encoder_error"].as_f64().unwrap() < 0.1, "{:#}", report["verdict"]);
+}
+
+#[test]
 fn one_link_is_diagnosed_alone_and_together_with_another_recording_of_it() {
     let folder = Folder::new();
     let first = folder.swing(ONE_LINK, "hinge_coulomb = 4e-3\n");

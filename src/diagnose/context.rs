@@ -61,6 +61,7 @@ impl<'a> FitContext<'a> {
             experiment: &mut experiment,
             yield_rad: self.yield_rad(),
             view: self.settings.prior.view,
+            encoder_rad: self.settings.prior.encoder_rad,
             strip: self.identified_strip.unwrap_or(CANDIDATE),
         };
         hypothesis.effects.iter().for_each(|effect| effect.set_up(&mut set_up));

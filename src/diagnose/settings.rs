@@ -220,6 +220,8 @@ pub struct PriorSettings {
     pub frequencies: f64,
     /// Standard deviation of the stretch and of the shear of a view, and of a gain: half the square of the angle by which it is askew (judgement: set up by eye, to some 20°).
     pub view: f64,
+    /// Standard deviation of each part of an encoder's error, once and twice a turn (judgement: a disc of 10 mm read 0.1 mm off its axis has 10 mrad, and the data sheets of magnetic sensors allow 1°).
+    pub encoder_rad: f64,
     /// Coefficients of less than this many standard deviations are not told from zero (statistics).
     pub min_significance: f64,
     /// From this variance on, over the noise's, a fall of χ² counts instead of a standard deviation (training bank).
@@ -424,6 +426,7 @@ impl Default for PriorSettings {
             yields: 3.4,
             frequencies: 10.0,
             view: 0.06,
+            encoder_rad: 0.01,
             min_significance: 1.5,
             much_left: 4.0,
             none: 0.25,

@@ -346,7 +346,7 @@ fn in_place(place: Place) -> &'static str {
         Place::Hinge => "at the hinge",
         Place::Joint => "in the joint",
         Place::Air => "along the specimen",
-        Place::Camera => "in what the camera sees",
+        Place::Camera => "in the measured angles",
     }
 }
 

@@ -176,6 +176,7 @@ pub fn contradictions(experiment: &Experiment, file: &Table) -> Result<Vec<Strin
     }
     judge(marks(experiment, stated.is_some()))?;
     judge(gravity(experiment.rig.gravity_m_s2))?;
+    judge(encoder(experiment))?;
     Ok(warnings)
 }
 
@@ -359,6 +360,16 @@ fn gravity(gravity_m_s2: f64) -> Option<Finding> {
     Finding::of(gravity_m_s2, EARTH_M_S2, RIG_M_S2, || {
         let unit = if (900.0..1100.0).contains(&gravity_m_s2) { "; if it is cm/s², write 9.81" } else { "" };
         format!("rig.gravity_m_s2 = {gravity_m_s2}: the ground has 9.78 to 9.83 m/s²{unit}")
+    })
+}
+
+/// The encoders of several joints err each in its own way, which four numbers do not hold.
+fn encoder(experiment: &Experiment) -> Option<Finding> {
+    let links = experiment.specimen.lengths_m().len();
+    (experiment.model.effects.encoder_error.is_some() && links > 1).then(|| {
+        Finding::Impossible(format!(
+            "model.effects.encoder_error: is of specimens of one link, this one has {links}; leave it out"
+        ))
     })
 }
 

@@ -38,6 +38,22 @@ pub struct ObliqueView {
     pub shear: f64,
 }
 
+/// An error of an encoder that comes again once and twice a turn: z + a₁ sin θ + b₁ cos θ + a₂ sin 2θ + b₂ cos 2θ.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct EncoderError {
+    /// z.
+    pub zero_rad: f64,
+    /// a₁.
+    pub sine_rad: f64,
+    /// b₁.
+    pub cosine_rad: f64,
+    /// a₂.
+    pub sine_2_rad: f64,
+    /// b₂.
+    pub cosine_2_rad: f64,
+}
+
 /// The physics beyond springs, dampers and gravity, by identifier. Absent means off.
 #[derive(Debug, Clone, Default, PartialEq, Deserialize)]
 #[serde(default, deny_unknown_fields)]
@@ -76,6 +92,8 @@ pub struct Effects {
     pub angle_gain: Option<f64>,
     /// A camera that looks askew.
     pub camera_oblique: Option<ObliqueView>,
+    /// An encoder off its axis, of a specimen of one link.
+    pub encoder_error: Option<EncoderError>,
     /// θ₂ sampled later than θ₁ (s).
     pub differential_lag: Option<f64>,
     /// Offset of θ₂ over that of θ₁ (rad).
@@ -155,6 +173,8 @@ impl Effects {
             ("distributed_flexibility", self.distributed_flexibility),
             // of a plane that is seen from its edge or from behind nothing is told
             ("camera_oblique: 1 + stretch", self.camera_oblique.map(|view| 1.0 + view.stretch)),
+            // what it reads has to grow with the angle
+            ("encoder_error: 1 - its steepest slope", self.encoder_error.map(|error| 1.0 - error.steepest())),
         ] {
             checked(id, value, positive)?;
         }

@@ -1,7 +1,7 @@
 //! The base model: what a fit leaves free unless told otherwise.
 
 use crate::experiment::Experiment;
-use crate::model::Parameter;
+use crate::model::{EncoderShape, Parameter};
 
 /// The joint's spring (where it has one) and damper, or of one link the hinge's viscous damper; and every effect named in `[model.effects]` or law stated in `[[model.law]]`.
 ///
@@ -43,6 +43,8 @@ pub fn base_parameters(experiment: &Experiment, marks: usize) -> Vec<Parameter> 
         (effects.differential_zero, Parameter::DifferentialZero),
     ];
     let named = named.into_iter().filter_map(|(value, parameter)| value.map(|_| parameter));
+    let of_encoder = effects.encoder_error.iter().flat_map(|_| EncoderShape::ALL.map(Parameter::Encoder));
+    let named = named.chain(of_encoder);
     let stated = experiment.model.law.iter().flat_map(|law| law.coefficients().map(|(parameter, _)| parameter));
     let named = named.chain(stated);
     free.extend(named.filter(|p| !free.contains(p)).collect::<Vec<_>>());

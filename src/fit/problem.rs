@@ -75,6 +75,10 @@ impl<'a> Problem<'a> {
                 let message = "this specimen has one link and no joint; leave it out".to_owned();
                 return Err(Error::Option { option: parameter.id().to_owned(), message });
             }
+            if matches!(parameter, Parameter::Encoder(_)) && records.iter().any(|record| record.links() > 1) {
+                let message = "is of specimens of one link; leave it out".to_owned();
+                return Err(Error::Option { option: parameter.id().to_owned(), message });
+            }
         }
         Ok(Self {
             records,
@@ -394,6 +398,9 @@ pub fn switch_on(experiment: &mut Experiment, parameter: Parameter) {
         Parameter::AngleGain => on(&mut effects.angle_gain),
         Parameter::ViewStretch | Parameter::ViewShear => {
             effects.camera_oblique.get_or_insert_default();
+        }
+        Parameter::Encoder(_) => {
+            effects.encoder_error.get_or_insert_default();
         }
         Parameter::DifferentialLag => on(&mut effects.differential_lag),
         Parameter::DifferentialZero => on(&mut effects.differential_zero),

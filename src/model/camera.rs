@@ -1,17 +1,18 @@
-//! What a camera makes of the angles: its clock, its tilt, its pixels, from where it looks.
+//! What a camera makes of the angles: its clock, its tilt, its pixels, from where it looks. And what an encoder does.
 
 use super::Parameter;
 use super::view::View;
-use crate::experiment::Effects;
+use crate::experiment::{Effects, EncoderError};
 
 /// A camera that is not perfect. The angle seen of link i at stamp t is
 ///
 /// ```text
-/// φᵢ(t) = (1 + angle_gain) v(θᵢ(T(t) + [i > 1] differential_lag)) + camera_tilt + [i > 1] differential_zero
+/// φᵢ(t) = (1 + angle_gain) v(θᵢ(T(t) + [i > 1] differential_lag)) + e(θᵢ) + camera_tilt + [i > 1] differential_zero
 /// T(t)  = t₀ + (1 + time_base)(t − t₀) + [t ≥ t_d] dropped_frames
 /// ```
 ///
-/// v: how a camera sees an angle that looks askew, `camera_oblique` ([`View`]); v(θ) = θ of one that does not.
+/// v: how a camera sees an angle that looks askew, `camera_oblique` ([`View`]); v(θ) = θ of one that does not. e: of the encoder of a specimen of one link, `encoder_error`
+/// ([`EncoderError`]).
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct Camera {
     /// ε of `time_base`.
@@ -26,6 +27,8 @@ pub struct Camera {
     pub gain: f64,
     /// `camera_oblique`.
     pub view: View,
+    /// `encoder_error`.
+    pub encoder: EncoderError,
     /// `differential_lag`.
     pub lag_s: f64,
     /// `differential_zero`.
@@ -44,6 +47,7 @@ impl Camera {
             tilt_rad: effects.camera_tilt.unwrap_or(0.0),
             gain: effects.angle_gain.unwrap_or(0.0),
             view: effects.camera_oblique.map_or(View::default(), |o| View { stretch: o.stretch, shear: o.shear }),
+            encoder: effects.encoder_error.unwrap_or_default(),
             lag_s: effects.differential_lag.unwrap_or(0.0),
             zero_rad: effects.differential_zero.unwrap_or(0.0),
             origin_s,
@@ -70,12 +74,13 @@ impl Camera {
     /// φ of θ of one link.
     pub fn seen_rad(&self, theta_rad: f64, link: usize) -> f64 {
         let zero_rad = if link > 0 { self.zero_rad } else { 0.0 };
-        (1.0 + self.gain) * self.view.angle_rad(theta_rad) + self.tilt_rad + zero_rad
+        let in_place_rad = (1.0 + self.gain) * self.view.angle_rad(theta_rad);
+        in_place_rad + self.encoder.of_rad(theta_rad) + self.tilt_rad + zero_rad
     }
 
     /// ∂φ/∂θ.
     pub fn seen_slope(&self, theta_rad: f64) -> f64 {
-        (1.0 + self.gain) * self.view.slopes(theta_rad).angle
+        (1.0 + self.gain) * self.view.slopes(theta_rad).angle + self.encoder.slope(theta_rad)
     }
 
     /// ∂φ with one of the camera's parameters, at stamp `t_s` of a link with angle θ and rate θ̇; zero with any other parameter.
@@ -86,6 +91,7 @@ impl Camera {
             Parameter::AngleGain => self.view.angle_rad(theta_rad),
             Parameter::ViewStretch => (1.0 + self.gain) * self.view.slopes(theta_rad).stretch,
             Parameter::ViewShear => (1.0 + self.gain) * self.view.slopes(theta_rad).shear,
+            Parameter::Encoder(shape) => shape.at(theta_rad),
             Parameter::TimeBase | Parameter::DroppedFrames | Parameter::DifferentialLag => {
                 self.seen_slope(theta_rad) * omega_rad_s * self.true_time_slope(parameter, t_s, link)
             }
@@ -102,6 +108,7 @@ impl Camera {
             Parameter::AngleGain => Some(self.gain),
             Parameter::ViewStretch => Some(self.view.stretch),
             Parameter::ViewShear => Some(self.view.shear),
+            Parameter::Encoder(shape) => Some(self.encoder.coefficient_rad(shape)),
             Parameter::DifferentialLag => Some(self.lag_s),
             Parameter::DifferentialZero => Some(self.zero_rad),
             _ => None,
@@ -117,6 +124,7 @@ impl Camera {
             Parameter::AngleGain => self.gain = value,
             Parameter::ViewStretch => self.view.stretch = value,
             Parameter::ViewShear => self.view.shear = value,
+            Parameter::Encoder(shape) => *self.encoder.coefficient_mut(shape) = value,
             Parameter::DifferentialLag => self.lag_s = value,
             Parameter::DifferentialZero => self.zero_rad = value,
             _ => {}
@@ -137,6 +145,13 @@ mod tests {
             tilt_rad: 0.02,
             gain: -0.03,
             view: View { stretch: 0.05, shear: -0.08 },
+            encoder: EncoderError {
+                zero_rad: 0.003,
+                sine_rad: 0.01,
+                cosine_rad: -0.02,
+                sine_2_rad: 0.03,
+                cosine_2_rad: 0.005,
+            },
             lag_s: 0.004,
             zero_rad: 0.03,
             origin_s: 0.2,
@@ -160,6 +175,6 @@ mod tests {
             assert!((slope - difference).abs() < 1e-7, "{parameter}: {slope} {difference}");
             count += 1;
         }
-        assert_eq!(count, 8);
+        assert_eq!(count, 13);
     }
 }

@@ -18,8 +18,9 @@
 //! | [`work`] | what integrations have cost |
 //! | [`observe`] | the angles between marks |
 //! | `rest` | the chain at rest |
-//! | [`camera`] | what a camera makes of them |
+//! | [`camera`] | what a camera, or another sensor, makes of them |
 //! | [`view`] | of these, a camera that looks askew |
+//! | `encoder` | an encoder off its axis |
 //! | [`modes`] | small vibrations: frequencies, damping ratios, shapes |
 //! | [`strip`] | the strip as a beam in gravity, by finite elements |
 //! | [`light`] | the pressure of light |
@@ -31,6 +32,7 @@ pub mod chain;
 pub mod collocation;
 pub mod effects;
 mod elimination;
+mod encoder;
 pub mod expression;
 pub mod forward;
 pub mod integrate;
@@ -54,6 +56,7 @@ pub mod work;
 pub use camera::Camera;
 pub use chain::Chain;
 pub use effects::Effect;
+pub use encoder::EncoderShape;
 pub use expression::Expression;
 pub use forward::ForwardModel;
 pub use integrate::Accuracy;

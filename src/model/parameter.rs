@@ -5,6 +5,8 @@ use std::fmt;
 use std::hash::{Hash, Hasher};
 use std::sync::{Mutex, PoisonError};
 
+use super::EncoderShape;
+
 /// A coefficient of a law that a file states by a formula.
 #[derive(Debug, Clone, Copy, Eq, PartialOrd, Ord)]
 pub struct LawCoefficient {
@@ -106,6 +108,8 @@ pub enum Parameter {
     ViewStretch,
     /// b of a view askew.
     ViewShear,
+    /// Of the error of an encoder.
+    Encoder(EncoderShape),
     /// θ₂ is sampled later than θ₁.
     DifferentialLag,
     /// Offset of θ₂ over that of θ₁.
@@ -144,6 +148,11 @@ impl Parameter {
             Self::AngleGain => "angle_gain",
             Self::ViewStretch => "camera_oblique.stretch",
             Self::ViewShear => "camera_oblique.shear",
+            Self::Encoder(EncoderShape::Zero) => "encoder_error.zero_rad",
+            Self::Encoder(EncoderShape::Sine) => "encoder_error.sine_rad",
+            Self::Encoder(EncoderShape::Cosine) => "encoder_error.cosine_rad",
+            Self::Encoder(EncoderShape::Sine2) => "encoder_error.sine_2_rad",
+            Self::Encoder(EncoderShape::Cosine2) => "encoder_error.cosine_2_rad",
             Self::DifferentialLag => "differential_lag",
             Self::DifferentialZero => "differential_zero",
             Self::Law(coefficient) => coefficient.id,
@@ -155,7 +164,9 @@ impl Parameter {
         match self {
             Self::JointStiffness | Self::HingeStiffness => "N m/rad",
             Self::JointDamping | Self::HingeViscous => "N m s/rad",
-            Self::RestCurl | Self::HysteresisYield | Self::CameraTilt | Self::DifferentialZero => "rad",
+            Self::RestCurl | Self::HysteresisYield | Self::CameraTilt | Self::DifferentialZero | Self::Encoder(_) => {
+                "rad"
+            }
             Self::BendingStiffness => "N m2",
             Self::JointCubicStiffness => "N m/rad3",
             Self::HysteresisTorque | Self::HingeCoulomb => "N m",
@@ -211,6 +222,7 @@ impl Parameter {
             | Self::AngleGain
             | Self::ViewStretch
             | Self::ViewShear
+            | Self::Encoder(_)
             | Self::DifferentialLag
             | Self::DifferentialZero
             | Self::Law(_) => false,
@@ -243,7 +255,7 @@ impl Parameter {
     }
 
     /// Every parameter but those of links and of stated laws.
-    pub const ALL: [Self; 25] = [
+    pub const ALL: [Self; 30] = [
         Self::JointStiffness,
         Self::JointDamping,
         Self::RestCurl,
@@ -267,6 +279,11 @@ impl Parameter {
         Self::AngleGain,
         Self::ViewStretch,
         Self::ViewShear,
+        Self::Encoder(EncoderShape::Zero),
+        Self::Encoder(EncoderShape::Sine),
+        Self::Encoder(EncoderShape::Cosine),
+        Self::Encoder(EncoderShape::Sine2),
+        Self::Encoder(EncoderShape::Cosine2),
         Self::DifferentialLag,
         Self::DifferentialZero,
     ];

@@ -53,7 +53,7 @@ pub(super) fn page(diagnosis: &Diagnosis) -> String {
             let [name, probability, left] = std::mem::take(&mut first);
             let value = number(quantity.value.unwrap_or(0.0), 4);
             // of an effect with several coefficients each is told by its own name
-            let own = parameter.id().split_once('.').and_then(|(_, own)| own.split('_').next().map(str::to_owned));
+            let own = parameter.id().split_once('.').map(|(_, own)| without_unit(own).replace('_', " "));
             let which = own.map_or(String::new(), |own| format!(" ({own})"));
             table.row([name, probability, left, value, number(quantity.sd, 2), quantity.unit.to_owned() + &which]);
         }
@@ -79,6 +79,11 @@ pub(super) fn page(diagnosis: &Diagnosis) -> String {
 /// A probability, as far as anybody reads it.
 fn of_one(probability: f64) -> String {
     if probability < LEAST { format!("<{LEAST}") } else { number(probability, 3) }
+}
+
+/// A key without the unit at its end.
+fn without_unit(key: &str) -> &str {
+    ["_n_m", "_rad", "_hz", "_m"].iter().find_map(|unit| key.strip_suffix(unit)).unwrap_or(key)
 }
 
 /// What was not fitted.

@@ -11,7 +11,7 @@ mod table;
 
 use std::fmt;
 
-use crate::experiment::{Experiment, Sensor};
+use crate::experiment::Experiment;
 use crate::model::Parameter;
 use table::TABLE;
 
@@ -31,6 +31,8 @@ pub enum Effect {
     AngleGain,
     /// A camera that looks at the plane of the swing askew.
     CameraOblique,
+    /// An encoder off its axis, or askew on it.
+    EncoderError,
     /// θ₂ is sampled later than θ₁.
     DifferentialLag,
     /// An offset of θ₂ that θ₁ does not have.
@@ -63,12 +65,13 @@ pub enum Effect {
 
 impl Effect {
     /// Every effect, in the order of the table.
-    pub const ALL: [Self; 19] = [
+    pub const ALL: [Self; 20] = [
         Self::TimeBase,
         Self::DroppedFrames,
         Self::CameraTilt,
         Self::AngleGain,
         Self::CameraOblique,
+        Self::EncoderError,
         Self::DifferentialLag,
         Self::DifferentialZero,
         Self::HingeViscous,
@@ -147,11 +150,12 @@ impl Effect {
         let strip = experiment.specimen.links.is_empty();
         let meaningful = match self.entry().needs {
             Requires::Nothing => true,
+            Requires::OneAngle => marks == 1,
             Requires::Joint => marks > 1,
             Requires::Spring => base.iter().any(|parameter| parameter.is_spring()),
             Requires::Strip => marks > 1 && strip && base.contains(&Parameter::JointStiffness),
         };
-        let meaningful = meaningful && !(self.entry().of_camera && experiment.rig.sensor == Sensor::Encoder);
+        let meaningful = meaningful && self.entry().sensor.is_none_or(|sensor| experiment.rig.sensor == sensor);
         // a camera that misses frames, and the first coefficient of a named effect
         meaningful && !self.parameters().iter().any(|p| base.contains(p)) && !self.is_set(experiment)
     }
@@ -192,6 +196,7 @@ mod tests {
             "camera_tilt",
             "angle_gain",
             "camera_oblique",
+            "encoder_error",
             "differential_lag",
             "differential_zero",
             "hinge_viscous",

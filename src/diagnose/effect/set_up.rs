@@ -2,7 +2,7 @@
 
 use crate::experiment::{Experiment, Hysteresis};
 use crate::fit::Belief;
-use crate::model::Parameter;
+use crate::model::{EncoderShape, Parameter};
 
 /// A problem that is being set up, and what of the recordings that may depend on.
 pub struct SetUp<'s> {
@@ -16,6 +16,8 @@ pub struct SetUp<'s> {
     pub yield_rad: (f64, f64),
     /// Standard deviation of the stretch and of the shear of a view to expect.
     pub view: f64,
+    /// Standard deviation of each part of an encoder's error to expect.
+    pub encoder_rad: f64,
     /// The strip that bends everywhere.
     pub strip: BendingStrip,
 }
@@ -56,5 +58,11 @@ impl SetUp<'_> {
     pub(super) fn add_oblique_view(&mut self) {
         let of = |parameter| Belief { parameter, value: 0.0, sd: self.view };
         self.beliefs.extend([Parameter::ViewStretch, Parameter::ViewShear].map(of));
+    }
+
+    /// An encoder errs by no more than those who build one allow.
+    pub(super) fn add_encoder_error(&mut self) {
+        let of = |shape| Belief { parameter: Parameter::Encoder(shape), value: 0.0, sd: self.encoder_rad };
+        self.beliefs.extend(EncoderShape::ALL.map(of));
     }
 }

@@ -1,7 +1,8 @@
 //! The rows of the table: what is particular to each effect and needs no fit.
 
 use super::set_up::SetUp;
-use crate::model::Parameter;
+use crate::experiment::Sensor;
+use crate::model::{EncoderShape, Parameter};
 
 /// Where an effect acts.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, serde::Serialize)]
@@ -93,6 +94,8 @@ pub enum Acts {
 pub enum Requires {
     /// Nothing.
     Nothing,
+    /// No angle but one.
+    OneAngle,
     /// A joint.
     Joint,
     /// A joint with a spring.
@@ -118,8 +121,8 @@ pub struct Entry {
     pub acts: Acts,
     /// Whether it means anything.
     pub needs: Requires,
-    /// Whether it is excluded where the sensor is an encoder.
-    pub of_camera: bool,
+    /// The sensor that alone can have it; `None` where any can.
+    pub sensor: Option<Sensor>,
     /// The part of its own torque by which its law may be wrong before something else is suspected beside it. That of friction and of hysteresis is larger: how they go
     /// with speed, and over from sticking to slip, has as many forms as there are authors.
     pub law_error: f64,
@@ -136,7 +139,7 @@ pub struct Entry {
 impl Entry {
     /// Whether it changes a frequency, or the scale of the angles at which that is seen.
     pub fn is_of_frequency(&self) -> bool {
-        self.acts == Acts::Pace || self.of_camera && self.phase == Some(Phase::Position)
+        self.acts == Acts::Pace || self.sensor.is_some() && self.phase == Some(Phase::Position)
     }
 }
 
@@ -160,7 +163,7 @@ const fn entry(parameters: &'static [Parameter], place: Place, acts: Acts, words
         cost,
         acts,
         needs,
-        of_camera: false,
+        sensor: None,
         law_error,
         shapes: &[],
         can_stop: false,
@@ -174,7 +177,7 @@ const fn position(entry: Entry) -> Entry {
 }
 
 const fn of_camera(entry: Entry) -> Entry {
-    Entry { of_camera: true, ..entry }
+    Entry { sensor: Some(Sensor::Camera), ..entry }
 }
 
 const fn velocity(entry: Entry) -> Entry {
@@ -182,7 +185,7 @@ const fn velocity(entry: Entry) -> Entry {
 }
 
 /// The table, those of the camera first: an error of measurement is not to be blamed on physics.
-pub(super) static TABLE: [Entry; 19] = {
+pub(super) static TABLE: [Entry; 20] = {
     use Acts::{Loss, Motion, Otherwise, Pace};
     use Parameter as P;
     use Place::{Air, Camera, Hinge, Joint};
@@ -198,6 +201,24 @@ pub(super) static TABLE: [Entry; 19] = {
             id: "camera_oblique",
             set_up: |problem| problem.add_oblique_view(),
             ..of_camera(position(entry(&[P::ViewStretch, P::ViewShear], Camera, Otherwise, "an oblique camera view")))
+        },
+        Entry {
+            id: "encoder_error",
+            needs: Requires::OneAngle,
+            sensor: Some(Sensor::Encoder),
+            set_up: |problem| problem.add_encoder_error(),
+            ..position(entry(
+                &[
+                    P::Encoder(EncoderShape::Sine),
+                    P::Encoder(EncoderShape::Cosine),
+                    P::Encoder(EncoderShape::Sine2),
+                    P::Encoder(EncoderShape::Cosine2),
+                    P::Encoder(EncoderShape::Zero),
+                ],
+                Camera,
+                Otherwise,
+                "an encoder off its axis or askew on it",
+            ))
         },
         Entry {
             needs: Requires::Joint,

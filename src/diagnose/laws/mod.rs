@@ -7,9 +7,11 @@
 //! | [`moving_support`] | at which frequency a support moves |
 //! | [`hysteresis`] | where its fit starts |
 //! | `oblique_view` | a camera that looks askew, with its stretch and its shear; a sensor's scale |
+//! | `encoder` | an encoder off its axis, with its error once and twice a turn |
 //! | [`bending`] | a strip that bends everywhere, as finely as it needs |
 
 pub mod bending;
+mod encoder;
 pub mod hysteresis;
 pub mod missing_frames;
 pub mod moving_support;
@@ -96,6 +98,7 @@ pub fn law_of(effect: Effect) -> &'static dyn Law {
         Effect::DroppedFrames => &missing_frames::MissingFrames,
         Effect::SupportMotion => &moving_support::MovingSupport,
         Effect::CameraOblique => &oblique_view::ObliqueView,
+        Effect::EncoderError => &encoder::EncoderError,
         Effect::AngleGain => &oblique_view::WrongScale,
         Effect::JointHysteretic => &hysteresis::Hysteresis,
         Effect::DistributedFlexibility => &bending::Bending,
