@@ -45,6 +45,8 @@ pub(super) struct Target {
     pub level: u32,
     /// Only round spots count.
     pub round: bool,
+    /// Marks are black and white targets.
+    pub quadrants: bool,
     /// Least and greatest number of samples.
     pub samples: [usize; 2],
     /// How its levels differ around its edge.
@@ -85,7 +87,7 @@ pub(super) fn find(
         let binary_px = silhouette.centre_px;
         let centroid = match conditions.channels {
             Channels::Chroma => None,
-            _ if part.is_target() => centroid::of_target(picture, &silhouette),
+            _ if target.quadrants || part.is_target() => centroid::of_target(picture, &silhouette),
             _ => None,
         };
         let measure = || centroid::measure(picture, target.axis, &silhouette, conditions);

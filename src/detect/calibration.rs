@@ -33,6 +33,8 @@ const HALF_CONTRAST: f64 = 40.0;
 pub const COUNTS: [usize; 3] = [1, 2, 3];
 /// Where between a threshold and the tops of the marks higher ones are tried.
 const HIGHER: [f64; 3] = [0.25, 0.5, 0.75];
+/// Where between the least contrast and a threshold lower ones are tried for black and white targets.
+const LOWER: [f64; 2] = [0.5, 0.25];
 /// What a spot that stands still counts where others move.
 const STILL_COUNTS: f64 = 0.3;
 
@@ -309,6 +311,16 @@ impl Scale {
             threshold.map(|t| (fixed.unwrap_or(t), thin))
         });
         let (threshold, thin) = chosen?;
+        let trial = self.at_threshold(threshold, thin, marks);
+        // where black meets white, half of the step lies nearer the background than where it meets the background: above a high threshold the dark quadrants are too small to touch
+        let is_too_high = fixed.is_none() && self.luma && trial.shows_targets();
+        let lower = LOWER.iter().filter(|_| is_too_high).map(|part| self.floor + part * (threshold - self.floor));
+        let lower = lower.map(|threshold| self.at_threshold(threshold, thin, marks));
+        Some(lower.fold(trial, |best, lower| if lower.quality > best.quality { lower } else { best }))
+    }
+
+    /// What is above a threshold.
+    fn at_threshold(&self, threshold: f64, thin: bool, marks: usize) -> Trial {
         let of_picture = |(n, plane): (usize, &Plane)| {
             let mask = Mask::of_plane(plane, from_255(threshold), thin).bridged(self.luma);
             spots_of(plane, &mask, self.least, self.moved.get(n).map(Vec::as_slice))
@@ -320,7 +332,7 @@ impl Scale {
         // a spot of few samples is round by chance, and beside its surroundings by little
         let wide = trial.usual_samples().map_or(0.0, |n| (n * 4.0 / std::f64::consts::PI).sqrt());
         trial.quality *= (wide / WIDE_ENOUGH).min(1.0);
-        Some(trial)
+        trial
     }
 }
 
@@ -365,6 +377,12 @@ impl Trial {
     pub fn likely(&self) -> impl Iterator<Item = &Spot> {
         let moves = self.spots.iter().flatten().any(|s| s.moves);
         self.spots.iter().flatten().filter(move |s| s.roundness >= LEAST_ROUNDNESS && (s.moves || !moves))
+    }
+
+    /// Most of its likely spots are black and white targets.
+    pub fn shows_targets(&self) -> bool {
+        let likely: Vec<bool> = self.likely().map(|spot| spot.part.is_target()).collect();
+        2 * likely.iter().filter(|is_target| **is_target).count() > likely.len()
     }
 
     /// Most pictures show more than the marks.

@@ -55,6 +55,8 @@ pub struct Hue {
     pub area_px2: Option<f64>,
     /// Only round spots count, and of that area: what the marks stand on may have their hue.
     pub round: bool,
+    /// Marks are black and white targets.
+    pub quadrants: bool,
     /// How a mark's levels differ around its edge, where it is lit from one side.
     pub shading: Shading,
 }
@@ -70,6 +72,7 @@ impl Default for Hue {
             level: 0,
             area_px2: None,
             round: false,
+            quadrants: false,
             shading: Shading::default(),
         }
     }
@@ -84,6 +87,7 @@ impl Hue {
     pub fn adopt(&mut self, trial: &Trial, sample_px2: f64) {
         (self.threshold, self.thin, self.level) = (trial.threshold, trial.thin, trial.level);
         self.angle_rad = trial.angle_rad;
+        self.quadrants = trial.shows_targets();
         self.area_px2 = trial.usual_samples().map(|n| n * sample_px2 * f64::from(1u32 << (2 * trial.level)));
     }
 
@@ -215,6 +219,7 @@ impl Detector {
             thin: hue.thin,
             level: hue.level,
             round,
+            quadrants: hue.quadrants,
             samples: [samples(least).max(3), hue.area_px2.map_or(usize::MAX, |a| samples(larger * a))],
             shading: hue.shading,
         }
