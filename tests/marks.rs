@@ -147,6 +147,29 @@ fn what_init_writes_is_enough_to_track_and_says_what_is_still_to_be_measured() {
     assert!(refused(&bench.freeswing(&["init", "swing.mp4"])).contains("exists already"));
 }
 
+/// A telephone that was held upright writes a picture that lies on its side, where its file does not say so.
+#[test]
+fn a_recording_that_is_turned_is_told() {
+    let bench = Bench::of(&scene());
+    let words = done(&bench.freeswing(&["init", "swing.mp4"]));
+    assert!(!words.contains("downward direction"), "{words}");
+    bench.refilmed("transpose=2", "12");
+    let words = done(&bench.freeswing(&["init", "swing.mp4", "--force"]));
+    assert!(words.contains("from the picture's downward direction") && words.contains("transpose=1"), "{words}");
+    let degrees = words.split_once("lies ").and_then(|(_, rest)| rest.split_once('°')).unwrap().0;
+    assert!((80.0..100.0).contains(&degrees.parse::<f64>().unwrap()), "{words}");
+}
+
+/// The colour of the command line is that of the marks that the file counts.
+#[test]
+fn a_colour_of_the_command_line_leaves_the_number_of_marks_to_the_file() {
+    let bench = Bench::of(&scene());
+    std::fs::write(bench.path("one.toml"), "[rig]\nmarks = [\"blue\"]\npivot_px = [160, 20]\n").unwrap();
+    let words = said(&bench.track(&["--config", "one.toml", "--color", "red"]));
+    assert!(!words.contains("where 2 are needed"), "{words}");
+    assert!(column(&bench.table(), "theta1_rad").len() > 10 && !bench.table().contains("theta2_rad"), "{words}");
+}
+
 /// The file states pixels that are a third wider than high: the circle is one in square pixels, and its centre in those of the file.
 #[test]
 fn pixels_that_are_not_square_have_the_same_pivot() {

@@ -10,6 +10,11 @@ use crate::look::{Finding, look, preview, to_toml};
 use crate::measure::Options;
 use crate::output::OutputFile;
 
+/// A specimen that hangs farther than this from the picture's downward direction hangs along another side of it (geometry: half of a quarter turn).
+const SIDEWAYS_RAD: f64 = 0.25 * std::f64::consts::PI;
+/// And farther than this, along the opposite one.
+const UPSIDE_DOWN_RAD: f64 = 0.75 * std::f64::consts::PI;
+
 /// Look at a recording and write a starting experiment file.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "\
@@ -108,6 +113,17 @@ impl InitArgs {
             console.remark(format!("held still until t = {held_s:.2} s, as by a hand: left out (from_s in {out})"));
         }
         console.remark(hinge_in_words(finding));
+        if let Some(turned_rad) = finding.hangs_at_rad().filter(|angle_rad| angle_rad.abs() > SIDEWAYS_RAD) {
+            let filter = match turned_rad {
+                angle_rad if angle_rad.abs() > UPSIDE_DOWN_RAD => "hflip,vflip",
+                angle_rad if angle_rad > 0.0 => "transpose=1",
+                _ => "transpose=2",
+            };
+            console.warning(format!(
+                "{video}: the specimen lies {:.0}° from the picture's downward direction. If the recording is turned, turn it back (`ffmpeg -i {video} -vf {filter} turned.mp4`), or name two points of a plumb line, upper first, as plumb_px in {out}: angles are measured from the vertical",
+                turned_rad.abs().to_degrees()
+            ));
+        }
         if let Some(other) = finding.apart.first() {
             let [[x, y], [ox, oy]] = [finding.marks[0].thing.place_px(), other.place_px()];
             console.warning(format!(

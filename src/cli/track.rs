@@ -265,7 +265,10 @@ impl TrackArgs {
         let usual = if pivot { 2 } else { 3 };
         let (colour, count) = match given {
             [] => (Some(MarkColour::red()), self.markers.unwrap_or(usual)),
-            [one] if self.color.len() == 1 => (Some(one.clone()), self.markers.unwrap_or(configured.len().max(usual))),
+            [one] if self.color.len() == 1 => {
+                let of_file = if configured.is_empty() { usual } else { configured.len() };
+                (Some(one.clone()), self.markers.unwrap_or(of_file))
+            }
             // of marks that are all alike there may be more or fewer than the file says
             [one, others @ ..] if self.color.is_empty() && others.iter().all(|other| other == one) => {
                 (Some(one.clone()), self.markers.unwrap_or(given.len()))

@@ -17,6 +17,16 @@ impl Finding {
         !self.hinge_marked && self.shows_pivot() && self.keeps_distance()
     }
 
+    /// The angle at which the first link hangs in the middle of its swing, from the picture's downward direction, positive to the right (rad); `None` where nothing shows its upper end.
+    pub fn hangs_at_rad(&self) -> Option<f64> {
+        let (first, rest) = self.marks.split_first()?;
+        let (upper, lower) = match (self.hinge_marked, self.arc.filter(|_| self.states_pivot())) {
+            (true, _) => (first.thing.place_px(), rest.first()?.thing.place_px()),
+            (false, arc) => (arc?.centre_px, first.thing.place_px()),
+        };
+        Some((self.stream.pixel_aspect * (lower[0] - upper[0])).atan2(lower[1] - upper[1]))
+    }
+
     /// Enough of a circle is swung to show its centre.
     fn shows_pivot(&self) -> bool {
         self.arc.is_some_and(|arc| arc.sd_px[0].max(arc.sd_px[1]) < MOST_PIVOT_SD * arc.radius_px)
