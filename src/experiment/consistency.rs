@@ -363,7 +363,7 @@ fn gravity(gravity_m_s2: f64) -> Option<Finding> {
     })
 }
 
-/// The encoders of several joints err each in its own way, which four numbers do not hold.
+/// The encoders of several joints err each in its own way.
 fn encoder(experiment: &Experiment) -> Option<Finding> {
     let links = experiment.specimen.lengths_m().len();
     (experiment.model.effects.encoder_error.is_some() && links > 1).then(|| {

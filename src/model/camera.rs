@@ -28,7 +28,7 @@ pub struct Camera {
     /// `camera_oblique`.
     pub view: View,
     /// `encoder_error`.
-    pub encoder: EncoderError,
+    pub encoder: Option<EncoderError>,
     /// `differential_lag`.
     pub lag_s: f64,
     /// `differential_zero`.
@@ -47,7 +47,7 @@ impl Camera {
             tilt_rad: effects.camera_tilt.unwrap_or(0.0),
             gain: effects.angle_gain.unwrap_or(0.0),
             view: effects.camera_oblique.map_or(View::default(), |o| View { stretch: o.stretch, shear: o.shear }),
-            encoder: effects.encoder_error.unwrap_or_default(),
+            encoder: effects.encoder_error,
             lag_s: effects.differential_lag.unwrap_or(0.0),
             zero_rad: effects.differential_zero.unwrap_or(0.0),
             origin_s,
@@ -75,12 +75,14 @@ impl Camera {
     pub fn seen_rad(&self, theta_rad: f64, link: usize) -> f64 {
         let zero_rad = if link > 0 { self.zero_rad } else { 0.0 };
         let in_place_rad = (1.0 + self.gain) * self.view.angle_rad(theta_rad);
-        in_place_rad + self.encoder.of_rad(theta_rad) + self.tilt_rad + zero_rad
+        let of_encoder_rad = self.encoder.map_or(0.0, |error| error.of_rad(theta_rad));
+        in_place_rad + of_encoder_rad + self.tilt_rad + zero_rad
     }
 
     /// ∂φ/∂θ.
     pub fn seen_slope(&self, theta_rad: f64) -> f64 {
-        (1.0 + self.gain) * self.view.slopes(theta_rad).angle + self.encoder.slope(theta_rad)
+        let of_encoder = self.encoder.map_or(0.0, |error| error.slope(theta_rad));
+        (1.0 + self.gain) * self.view.slopes(theta_rad).angle + of_encoder
     }
 
     /// ∂φ with one of the camera's parameters, at stamp `t_s` of a link with angle θ and rate θ̇; zero with any other parameter.
@@ -108,7 +110,7 @@ impl Camera {
             Parameter::AngleGain => Some(self.gain),
             Parameter::ViewStretch => Some(self.view.stretch),
             Parameter::ViewShear => Some(self.view.shear),
-            Parameter::Encoder(shape) => Some(self.encoder.coefficient_rad(shape)),
+            Parameter::Encoder(shape) => Some(self.encoder.map_or(0.0, |error| error.coefficient_rad(shape))),
             Parameter::DifferentialLag => Some(self.lag_s),
             Parameter::DifferentialZero => Some(self.zero_rad),
             _ => None,
@@ -124,7 +126,7 @@ impl Camera {
             Parameter::AngleGain => self.gain = value,
             Parameter::ViewStretch => self.view.stretch = value,
             Parameter::ViewShear => self.view.shear = value,
-            Parameter::Encoder(shape) => *self.encoder.coefficient_mut(shape) = value,
+            Parameter::Encoder(shape) => *self.encoder.get_or_insert_default().coefficient_mut(shape) = value,
             Parameter::DifferentialLag => self.lag_s = value,
             Parameter::DifferentialZero => self.zero_rad = value,
             _ => {}
@@ -145,13 +147,13 @@ mod tests {
             tilt_rad: 0.02,
             gain: -0.03,
             view: View { stretch: 0.05, shear: -0.08 },
-            encoder: EncoderError {
+            encoder: Some(EncoderError {
                 zero_rad: 0.003,
                 sine_rad: 0.01,
                 cosine_rad: -0.02,
                 sine_2_rad: 0.03,
                 cosine_2_rad: 0.005,
-            },
+            }),
             lag_s: 0.004,
             zero_rad: 0.03,
             origin_s: 0.2,

@@ -8,11 +8,8 @@ use super::super::misfit::chi2_noise_limit;
 use super::super::refit::Refit;
 use super::super::settings::{PriorSettings, Settings};
 use super::ordinary::Ordinary;
-use super::{Coefficients, FitRequest, Law};
+use super::{Coefficients, FARTHEST, FitRequest, Law};
 use crate::model::{EncoderShape, Parameter};
-
-/// Standard deviations of what an encoder errs beyond which it is none of its errors (statistics).
-const FARTHEST: f64 = 3.0;
 
 /// The error of an encoder.
 pub struct EncoderError;

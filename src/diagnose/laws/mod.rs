@@ -44,6 +44,9 @@ pub struct FitRequest<'q, 'a> {
     pub misfit: Misfit,
 }
 
+/// Standard deviations of what a sensor or a set-up errs beyond which it is none of its errors (statistics): a torque that changes the frequency with the amplitude looks like one.
+const FARTHEST: f64 = 3.0;
+
 /// Value and standard deviation of each coefficient of a fit.
 pub type Coefficients<'c> = dyn Fn(Parameter) -> (f64, f64) + 'c;
 

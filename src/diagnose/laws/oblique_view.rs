@@ -7,11 +7,8 @@ use super::super::effect::Effect;
 use super::super::refit::Refit;
 use super::super::settings::PriorSettings;
 use super::ordinary::Ordinary;
-use super::{Coefficients, FitRequest, Law};
+use super::{Coefficients, FARTHEST, FitRequest, Law};
 use crate::model::Parameter;
-
-/// Standard deviations of what a set-up errs beyond which it is none of its errors (statistics): a torque that changes the frequency with the amplitude looks like one.
-const FARTHEST: f64 = 3.0;
 
 /// A camera that looks askew.
 pub struct ObliqueView;
