@@ -196,18 +196,32 @@ fn variants() -> Vec<String> {
     String::from_utf8(output.stdout).unwrap().split_whitespace().map(str::to_owned).collect()
 }
 
+/// What a film of this bank shows.
+fn found(folder: &Path, name: &str) -> Finding {
+    look(&folder.join(format!("{name}.mp4")), &Options::default(), Path::new(""), &Silent).unwrap()
+}
+
+/// From the hinge down.
+fn colours(found: &Finding) -> Vec<String> {
+    found.marks.iter().map(|mark| mark.colour.clone()).collect()
+}
+
+#[test]
+fn a_small_target_is_found_also_where_its_dark_quadrants_hardly_touch() {
+    let folder = tempfile::tempdir().unwrap();
+    films(folder.path(), 4.0, &["small_quadrants"]);
+    let target = found(folder.path(), "small_quadrants");
+    assert_eq!(colours(&target), ["dark"]);
+    assert!(target.marks[0].thing.presence > 0.97, "{}", target.marks[0].thing.presence);
+}
+
 #[test]
 fn dark_marks_before_a_dark_wall_are_found_and_a_dark_clamp_behind_a_strip_is_none() {
     let folder = tempfile::tempdir().unwrap();
     films(folder.path(), 4.0, &["dark_dots_dark", "dark_bracket"]);
-    let found = |name: &str| {
-        let film = folder.path().join(format!("{name}.mp4"));
-        look(&film, &Options::default(), Path::new(""), &Silent).unwrap()
-    };
-    let colours = |found: &Finding| found.marks.iter().map(|mark| mark.colour.clone()).collect::<Vec<_>>();
-    let dots = found("dark_dots_dark");
+    let dots = found(folder.path(), "dark_dots_dark");
     assert_eq!(colours(&dots), ["dark"; 3]);
     assert!(dots.hinge_marked);
-    let blue = colours(&found("dark_bracket"));
+    let blue = colours(&found(folder.path(), "dark_bracket"));
     assert!(blue.len() == 2 && blue.iter().all(|colour| colour.starts_with('#')), "{blue:?}");
 }
