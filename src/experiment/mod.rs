@@ -404,6 +404,19 @@ hinge_coulomb = 1.0e-7
     }
 
     #[test]
+    fn an_error_of_an_encoder_is_of_one_link_and_lets_its_reading_grow_with_the_angle() {
+        let of = |lengths: &str, error: &str| {
+            let text = format!("[specimen]\nlink_lengths_m = {lengths}\n[model.effects]\nencoder_error = {error}\n");
+            Experiment::parse(&text, Path::new("e.toml")).map_err(|e| e.to_string())
+        };
+        assert_eq!(of("[0.1]", "{ sine_rad = 0.01 }").unwrap().model.effects.encoder_error.unwrap().sine_rad, 0.01);
+        assert!(
+            of("[0.1, 0.1]", "{ sine_rad = 0.01 }").unwrap_err().contains("of specimens of one link, this one has 2")
+        );
+        assert!(of("[0.1]", "{ sine_2_rad = 0.6 }").unwrap_err().contains("encoder_error: 1 - its steepest slope"));
+    }
+
+    #[test]
     fn a_mass_of_zero_is_refused() {
         let error = Experiment::parse("[specimen]\nmass_kg = 0.0\n", Path::new("e.toml")).unwrap_err();
         assert_eq!(error.to_string(), "e.toml: specimen.mass_kg = 0: must be a positive number");
