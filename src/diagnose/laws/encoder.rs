@@ -7,18 +7,13 @@ use super::super::effect::Effect;
 use super::super::misfit::chi2_noise_limit;
 use super::super::refit::Refit;
 use super::super::settings::{PriorSettings, Settings};
-use super::ordinary::Ordinary;
-use super::{Coefficients, FARTHEST, FitRequest, Law};
+use super::{Coefficients, FARTHEST, Law};
 use crate::model::{EncoderShape, Parameter};
 
 /// The error of an encoder.
 pub struct EncoderError;
 
 impl Law for EncoderError {
-    fn beside<'a>(&self, sought: &FitRequest<'_, 'a>) -> Option<Refit<'a>> {
-        Ordinary.beside(sought)
-    }
-
     /// ρ, as many standard deviations from zero as the clearest of them but the zero.
     fn strength(&self, _effect: Effect, of: &Coefficients<'_>) -> Option<(f64, f64)> {
         let parts = EncoderShape::ALL.map(|shape| of(Parameter::Encoder(shape)));

@@ -50,10 +50,12 @@ const FARTHEST: f64 = 3.0;
 /// Value and standard deviation of each coefficient of a fit.
 pub type Coefficients<'c> = dyn Fn(Parameter) -> (f64, f64) + 'c;
 
-/// What is particular to a law.
+/// What is particular to a law; what it does not say is as of any law in proportion to its coefficient.
 pub trait Law: Sync {
     /// The best fit of it beside another one, from every start that may lead to its minimum.
-    fn beside<'a>(&self, sought: &FitRequest<'_, 'a>) -> Option<Refit<'a>>;
+    fn beside<'a>(&self, sought: &FitRequest<'_, 'a>) -> Option<Refit<'a>> {
+        ordinary::beside(sought)
+    }
 
     /// The best fit of it beside another one from wherever it may be, where all else has failed: of a law with more false minima than its starts come by.
     fn fit_from_many_starts<'a>(&self, _context: &FitContext<'a>, _base: &Refit<'a>) -> Option<Refit<'a>> {
@@ -87,7 +89,16 @@ pub trait Law: Sync {
     }
 
     /// ln of how many kinds of it there are beyond its strength: signs, phases, frequencies, instants.
-    fn ln_multiplicity(&self, fit: &Refit<'_>, effect: Effect, of: &Coefficients<'_>, settings: &PriorSettings) -> f64;
+    fn ln_multiplicity(
+        &self,
+        _fit: &Refit<'_>,
+        effect: Effect,
+        _of: &Coefficients<'_>,
+        _settings: &PriorSettings,
+    ) -> f64 {
+        // either sign, where it may have either
+        if effect.parameters()[0].is_not_negative() { 0.0 } else { std::f64::consts::LN_2 }
+    }
 
     /// The odds that it is what it seems to be, in a fit among others, and stands for nothing else.
     fn odds(&self, _fit: &Refit<'_>, _others: &[&Refit<'_>], _settings: &Settings) -> f64 {

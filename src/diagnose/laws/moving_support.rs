@@ -12,8 +12,7 @@ use super::super::noise;
 use super::super::refit::Refit;
 use super::super::screen::{Score, Screen};
 use super::super::settings::{PriorSettings, Settings};
-use super::ordinary::Ordinary;
-use super::{Coefficients, FitRequest, Law};
+use super::{Coefficients, Law};
 use crate::model::Parameter;
 use crate::model::observe::chord_angles_rad;
 
@@ -39,10 +38,6 @@ const POWER_IN_STEP: f64 = 1e-5;
 pub struct MovingSupport;
 
 impl Law for MovingSupport {
-    fn beside<'a>(&self, sought: &FitRequest<'_, 'a>) -> Option<Refit<'a>> {
-        Ordinary.beside(sought)
-    }
-
     fn scan(&self, screen: &Screen<'_, '_>) -> Option<Score> {
         scanned(screen)
     }

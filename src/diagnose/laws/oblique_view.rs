@@ -6,8 +6,7 @@
 use super::super::effect::Effect;
 use super::super::refit::Refit;
 use super::super::settings::PriorSettings;
-use super::ordinary::Ordinary;
-use super::{Coefficients, FARTHEST, FitRequest, Law};
+use super::{Coefficients, FARTHEST, Law};
 use crate::model::Parameter;
 
 /// A camera that looks askew.
@@ -16,10 +15,6 @@ pub struct ObliqueView;
 pub struct WrongScale;
 
 impl Law for ObliqueView {
-    fn beside<'a>(&self, sought: &FitRequest<'_, 'a>) -> Option<Refit<'a>> {
-        Ordinary.beside(sought)
-    }
-
     /// ρ, as many standard deviations from zero as the stretch or the shear.
     fn strength(&self, _effect: Effect, of: &Coefficients<'_>) -> Option<(f64, f64)> {
         let ((stretch, of_stretch), (shear, of_shear)) = (of(Parameter::ViewStretch), of(Parameter::ViewShear));
@@ -47,14 +42,6 @@ impl Law for ObliqueView {
 }
 
 impl Law for WrongScale {
-    fn beside<'a>(&self, sought: &FitRequest<'_, 'a>) -> Option<Refit<'a>> {
-        Ordinary.beside(sought)
-    }
-
-    fn ln_multiplicity(&self, fit: &Refit<'_>, effect: Effect, of: &Coefficients<'_>, settings: &PriorSettings) -> f64 {
-        Ordinary.ln_multiplicity(fit, effect, of, settings)
-    }
-
     fn is_possible(&self, fit: &Refit<'_>, prior: &PriorSettings) -> bool {
         fit.value(Parameter::AngleGain).is_none_or(|gain| gain.abs() < FARTHEST * prior.view)
     }
