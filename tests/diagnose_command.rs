@@ -588,6 +588,27 @@ fn a_stiffening_hinge_is_learnt_as_a_formula_that_the_file_takes_back() {
 }
 
 #[test]
+fn friction_that_goes_with_the_load_is_friction_and_no_drag_beside_it() {
+    // at the lowest point a swing of 75 degrees loads its bearing with 2.5 times its weight: friction that grows with the speed, as drag does
+    let folder = Folder::new();
+    let base = &bob(1.3, "");
+    let hidden = "[[model.law]]\nname = \"bearing\"\nplace = \"hinge\"\ntorque_n_m = \"-a * sign(rate) * load\"\n\
+                  parameters.a = { start = 4e-4, min = 0.0, unit = \"m\" }\n";
+    let angles = folder.simulated(base, hidden, &["--duration", "40", "--noise-rad", "4e-4", "--seed", "1"]);
+    let verdict = &folder.diagnosis(&angles, base, &[])["verdict"];
+    assert_eq!(names(&verdict["effects"]), ["hinge_coulomb"], "{verdict:#}");
+    let law = &verdict["law"]["terms"][0];
+    assert_eq!(
+        (&law["place"], &law["shape"], &law["modulation"]),
+        (&"hinge".into(), &"sign".into(), &"in proportion to the load".into()),
+        "{verdict:#}"
+    );
+    let radius = &law["parameters"]["a"];
+    assert_eq!(radius["unit"], "m");
+    assert!((radius["value"].as_f64().unwrap() / 4e-4 - 1.0).abs() < 0.01, "{radius:#}");
+}
+
+#[test]
 fn friction_that_fades_with_speed_is_friction_and_no_drag_beside_it() {
     let folder = Folder::new();
     let hidden = "hinge_coulomb = 2.5e-3\n[[model.law]]\nname = \"sticking\"\nplace = \"hinge\"\n\

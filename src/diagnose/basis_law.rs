@@ -65,22 +65,24 @@ pub struct Swing<'s> {
 }
 
 impl<'s> Swing<'s> {
-    /// Along a linearised motion of a model.
-    pub fn of(around: &'s Linearisation, model: &ForwardModel) -> Self {
+    /// Along a linearised motion of a model; `None` where that has no accelerations.
+    pub fn of(around: &'s Linearisation, model: &ForwardModel) -> Option<Self> {
         let middle = |a: &[f64], b: &[f64]| -> Vec<f64> { a.iter().zip(b).map(|(a, b)| 0.5 * (a + b)).collect() };
         let last = around.rows.len().max(2) - 1;
         let instant = |(k, pair): (usize, &[Row])| {
             let t_s = 0.5 * (around.t_s[k] + around.t_s[k + 1]);
             let (theta_rad, rate) =
                 (middle(&pair[0].theta_rad, &pair[1].theta_rad), middle(&pair[0].rate, &pair[1].rate));
-            Instant { motion: model.motion(t_s, &theta_rad, &rate), tau: (k as f64 + 0.5) / last as f64 - 0.5 }
+            let mut motion = model.motion(t_s, &theta_rad, &rate);
+            model.accelerate(&mut motion).ok()?;
+            Some(Instant { motion, tau: (k as f64 + 0.5) / last as f64 - 0.5 })
         };
         let each_link = DMatrix::identity(around.links, around.links);
-        Self {
+        Some(Self {
             around,
-            instants: around.rows.windows(2).enumerate().map(instant).collect(),
+            instants: around.rows.windows(2).enumerate().map(instant).collect::<Option<_>>()?,
             transitions: around.transitions_of_inputs(|_| each_link.clone()),
-        }
+        })
     }
 
     /// The motion at the middles between two rows.
@@ -162,7 +164,7 @@ impl<'s> Swing<'s> {
 pub fn swings<'s>(fit: &Refit<'_>, around: &'s [Linearisation]) -> Option<Vec<Swing<'s>>> {
     let swing = |(record, around)| {
         let (model, _) = fit.problem.model(record, &fit.x[..fit.problem.free.len()]).ok()?;
-        Some(Swing::of(around, &model))
+        Swing::of(around, &model)
     };
     around.iter().enumerate().map(swing).collect()
 }

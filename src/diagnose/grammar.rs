@@ -5,7 +5,8 @@
 //! place       hinge, joint, strip, tip
 //! state       the angle there, its rate, the wind across the strip
 //! shape       |u|^p sgn u (p = 0 … 3), u², constant, one-sided, with play, a stop on one side, a bump, a pull near the middle, a sign that fades with speed
-//! modulation  1, growing with time, fading with time, from an instant on; of what goes with a rate also with the angle, as of a magnet at the lowest point
+//! modulation  1, growing with time, fading with time, from an instant on; of what goes with a rate also with the angle, as of a magnet at the lowest point;
+//!             of a dry friction with the load of its bearing
 //! ```
 //!
 //! Each term has the amplitude `a` and at most two further coefficients, whose starts are parts of the largest state that the recordings visit.
@@ -56,6 +57,11 @@ impl Term {
         let mut plain = term(self.law.place, self.state, (shape, &[]), None);
         plain.law.parameters.get_mut("a")?.start = self.law.parameters.get("a")?.start;
         Some(plain)
+    }
+
+    /// Whether it goes with the load of its bearing.
+    pub fn is_by_load(&self) -> bool {
+        self.modulation == WITH_LOAD.words
     }
 
     /// Its formula with the numbers of its coefficients.
@@ -157,34 +163,37 @@ struct Modulation {
     formula: &'static str,
     /// Starts of d, as parts of the recordings' length, or of the largest angle.
     starts: &'static [f64],
-    /// The powers of rad and s that it has.
-    powers: [i32; 2],
+    /// The powers of rad, s and N that it has.
+    powers: [i32; 3],
 }
 
 /// It does not.
 const NO_MODULATION: &str = "none";
 /// With time.
 const WITH_TIME: [Modulation; 3] = [
-    Modulation { words: "growing with time", formula: "t", starts: &[], powers: [0, 1] },
-    Modulation { words: "fading with time", formula: "exp(-t / d)", starts: &[0.3], powers: [0, 0] },
-    Modulation { words: "from an instant on", formula: "step(t - d)", starts: &[0.35, 0.65], powers: [0, 0] },
+    Modulation { words: "growing with time", formula: "t", starts: &[], powers: [0, 1, 0] },
+    Modulation { words: "fading with time", formula: "exp(-t / d)", starts: &[0.3], powers: [0, 0, 0] },
+    Modulation { words: "from an instant on", formula: "step(t - d)", starts: &[0.35, 0.65], powers: [0, 0, 0] },
 ];
 /// Of what goes with a rate, with the angle.
 const WITH_ANGLE: [Modulation; 2] = [
-    Modulation { words: "growing with the square of the angle", formula: "angle ^ 2", starts: &[], powers: [2, 0] },
+    Modulation { words: "growing with the square of the angle", formula: "angle ^ 2", starts: &[], powers: [2, 0, 0] },
     Modulation {
         words: "strongest at the middle",
         formula: "exp(-(angle / d) ^ 2)",
         starts: &[0.15, 0.5],
-        powers: [0, 0],
+        powers: [0, 0, 0],
     },
 ];
 
+/// Of dry friction, with the load of its bearing: the amplitude is the coefficient of friction times the radius at which it rubs.
+const WITH_LOAD: Modulation =
+    Modulation { words: "in proportion to the load", formula: "load", starts: &[], powers: [0, 0, 1] };
+
 /// Every term at a place.
 pub fn terms(place: LawPlace, largest: StateRange) -> Vec<Term> {
-    let variables = place.variables();
-    let states = &variables[..variables.len() - 1];
-    states.iter().flat_map(|state| of_state(place, state, largest)).collect()
+    let states = place.variables().iter().filter(|variable| !["load", "t"].contains(variable));
+    states.flat_map(|state| of_state(place, state, largest)).collect()
 }
 
 /// The shapes that a state may have.
@@ -213,7 +222,9 @@ fn of_state(place: LawPlace, state: &'static str, largest: StateRange) -> Vec<Te
         let is_brake = |own: &&Modulation| own.starts.is_empty() || shape.power == 1;
         let of_angle = WITH_ANGLE.iter().filter(|_| is_plain && state == "rate").filter(is_brake);
         let of_time = of_time.map(|modulation| (modulation, largest.time_s));
-        for (modulation, most) in of_time.chain(of_angle.map(|modulation| (modulation, largest.angle))) {
+        let is_dry = shape.formula == "sign(u)" && state == "rate";
+        let of_load = is_dry.then_some((&WITH_LOAD, 0.0));
+        for (modulation, most) in of_time.chain(of_angle.map(|modulation| (modulation, largest.angle))).chain(of_load) {
             let times = modulation.starts.iter().map(|part| Some(part * most));
             let times: Vec<Option<f64>> = if modulation.starts.is_empty() { vec![None] } else { times.collect() };
             all.extend(times.into_iter().map(|d| term(place, state, (shape, &[]), Some((modulation, d)))));
@@ -239,7 +250,7 @@ fn term(
         "rate" => "rad/s",
         _ => "m/s",
     };
-    let powers = changes.map_or([0; 2], |(modulation, _)| modulation.powers);
+    let powers = changes.map_or([0; 3], |(modulation, _)| modulation.powers);
     let amplitude = coefficient(0.0, None, &unit_of(place, state, shape.power, powers));
     let mut parameters = BTreeMap::from([("a".to_owned(), amplitude)]);
     for (name, start) in ["b", "c"].into_iter().zip(starts) {
@@ -271,8 +282,10 @@ fn with_words(formula: &str, of_word: impl Fn(&str) -> Option<String>) -> String
     text + rest
 }
 
-/// The unit of an amplitude: the place's own over that of a power of the state and of what it changes with, powers of rad and s.
-fn unit_of(place: LawPlace, state: &str, power: i32, [rad, s]: [i32; 2]) -> String {
+/// The unit of an amplitude: the place's own over that of a power of the state and of what it changes with, powers of rad, s and N.
+fn unit_of(place: LawPlace, state: &str, power: i32, [rad, s, newton]: [i32; 3]) -> String {
+    // the torque of a force at a radius
+    let own = if place.unit() == "N m" && newton == 1 { "m" } else { place.unit() };
     let of_wind = state == "wind";
     let exponents = [
         ("rad", -rad - if of_wind { 0 } else { power }),
@@ -285,7 +298,7 @@ fn unit_of(place: LawPlace, state: &str, power: i32, [rad, s]: [i32; 2]) -> Stri
     };
     let above = exponents.iter().filter(|e| e.1 > 0).map(|e| format!(" {}", raised(e)));
     let below = exponents.iter().filter(|e| e.1 < 0).map(|e| format!("/{}", raised(e)));
-    std::iter::once(place.unit().to_owned()).chain(above).chain(below).collect()
+    std::iter::once(own.to_owned()).chain(above).chain(below).collect()
 }
 
 #[cfg(test)]
@@ -382,6 +395,7 @@ mod tests {
         assert_eq!(unit(LawPlace::Hinge, "-a * angle * t"), "N m/rad/s");
         assert_eq!(unit(LawPlace::Hinge, "-a * sign(rate) * angle ^ 2"), "N m/rad2");
         assert_eq!(unit(LawPlace::Hinge, "-a"), "N m");
+        assert_eq!(unit(LawPlace::Hinge, "-a * sign(rate) * load"), "m");
         assert_eq!(unit(LawPlace::Hinge, "-a * rate * exp(-(angle / d) ^ 2)"), "N m s/rad");
         assert_eq!(unit(LawPlace::Strip, "-a * wind * abs(wind)"), "N/m s2/m2");
     }

@@ -192,16 +192,20 @@ impl Findings<'_> {
     /// The effects of the table that terms of the learnt law are nearly.
     fn law_of_table(&self) -> String {
         let Some(learnt) = &self.learnt else { return String::new() };
-        let of_term = |(place, effects): (usize, &Vec<Effect>)| {
+        let of_term = |(place, (term, effects)): (usize, (&Term, &Vec<Effect>))| {
             let which = match (learnt.terms.len(), place) {
                 (1, _) => "that",
                 (_, 0) => "the first of them",
                 _ => "the second",
             };
-            (!effects.is_empty())
-                .then(|| format!(" In this motion {which} is nearly the same as {}.", words_of_any(effects)))
+            let effects = (!effects.is_empty()).then(|| words_of_any(effects))?;
+            Some(if term.is_by_load() {
+                format!(" Here {which} is {effects}, in proportion to the load of the bearing.")
+            } else {
+                format!(" In this motion {which} is nearly the same as {effects}.")
+            })
         };
-        learnt.stand_for.iter().enumerate().filter_map(of_term).collect()
+        learnt.terms.iter().zip(&learnt.stand_for).enumerate().filter_map(of_term).collect()
     }
 
     /// Whether every term of the learnt law is nearly an effect of the table.

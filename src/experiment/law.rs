@@ -11,9 +11,9 @@ use crate::model::{Expression, LawCoefficient, Parameter};
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum LawPlace {
-    /// A torque on the first link (N·m) from its `angle` (rad) and `rate` (rad/s).
+    /// A torque on the first link (N·m) from its `angle` (rad), its `rate` (rad/s) and the `load` of the bearing (N).
     Hinge,
-    /// A torque on the lower link of every joint (N·m), and back on the upper one, from the bend `angle` and its `rate`.
+    /// A torque on the lower link of every joint (N·m), and back on the upper one, from the bend `angle`, its `rate`, and the `load` of the joint.
     Joint,
     /// A force per length across the strip (N/m) from the speed across itself, `wind` (m/s).
     Strip,
@@ -48,7 +48,7 @@ impl LawPlace {
     /// The variables of a formula there; the time `t` (s) is the last.
     pub fn variables(self) -> &'static [&'static str] {
         match self {
-            Self::Hinge | Self::Joint => &["angle", "rate", "t"],
+            Self::Hinge | Self::Joint => &["angle", "rate", "load", "t"],
             Self::Strip | Self::Tip => &["wind", "t"],
             Self::Support => &["t"],
         }

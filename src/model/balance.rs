@@ -132,12 +132,19 @@ impl<'a> Balance<'a> {
     /// [`crate::Error::Simulation`] when no inertia is left (a negative added mass).
     pub fn accelerations(&mut self) -> Result<Vec<f64>> {
         let (n, m) = (self.count(), self.rates());
-        self.motion.acceleration.fill(0.0);
-        let mut partials = Partials::zero(n, m);
-        self.partials(&mut partials);
-        let mut q = DVector::zeros(m);
-        self.torque(q.as_mut_slice());
-        balanced(partials, &q, self.motion.t_s)
+        let (mut partials, mut q) = (Partials::zero(n, m), DVector::zeros(m));
+        let mut accelerations = vec![0.0; m];
+        for _ in 0..self.model.newton_steps() {
+            match self.shapes {
+                None => self.motion.acceleration.copy_from_slice(&accelerations),
+                Some(shapes) => shapes.expand(&accelerations, &mut self.motion.acceleration),
+            }
+            self.partials(&mut partials);
+            self.torque(q.as_mut_slice());
+            let change = balanced(&partials, &q, self.motion.t_s)?;
+            accelerations.iter_mut().zip(&change).for_each(|(own, change)| *own += change);
+        }
+        Ok(accelerations)
     }
 
     /// What friction has to bear while the hinge is held: the sum of all other torques on the first coordinate (N·m).

@@ -138,6 +138,30 @@ impl Chain {
         self.links[i].length_m
     }
 
+    /// Mass of a link and of all below (kg).
+    pub fn mass_from_kg(&self, link: usize) -> f64 {
+        self.links[link].mass_kg + mass_below_kg(&self.links, link)
+    }
+
+    /// kₗ: what the bearing at the upper end of `link` bears of link l's turning (kg·m), see [`bearing`](super::effects::bearing).
+    pub fn borne_moment_kg_m(&self, link: usize, l: usize) -> f64 {
+        if l < link { self.mass_from_kg(link) * self.next_pivot_m[l] } else { self.static_moment_kg_m[l] }
+    }
+
+    /// ∂kₗ/∂(a parameter of a link) (kg).
+    pub fn borne_moment_slope_kg(&self, link: usize, l: usize, parameter: Parameter) -> f64 {
+        match parameter {
+            Parameter::Link(own, of) if usize::from(own) == l => match of {
+                LinkProperty::Inertia => 0.0,
+                LinkProperty::Com if l < link => 0.0,
+                LinkProperty::Com => self.links[l].mass_kg,
+                LinkProperty::Length if l < link => self.mass_from_kg(link),
+                LinkProperty::Length => mass_below_kg(&self.links, l),
+            },
+            _ => 0.0,
+        }
+    }
+
     /// σ of the joint below link `upper`: the length between marks over the links' own, see [`joint`](super::effects::joint).
     pub fn joint_ratio(&self, upper: usize) -> f64 {
         self.joint_ratios[upper]

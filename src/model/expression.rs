@@ -13,7 +13,7 @@
 use smallvec::SmallVec;
 
 /// Most variables of one formula: the state and the coefficients.
-pub const MOST_VARIABLES: usize = 12;
+pub const MOST_VARIABLES: usize = 13;
 /// Half the width over which a sign goes from −1 to 1, in the unit of what it is of.
 const SIGN_WIDTH: f64 = 1e-3;
 /// The variables, and a sign that is given.

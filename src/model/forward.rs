@@ -10,6 +10,9 @@ use super::{Chain, Hinge, Motion, Parameter, Partials, Work};
 use crate::error::{Error, Result};
 use crate::experiment::Experiment;
 
+/// A friction that goes with the load is a small part of the torques: each step leaves less than a hundredth of what the one before left.
+const MOST_NEWTON_STEPS: usize = 5;
+
 /// A chain under gravity, with its effects, as a balance of torques (d'Alembert):
 ///
 /// ```text
@@ -119,7 +122,7 @@ impl ForwardModel {
 
     /// What dry friction of the hinge can hold at an instant (N·m), all laws together, where the hinge is dry.
     pub fn friction_n_m(&self, motion: &Motion) -> Option<f64> {
-        self.effects.iter().filter_map(|e| e.friction_n_m(motion)).reduce(|a, b| a + b)
+        self.effects.iter().filter_map(|e| e.friction_n_m(&self.chain, motion)).reduce(|a, b| a + b)
     }
 
     /// Whether the hinge has dry friction.
@@ -180,9 +183,10 @@ impl ForwardModel {
         motion
     }
 
-    /// Sets the time, and with it the pivot.
+    /// Sets the time, and with it the pivot, and what weighs on the chain.
     pub fn set_time(&self, motion: &mut Motion, t_s: f64) {
         motion.t_s = t_s;
+        motion.gravity_m_s2 = self.gravity_m_s2;
         if let Some(support) = self.support() {
             [_, motion.pivot_m_s, motion.pivot_m_s2] = support.at(t_s);
         }
@@ -229,6 +233,7 @@ impl ForwardModel {
             let of_effects: f64 = self.effects.iter().map(|e| e.sideways_m_s2(motion)).sum();
             let sideways_m_s2 = of_effects - motion.pivot_m_s2;
             self.chain.add_sensitivity(of.parameter, [sideways_m_s2, self.gravity_m_s2], motion, q);
+            self.effects.iter().for_each(|e| e.add_sensitivity_of_links(of.parameter, &self.chain, motion, q));
         }
         of.effects.iter().for_each(|e| self.effects[*e].add_sensitivity(of.parameter, &self.chain, motion, q));
         if let Some(support) = self.support().filter(|_| of.of_support) {
@@ -248,13 +253,20 @@ impl ForwardModel {
     /// [`Error::Simulation`] when no inertia is left (a negative added mass).
     pub fn accelerate(&self, motion: &mut Motion) -> Result<()> {
         let (n, m) = (self.chain.count(), self.rates());
-        let mut partials = Partials::zero(n, m);
+        let (mut partials, mut q) = (Partials::zero(n, m), DVector::zeros(m));
         motion.acceleration.fill(0.0);
-        self.partials(motion, &mut partials);
-        let mut q = DVector::zeros(m);
-        self.torque(motion, q.as_mut_slice());
-        motion.acceleration = balanced(partials, &q, motion.t_s)?;
+        for _ in 0..self.newton_steps() {
+            self.partials(motion, &mut partials);
+            self.torque(motion, q.as_mut_slice());
+            let change = balanced(&partials, &q, motion.t_s)?;
+            motion.acceleration.iter_mut().zip(&change).for_each(|(own, change)| *own += change);
+        }
         Ok(())
+    }
+
+    /// Newton's steps from no acceleration to the balance: one where the torques are linear in the accelerations.
+    pub(super) fn newton_steps(&self) -> usize {
+        if self.effects.iter().all(|e| e.is_linear_in_accelerations()) { 1 } else { MOST_NEWTON_STEPS }
     }
 
     /// What friction has to bear on the first link while it is held: the sum of all other torques on it (N·m).
@@ -294,9 +306,9 @@ impl ForwardModel {
     }
 }
 
-/// The accelerations for which the torques balance: `q` and `partials` are those without any.
-pub(super) fn balanced(partials: Partials, q: &DVector<f64>, t_s: f64) -> Result<Vec<f64>> {
-    let solved = (-partials.acceleration).lu().solve(q).filter(|a| a.iter().all(|v| v.is_finite()));
+/// By how much the accelerations change until the torques balance, in linear approximation.
+pub(super) fn balanced(partials: &Partials, q: &DVector<f64>, t_s: f64) -> Result<Vec<f64>> {
+    let solved = (-&partials.acceleration).lu().solve(q).filter(|a| a.iter().all(|v| v.is_finite()));
     let solved = solved.ok_or_else(|| Error::Simulation {
         detail: format!("no inertia left at t = {t_s:.3} s; lower model.effects.added_mass"),
     })?;

@@ -22,6 +22,8 @@ pub struct Motion {
     pub pivot_m_s: f64,
     /// Sideways acceleration of the pivot.
     pub pivot_m_s2: f64,
+    /// What weighs on all masses.
+    pub gravity_m_s2: f64,
     /// What a dry hinge does.
     pub hinge: Hinge,
     /// On which side of its corners a law is (±1 for each of [`ForwardModel::corners`](super::ForwardModel::corners)), while a step is sought that
@@ -68,6 +70,7 @@ impl Motion {
             cos: vec![1.0; links],
             pivot_m_s: 0.0,
             pivot_m_s2: 0.0,
+            gravity_m_s2: 0.0,
             hinge: Hinge::SlidesForward,
             sides: Vec::new(),
         }

@@ -44,8 +44,8 @@ fn stated_laws() -> Vec<Law> {
         Experiment::parse(&text, std::path::Path::new("e.toml")).unwrap().model.law.remove(0)
     };
     vec![
-        of("hinge", "-1e-5 * a * rate * angle ^ 2 * exp(-t)"),
-        of("joint", "-1e-5 * a * (max(rate, 0) + sin(angle))"),
+        of("hinge", "-1e-5 * a * rate * angle ^ 2 * exp(-t) * (1 + 1e3 * load ^ 2)"),
+        of("joint", "-1e-5 * a * (max(rate, 0) + sin(angle)) * (1 + 1e3 * load)"),
         of("strip", "-a * wind ^ 3 * t"),
         of("tip", "-1e-2 * a * abs(wind) * wind"),
         of("support", "a * cos(3 * t)"),
@@ -322,6 +322,40 @@ fn a_formula_with_the_sign_of_the_rate_at_the_hinge_is_dry_friction() {
     let model = ForwardModel::still(&formula("-a * sign(rate)")).unwrap();
     let rest_rad = model.rest_rad(nalgebra::DVector::from_element(2, 0.01), |_, _, _| {}).unwrap();
     assert!(rest_rad.amax() < 1e-12, "{rest_rad}");
+}
+
+#[test]
+fn friction_in_proportion_to_the_load_goes_with_the_force_that_its_own_acceleration_makes() {
+    // one link of mass m, its centre c below the hinge: N² = m² [(g cos θ + c θ̇²)² + (g sin θ + c θ̈)²]
+    let (mass_kg, com_m, inertia_kg_m2, radius_m) = (0.2, 0.15, 1.5e-3, 2e-3);
+    let text = format!(
+        "[[specimen.links]]\nlength_m = 0.3\nmass_kg = {mass_kg}\ncom_m = {com_m}\ninertia_kg_m2 = {inertia_kg_m2}\n\
+         [model]\nc_eq_n_m_s_per_rad = 0.0\nrelease_rad = [1.2]\n\
+         [[model.law]]\nname = \"rub\"\nplace = \"hinge\"\ntorque_n_m = \"-a * sign(rate) * load\"\n\
+         parameters.a = {{ start = {radius_m}, unit = \"m\" }}\n"
+    );
+    let experiment = Experiment::parse_with_specimen(&text, std::path::Path::new("e.toml")).unwrap();
+    let model = ForwardModel::of(&experiment).unwrap();
+    let gravity_m_s2 = model.gravity_m_s2();
+    let about_hinge_kg_m2 = inertia_kg_m2 + mass_kg * com_m * com_m;
+    for (theta, rate) in [(0.9_f64, -2.0_f64), (-0.4, 6.0), (2.9, 1.0)] {
+        let mut motion = model.motion(0.0, &[theta], &[rate]);
+        model.accelerate(&mut motion).unwrap();
+        let along = gravity_m_s2 * theta.cos() + com_m * rate * rate;
+        let across = |acceleration: f64| gravity_m_s2 * theta.sin() + com_m * acceleration;
+        let balance = |acceleration: f64| {
+            let load_n = mass_kg * along.hypot(across(acceleration));
+            let torque = -mass_kg * gravity_m_s2 * com_m * theta.sin() - radius_m * load_n * rate.signum();
+            torque / about_hinge_kg_m2
+        };
+        let by_hand = (0..100).fold(0.0, |acceleration, _| balance(acceleration));
+        assert!((motion.acceleration[0] / by_hand - 1.0).abs() < 1e-12, "{} {by_hand}", motion.acceleration[0]);
+    }
+    // it comes to rest, and friction holds it
+    let swing = Trajectory::swing(&model, &State::at_rest(&[1.2]), 0.0, 60.0).unwrap();
+    assert_eq!(swing.at(60.0).omega_rad_s[0], 0.0);
+    let band_rad = radius_m / com_m;
+    assert!(swing.at(60.0).theta_rad[0].abs() < 1.01 * band_rad, "{}", swing.at(60.0).theta_rad[0]);
 }
 
 #[test]

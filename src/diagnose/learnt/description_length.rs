@@ -38,11 +38,15 @@ impl Description<'_> {
         (self.fit.hypothesis.clone(), self.terms.iter().map(Term::form).collect())
     }
 
-    /// The effects that each of its terms stands for along a motion, with the share of each.
+    /// The effects that each of its terms stands for along a motion, with the share of each. Friction that goes with its load is friction.
     pub fn stand_for(&self, context: &FitContext<'_>, along: &Along) -> Vec<Vec<(Effect, f64)>> {
         let (law, misfit) = (&context.settings.law, &context.settings.misfit);
         let is_exact = self.fit.chi2 < chi2_noise_limit(self.fit.values(), misfit);
-        self.terms.iter().map(|term| along.stands_for((term, is_exact), law)).collect()
+        let of_term = |term: &Term| match term.plainer().filter(|_| term.is_by_load()) {
+            Some(plain) => along.stands_for((&plain, is_exact), law),
+            None => along.stands_for((term, is_exact), law),
+        };
+        self.terms.iter().map(of_term).collect()
     }
 }
 

@@ -1,5 +1,6 @@
 //! A law that a file states by a formula (`[[model.law]]`).
 
+use super::bearing::BearingLoad;
 use super::load::{self, MovingLink};
 use super::{Effect, air};
 use crate::experiment::{Law, LawPlace};
@@ -15,10 +16,14 @@ pub struct Formula {
     /// The state where it is looked at, then the values of the coefficients; last, where it is dry friction of the hinge, the sign of the rate.
     values: Vec<f64>,
     is_dry: bool,
+    /// Whether the load of the bearing stands in it.
+    is_by_load: bool,
 }
 
 /// The rate among the variables of a law at the hinge.
 const RATE: usize = 1;
+/// The load of the bearing among those of a law at the hinge or the joints.
+const LOAD: usize = 2;
 
 /// How what a formula gives acts, where it is no force along the strip.
 enum Acts {
@@ -30,6 +35,18 @@ enum Acts {
     Support,
 }
 
+impl Acts {
+    /// The links on which a torque acts, each with its direction.
+    fn of_torque(&self) -> impl Iterator<Item = (usize, f64)> + use<> {
+        let (on, back) = match *self {
+            Self::Hinge => (Some(0), None),
+            Self::Joint(i) => (Some(i), Some(i - 1)),
+            Self::Support => (None, None),
+        };
+        on.map(|link| (link, 1.0)).into_iter().chain(back.map(|link| (link, -1.0)))
+    }
+}
+
 impl Formula {
     /// From a file's law; `None` where its formula is not sound.
     pub fn of(law: &Law) -> Option<Self> {
@@ -37,6 +54,7 @@ impl Formula {
         let stated = law.expression().ok()?;
         let dry = if law.place == LawPlace::Hinge { stated.with_sign_given(RATE) } else { None };
         let is_dry = dry.is_some();
+        let is_by_load = matches!(law.place, LawPlace::Hinge | LawPlace::Joint) && stated.uses(LOAD);
         let values = state.into_iter().chain(law.parameters.values().map(|own| own.start)).chain(is_dry.then_some(0.0));
         let coefficients = law.coefficients().map(|(parameter, _)| parameter).collect();
         Some(Self {
@@ -45,6 +63,7 @@ impl Formula {
             expression: dry.unwrap_or(stated),
             coefficients,
             is_dry,
+            is_by_load,
         })
     }
 
@@ -66,22 +85,25 @@ impl Formula {
         Some(self.place.variables().len() + index)
     }
 
-    /// The formula at every place of the chain where it acts, of a law that is no force along the strip.
-    fn visit<N>(
+    /// The formula at every place of the chain where it acts, of a law that is no force along the strip, with the load there.
+    fn visit<'a, N>(
         &self,
         evaluate: impl Fn(&Expression, &[f64]) -> N,
-        chain: &Chain,
-        motion: &Motion,
-        mut each: impl FnMut(&Acts, N),
+        chain: &'a Chain,
+        motion: &'a Motion,
+        mut each: impl FnMut(&Acts, N, Option<BearingLoad<'a>>),
     ) {
         let (theta, rate, t_s) = (&motion.theta_rad, &motion.rate, motion.t_s);
-        let at = |state: &[f64]| self.at(&evaluate, state, motion.hinge.sign());
+        let mut act = |acts: &Acts, angle: f64, rate: f64, link: usize| {
+            let bearing = self.is_by_load.then(|| BearingLoad::of(chain, motion, link));
+            let state = [angle, rate, bearing.map_or(0.0, |b| b.load_n), t_s];
+            each(acts, self.at(&evaluate, &state, motion.hinge.sign()), bearing);
+        };
         match self.place {
-            LawPlace::Hinge => each(&Acts::Hinge, at(&[theta[0], rate[0], t_s])),
-            LawPlace::Joint => (1..chain.count()).for_each(|i| {
-                each(&Acts::Joint(i), at(&[theta[i] - theta[i - 1], rate[i] - rate[i - 1], t_s]));
-            }),
-            LawPlace::Support => each(&Acts::Support, at(&[t_s])),
+            LawPlace::Hinge => act(&Acts::Hinge, theta[0], rate[0], 0),
+            LawPlace::Joint => (1..chain.count())
+                .for_each(|i| act(&Acts::Joint(i), theta[i] - theta[i - 1], rate[i] - rate[i - 1], i)),
+            LawPlace::Support => each(&Acts::Support, self.at(&evaluate, &[t_s], motion.hinge.sign()), None),
             LawPlace::Strip | LawPlace::Tip => {}
         }
     }
@@ -99,15 +121,11 @@ impl Formula {
             let force = |speed: f64| self.at(&value, &[speed, motion.t_s], 0.0);
             return load::add_torque(chain, motion, |link| air::load_of(link, self.points(chain, link), force), q);
         }
-        self.visit(value, chain, motion, |acts, value| match acts {
-            Acts::Hinge => q[0] += value,
-            Acts::Joint(i) => {
-                q[i - 1] -= value;
-                q[*i] += value;
-            }
+        self.visit(value, chain, motion, |acts, value, _| match acts {
             Acts::Support => {
                 (0..chain.count()).for_each(|i| q[i] -= value * chain.static_moment_kg_m(i) * motion.cos[i]);
             }
+            links => links.of_torque().for_each(|(link, sign)| q[link] += sign * value),
         });
     }
 
@@ -135,30 +153,47 @@ impl Effect for Formula {
             );
         }
         self.visit(
-            |formula, values| formula.at::<2>(values, 0),
+            |formula, values| formula.at::<3>(values, 0),
             chain,
             motion,
-            |acts, dual| {
-                let [with_angle, with_rate] = dual.slopes;
-                match acts {
-                    Acts::Hinge => {
-                        partials.theta[(0, 0)] += with_angle;
-                        partials.rate[(0, 0)] += with_rate;
-                    }
-                    Acts::Joint(i) => {
-                        for (own, sign) in [(*i, 1.0), (i - 1, -1.0)] {
-                            for (other, along) in [(*i, 1.0), (i - 1, -1.0)] {
-                                partials.theta[(own, other)] += sign * along * with_angle;
-                                partials.rate[(own, other)] += sign * along * with_rate;
-                            }
-                        }
-                    }
-                    Acts::Support => (0..chain.count()).for_each(|i| {
+            |acts, dual, bearing| {
+                let [with_angle, with_rate, with_load] = dual.slopes;
+                if let Acts::Support = acts {
+                    (0..chain.count()).for_each(|i| {
                         partials.theta[(i, i)] += dual.value * chain.static_moment_kg_m(i) * motion.sin[i];
-                    }),
+                    });
+                }
+                for (own, sign) in acts.of_torque() {
+                    for (other, along) in acts.of_torque() {
+                        partials.theta[(own, other)] += sign * along * with_angle;
+                        partials.rate[(own, other)] += sign * along * with_rate;
+                    }
+                    let Some(bearing) = &bearing else { continue };
+                    for l in 0..chain.count() {
+                        let [theta, rate, acceleration] = bearing.slopes(l);
+                        partials.theta[(own, l)] += sign * with_load * theta;
+                        partials.rate[(own, l)] += sign * with_load * rate;
+                        partials.acceleration[(own, l)] += sign * with_load * acceleration;
+                    }
+                    partials.pivot_acceleration[own] += sign * with_load * bearing.with_pivot_kg();
                 }
             },
         );
+    }
+
+    fn add_sensitivity_of_links(&self, parameter: Parameter, chain: &Chain, motion: &Motion, q: &mut [f64]) {
+        if !self.is_by_load {
+            return;
+        }
+        let slope = |formula: &Expression, values: &[f64]| formula.at::<1>(values, LOAD).slopes[0];
+        self.visit(slope, chain, motion, |acts, with_load, bearing| {
+            let with_parameter = bearing.map_or(0.0, |bearing| with_load * bearing.with_parameter(parameter));
+            acts.of_torque().for_each(|(link, sign)| q[link] += sign * with_parameter);
+        });
+    }
+
+    fn is_linear_in_accelerations(&self) -> bool {
+        !self.is_by_load
     }
 
     /// Half a unit for each operation, four points a link of a strip.
@@ -170,11 +205,13 @@ impl Effect for Formula {
             LawPlace::Strip => (4 * n, load::work(chain)),
             LawPlace::Tip => (1, load::work(chain)),
         };
-        way + evaluations * self.expression.operations() as u64 / 2
+        let of_load = if self.is_by_load { evaluations * n } else { 0 };
+        way + of_load + evaluations * self.expression.operations() as u64 / 2
     }
 
-    fn friction_n_m(&self, motion: &Motion) -> Option<f64> {
-        let of_sign = |sign: f64| self.at(Expression::value, &[motion.theta_rad[0], 0.0, motion.t_s], sign);
+    fn friction_n_m(&self, chain: &Chain, motion: &Motion) -> Option<f64> {
+        let load_n = if self.is_by_load { BearingLoad::of(chain, motion, 0).load_n } else { 0.0 };
+        let of_sign = |sign: f64| self.at(Expression::value, &[motion.theta_rad[0], 0.0, load_n, motion.t_s], sign);
         self.is_dry.then(|| 0.5 * (of_sign(-1.0) - of_sign(1.0)))
     }
 

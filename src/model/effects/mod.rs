@@ -6,12 +6,14 @@
 //! | [`joint`] | the joint's spring and damper, `rest_curl`, `joint_cubic_stiffness`, `joint_hysteretic` |
 //! | [`air`] | `air_linear`, `air_quadratic`, `added_mass` |
 //! | [`formula`] | those that a file states by a formula |
+//! | [`bearing`] | the load that a formula may go with |
 //! | [`outside`] | `side_force`, `support_motion`, nodal forces |
 //!
 //! `distributed_flexibility` is a chain of more links, see [`Chain::of`](super::Chain::of). Camera effects (`time_base`, `dropped_frames`,
 //! `camera_tilt`, `angle_gain`, `camera_oblique`, `differential_lag`, `differential_zero`) change the observation, not the motion.
 
 pub mod air;
+pub mod bearing;
 pub mod formula;
 pub mod hinge;
 pub mod joint;
@@ -42,8 +44,16 @@ pub trait Effect: std::fmt::Debug + Send + Sync {
     /// Adds ∂Q/∂coefficient.
     fn add_sensitivity(&self, _parameter: Parameter, _chain: &Chain, _motion: &Motion, _q: &mut [f64]) {}
 
+    /// Adds ∂Q/∂(a parameter of a link), where its torques depend on the links' masses and lengths.
+    fn add_sensitivity_of_links(&self, _parameter: Parameter, _chain: &Chain, _motion: &Motion, _q: &mut [f64]) {}
+
+    /// Whether its torques are linear in the accelerations.
+    fn is_linear_in_accelerations(&self) -> bool {
+        true
+    }
+
     /// What the hinge's dry friction can hold (N·m), where it is such a law.
-    fn friction_n_m(&self, _motion: &Motion) -> Option<f64> {
+    fn friction_n_m(&self, _chain: &Chain, _motion: &Motion) -> Option<f64> {
         None
     }
 
@@ -151,7 +161,7 @@ impl<L: Law> Effect for Proportional<L> {
         self.law.energy_j(chain, motion, self.coefficient)
     }
 
-    fn friction_n_m(&self, _: &Motion) -> Option<f64> {
+    fn friction_n_m(&self, _: &Chain, _: &Motion) -> Option<f64> {
         self.law.friction_n_m(self.coefficient)
     }
 
