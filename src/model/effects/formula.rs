@@ -101,8 +101,9 @@ impl Formula {
         };
         match self.place {
             LawPlace::Hinge => act(&Acts::Hinge, theta[0], rate[0], 0),
-            LawPlace::Joint => (1..chain.count())
-                .for_each(|i| act(&Acts::Joint(i), theta[i] - theta[i - 1], rate[i] - rate[i - 1], i)),
+            LawPlace::Joint => {
+                (1..chain.count()).for_each(|i| act(&Acts::Joint(i), theta[i] - theta[i - 1], rate[i] - rate[i - 1], i))
+            }
             LawPlace::Support => each(&Acts::Support, self.at(&evaluate, &[t_s], motion.hinge.sign()), None),
             LawPlace::Strip | LawPlace::Tip => {}
         }
