@@ -120,7 +120,8 @@ struct Link {
 
 #[derive(Debug, Serialize)]
 struct CameraMotion {
-    greatest_shift_px: f64,
+    /// Null where nothing that stands still shows it.
+    greatest_shift_px: Option<f64>,
     taken_out: bool,
     patches: usize,
     sd_px: f64,
@@ -179,7 +180,7 @@ impl Sidecar {
                 read_error: m.decoded.read_error.clone(),
             },
             camera: CameraMotion {
-                greatest_shift_px: m.camera.greatest_shift_px,
+                greatest_shift_px: (m.camera.is_told || m.camera.taken_out).then_some(m.camera.greatest_shift_px),
                 taken_out: m.camera.taken_out,
                 patches: m.camera.patches,
                 sd_px: m.camera.sd_px,

@@ -60,6 +60,13 @@ fn clips() -> Vec<(&'static str, Clip)> {
             swing().with(Scene { radius_px: 4.0, exposure_s: 1.0 / 30.0, amplitude_rad: 0.7, ..Scene::default() }),
         ),
         ("shaken", swing().with(Scene { shake_px: 4.0, ..Scene::default() })),
+        (
+            "drifting",
+            Clip {
+                frames: 150,
+                scene: Scene { marks: vec![(1, RED), (2, RED)], drift_px_s: 1.5, plain_wall: true, ..Scene::default() },
+            },
+        ),
         ("stops", swing().with(Scene { uncovered_s: [0.0, 1.2], ..Scene::default() })),
         ("late", swing().with(Scene { uncovered_s: [1.2, 9.0], ..Scene::default() })),
         ("twin", swing().with(Scene { twin: true, ..Scene::default() })),
@@ -284,6 +291,18 @@ fn shaking() -> Vec<Case> {
             "shaken.mp4",
             vec!["--steady", "never"],
             Warns(&["camera moved by up to", "--steady always"]),
+        ),
+        (
+            "a camera that drifts before a plain wall",
+            "drifting.mp4",
+            vec!["--markers", "2", "--pivot", "160,30"],
+            Warns(&["arc moves aside by", "the camera or the stand moves", "--reference"]),
+        ),
+        (
+            "a plain wall that is to show the camera's motion",
+            "drifting.mp4",
+            vec!["--markers", "2", "--pivot", "160,30", "--steady", "always"],
+            Refuses(&["--steady always", "clear edges", "--reference"]),
         ),
     ]
 }

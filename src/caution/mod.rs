@@ -5,10 +5,12 @@ use crate::experiment::Experiment;
 use crate::hand_hold::{caught_of, released_of};
 use crate::measure::{Measurement, Options, Steadying};
 use crate::statistics::median;
+
 use crate::track::chain_detection::{LEAST_TURN, MOST_MARKS};
 use crate::track::{Point, UnusedObject};
 
 mod link;
+mod pivot;
 
 pub use link::MOST_LENGTH_SPREAD;
 
@@ -69,7 +71,8 @@ pub fn cautions(m: &Measurement, options: &Options) -> Vec<String> {
     }
     cautions.extend(held);
     cautions.extend(caught(m));
-    cautions.extend(pivot(m, options));
+    cautions.extend(pivot::uncertain(m, options));
+    cautions.extend(pivot::moves(m, options));
     cautions.extend(camera(m, options));
     cautions.extend(repeats(m));
     cautions.extend(time(m, options));
@@ -154,7 +157,7 @@ fn spares(m: &Measurement) -> Vec<String> {
         let hang_on = m.tracks.spares.iter().any(|s| s.moves && s.keeps_distance);
         let remedy = match (all <= MOST_MARKS, one) {
             (true, _) if !hang_on => format!(
-                "{} no distance from {}: measure what swings by itself in a run of its own, with --roi around it",
+                "{} no distance from {}, or something of that colour lies in the way: measure what swings by itself in a run of its own, with --roi around it; hide what lies in the way, or leave it out with --mask",
                 if one { "it keeps" } else { "they keep" },
                 if marks == 1 { "the mark" } else { "the marks" }
             ),
@@ -270,36 +273,12 @@ fn caught(m: &Measurement) -> Option<String> {
     })
 }
 
-/// A pivot that is known to some pixels makes the angles of the first link wrong all alike: across the link by a shift, along it
-/// by a factor.
-fn pivot(m: &Measurement, options: &Options) -> Option<String> {
-    let ([x, y], [sx, sy]) = (options.rig.pivot_px?, options.rig.pivot_sd_px?);
-    let place = |axis: usize| {
-        let mut at: Vec<f64> =
-            m.tracks.marks.first()?.iter().filter_map(|p| Some(p.measured?.position_px[axis])).collect();
-        median(&mut at)
-    };
-    let [dx, dy] = [place(0)? - x, place(1)? - y];
-    let length_px = dx.hypot(dy);
-    let (cos, sin) = (dx / length_px, dy / length_px);
-    let [factor, shift_rad] = [(cos * sx).hypot(sin * sy), (sin * sx).hypot(cos * sy)].map(|sd_px| sd_px / length_px);
-    let angles = m.angles.links.first()?;
-    let sd_rad = usual_sd_rad(angles)?;
-    (shift_rad.max(factor * half_range_rad(angles)) > SHARED_DEVIATIONS * sd_rad).then(|| {
-        format!(
-            "the pivot is known to ± {sx:.1} px (x) and ± {sy:.1} px (y), if the camera faces the swing to 2°. All angles of link 1 may be too large or too small by {:.1} % and shifted by {:.2}°, in addition to the standard deviations in the table; frequency and damping are not affected. A mark on the hinge, or a wider swing, reduces this. A camera turned aside by 10° puts the pivot 3 % of the link's length too near",
-            100.0 * factor,
-            shift_rad.to_degrees()
-        )
-    })
-}
-
 /// The scatter of a mark, held against its size.
 fn mark_noise(m: &Measurement, mark: usize) -> Option<String> {
-    let measured: Vec<[f64; 3]> =
-        m.tracks.marks[mark].iter().filter_map(|p| p.measured).map(|m| m.covariance_px2).collect();
-    let n = measured.len().max(1) as f64;
-    let noise_px = (measured.iter().map(|c| 0.5 * (c[0] + c[1])).sum::<f64>() / n).sqrt();
+    let measured = m.tracks.marks[mark].iter().filter_map(|p| p.measured).map(|m| m.covariance_px2);
+    let mut measured: Vec<f64> = measured.map(|c| 0.5 * (c[0] + c[1])).collect();
+    // usually: where a hand or the picture's edge cuts it, it scatters more
+    let noise_px = median(&mut measured)?.sqrt();
     let width_px = 2.0 * (m.tracks.area_px2[mark] / std::f64::consts::PI).sqrt();
     let expected_px = MOST_NOISE_PX + NOISE_OF_WIDTH * width_px;
     (noise_px > expected_px && measured.len() >= FEWEST_FRAMES).then(|| {

@@ -94,15 +94,21 @@ pub struct Envelope {
 }
 
 impl Envelope {
-    /// Of one mode of the windows, which has these bounds.
+    /// Of one mode of the windows, which has these bounds; `other_rad` is what may stand in its place at an instant.
     ///
     /// # Errors
-    /// In words, when the mode is clear of the noise in fewer than three windows.
-    pub(super) fn of(windows: &Windows, mode: usize, bounds: Bounds) -> Result<Self, String> {
-        let moments = &windows.moments[mode];
+    /// In words, when the mode is clear of the noise, and of what else there is, in fewer than three windows.
+    pub(super) fn of(
+        windows: &Windows,
+        mode: usize,
+        bounds: Bounds,
+        other_rad: impl Fn(f64) -> f64,
+    ) -> Result<Self, String> {
+        let moments = &windows.clear_of(mode, other_rad);
         if moments.len() < 3 {
+            let clear_of = if windows.moments[mode].len() < 3 { "the noise" } else { "the slowest mode's harmonics" };
             return Err(format!(
-                "the mode stands clear of the noise in {} window{} of {:.2} s; at least 3 are needed",
+                "the mode stands clear of {clear_of} in {} window{} of {:.2} s; at least 3 are needed",
                 moments.len(),
                 if moments.len() == 1 { "" } else { "s" },
                 windows.window_s

@@ -77,6 +77,23 @@ pub(super) struct Whole<'a> {
     pub third_rad: f64,
 }
 
+impl Whole<'_> {
+    /// What the third harmonic of the slowest mode may be taken for of a faster one, in a window of some length about an instant (rad): A³/20, see
+    /// [`harmonic_share`], and of that as much as a window shows at a frequency so far from its own,
+    ///
+    /// ```text
+    /// A³/20 / √(1 + (Δω T/2)²)      Δω = ω − 3ω₁,  T: the window's length
+    /// ```
+    pub fn harmonic_rad(&self, mode: usize, t_s: f64, window_s: f64) -> f64 {
+        if mode == 0 || self.measured == Measured::Displacement {
+            return 0.0;
+        }
+        let apart = 0.5 * (self.fit.poles[mode].omega_rad_s - 3.0 * self.fit.poles[0].omega_rad_s) * window_s;
+        let amplitude_rad = self.fit.last_amplitude_rad(0, t_s - self.fit.origin_s);
+        amplitude_rad.powi(3) * LARGEST_HARMONIC / 1f64.hypot(apart)
+    }
+}
+
 /// What every method says about one mode.
 pub(super) struct Estimators {
     pub each: Vec<Estimator>,
@@ -220,6 +237,9 @@ const FARTHEST_LAW: f64 = 0.5;
 /// Nearness to three times the slowest frequency at which a mode and the harmonic of a large swing mix.
 const HARMONIC_BAND: f64 = 0.06;
 
+/// The third harmonic of a swing of amplitude A, over A³ (1/rad²), without resonance.
+const LARGEST_HARMONIC: f64 = 1.0 / 20.0;
+
 /// Whether a mode lies at three times the slowest frequency.
 pub(super) fn is_on_third_harmonic(fit: &SinusoidFit, mode: usize) -> bool {
     let times = fit.poles[mode].omega_rad_s / fit.poles[0].omega_rad_s;
@@ -234,7 +254,7 @@ pub(super) fn harmonic_share(fit: &SinusoidFit, mode: usize) -> f64 {
     if !is_on_third_harmonic(fit, mode) {
         return 0.0;
     }
-    (fit.amplitude_rad(0).powi(3) / 20.0 / fit.amplitude_rad(mode).max(f64::MIN_POSITIVE)).min(1.0)
+    (fit.amplitude_rad(0).powi(3) * LARGEST_HARMONIC / fit.amplitude_rad(mode).max(f64::MIN_POSITIVE)).min(1.0)
 }
 
 impl Choice {

@@ -304,13 +304,16 @@ fn of_linear_damper(envelope: &Envelope, bounds: Bounds, measured: Measured) -> 
 /// The mode's history in the windows of all modes; where those cannot show it, in windows of its own cycles.
 fn envelope_of(whole: &Whole, mode: usize) -> Result<Envelope, String> {
     let bounds = Bounds::of(mode == 0, whole.measured);
-    let shared = whole.windows.as_ref().map_err(Clone::clone).and_then(|w| Envelope::of(w, mode, bounds));
+    let of = |windows: &Windows, own: usize| {
+        Envelope::of(windows, own, bounds, |t_s| whole.harmonic_rad(mode, t_s, windows.window_s))
+    };
+    let shared = whole.windows.as_ref().map_err(Clone::clone).and_then(|windows| of(windows, mode));
     if shared.is_ok() || whole.fit.poles.len() == 1 {
         return shared;
     }
     let own = Windows::of_mode(whole.signal, whole.fit, mode)?;
     let others = (0..whole.fit.poles.len()).filter(|m| *m != mode).map(|m| whole.fit.amplitude_rad(m));
-    Ok(Envelope::of(&own, 0, bounds)?.widened_for_other_modes(others))
+    Ok(of(&own, 0)?.widened_for_other_modes(others))
 }
 
 /// Whether a mode is on the third harmonic of the slowest one throughout, and in the end no larger than that harmonic may be; where there are no windows, by the whole

@@ -41,6 +41,11 @@ impl WindowAmplitude {
     pub fn amplitude_rad(&self) -> f64 {
         (self.amplitude_rad.norm_sqr() - self.sd_rad * self.sd_rad).max(0.0).sqrt()
     }
+
+    /// Whether its phase can be followed.
+    fn is_clear(&self) -> bool {
+        self.amplitude_rad.norm() > CLEAR_OF_NOISE * self.sd_rad
+    }
 }
 
 /// The windows of a recording.
@@ -124,6 +129,13 @@ impl Windows {
         }
         windows.fits = fits;
         Ok(windows)
+    }
+
+    /// The moments of a mode, up to where something else of a size that is known at each instant (rad) may stand in its place.
+    pub fn clear_of(&self, mode: usize, other_rad: impl Fn(f64) -> f64) -> Vec<WindowAmplitude> {
+        let beside_other =
+            |own: &WindowAmplitude| WindowAmplitude { sd_rad: own.sd_rad.hypot(other_rad(own.t_s)), ..*own };
+        self.moments[mode].iter().map(beside_other).take_while(WindowAmplitude::is_clear).collect()
     }
 
     /// One mode alone in windows of its own cycles, every other one taken away as the whole record's fit has it.
@@ -253,5 +265,5 @@ fn moments(local: &[&SinusoidFit], mode: usize, shape: &[Complex<f64>]) -> Vec<W
         }
     });
     let sound = |m: &WindowAmplitude| m.sd_rad > 0.0 && m.sd_rad.is_finite();
-    each.filter(sound).take_while(|m| m.amplitude_rad.norm() > CLEAR_OF_NOISE * m.sd_rad).collect()
+    each.filter(sound).take_while(WindowAmplitude::is_clear).collect()
 }

@@ -104,6 +104,8 @@ pub struct Measurement {
 pub struct Camera {
     /// Greatest shift, px, that two of the pictures looked at beforehand show or, where it is taken out, in any frame.
     pub greatest_shift_px: f64,
+    /// The pictures looked at beforehand tell whether it moves.
+    pub is_told: bool,
     /// It is taken out of the marks' positions.
     pub taken_out: bool,
     /// Frames in which too little of the background was found again; nothing is measured in them.
@@ -179,6 +181,9 @@ impl<'a> Session<'a> {
         let (trials, surveyed) = rayon::join(marks, || survey::camera(&pictures, options, &stream));
         let mut trials = trials?;
         let SurveyedCamera { background, camera, still, shifts } = surveyed;
+        if options.steadying == Steadying::Always && !camera.taken_out {
+            return Err(nothing_steady());
+        }
         if album.steady(shifts) {
             hues = sought;
             trials = album.calibrate(&mut hues, options.threshold)?;
@@ -365,6 +370,9 @@ impl<'a> Session<'a> {
             let message = format!("no frame lies between --from and --until; the file holds {} frames", decoded.frames);
             return Err(Error::Option { option: "--from".to_owned(), message });
         }
+        if self.camera.lost_frames == self.stamps_s.len() {
+            return Err(nothing_steady());
+        }
         let (mut tracks, found) = tracker.finish();
         let (rig, frames) = (&self.options.rig, self.stamps_s.len() as u64);
         let rejected = Rejected { path: &self.path, album: &self.album, hues: &self.hues, frames, rig };
@@ -385,6 +393,12 @@ impl<'a> Session<'a> {
         let marks = self.slots.iter().map(|slot| hues[usize::from(slot.hue)].colour.clone()).collect();
         Ok(Measurement { stream, decoded, timing, hues, marks, tracks, angles, file_t_s, time_scale, camera, siting })
     }
+}
+
+/// The camera's motion cannot be taken out.
+fn nothing_steady() -> Error {
+    let message = "too little of what stands still has clear edges to tell where the camera looks; name corners or dots on it with --reference, or leave the option out".to_owned();
+    Error::Option { option: "--steady always".to_owned(), message }
 }
 
 impl Camera {

@@ -190,7 +190,7 @@ pub fn camera(pictures: &[OwnedPicture], options: &Options, stream: &StreamInfo)
     background.keep_steady(&agreed);
     let taken_out = taken_out && background.is_usable();
     let greatest_shift_px = if silent { 0.0 } else { greatest_px };
-    let camera = Camera { greatest_shift_px, taken_out, ..Camera::default() };
+    let camera = Camera { greatest_shift_px, is_told: !silent, taken_out, ..Camera::default() };
     SurveyedCamera {
         background: taken_out.then_some(background),
         camera,

@@ -148,6 +148,17 @@ impl Arc {
         part(0).max(part(1))
     }
 
+    /// Whether a point lies on the line from the middle of the path to the centre, at whatever distance: a plane of swing that is turned moves the centre along it, not aside.
+    pub fn is_on_line(&self, place_px: [f64; 2], middle_px: [f64; 2]) -> bool {
+        let [x, y] = [0, 1].map(|k| self.centre_px[k] - middle_px[k]);
+        let length_px = x.hypot(y).max(f64::MIN_POSITIVE);
+        let (x, y) = (x / length_px, y / length_px);
+        let [dx, dy] = [0, 1].map(|k| place_px[k] - middle_px[k]);
+        let sd_px = (y * self.sd_px[0]).hypot(x * self.sd_px[1]);
+        let limit_px = CENTRE_DEVIATIONS * sd_px + CENTRE_OFF_PX + CENTRE_OFF * self.radius_px;
+        (x * dy - y * dx).abs() < limit_px && x * dx + y * dy > 0.0
+    }
+
     /// A mark there may show the hinge.
     pub fn is_near(&self, place_px: [f64; 2]) -> bool {
         self.off_centre(place_px) < 1.0
@@ -169,6 +180,18 @@ fn algebraic(points: &[[f64; 2]]) -> Option<Vector3<f64>> {
 
 #[cfg(test)]
 mod tests {
+    #[test]
+    fn a_turned_plane_moves_the_centre_along_the_line_of_the_swing_and_not_aside() {
+        let swing = |turned: f64| -> Vec<[f64; 2]> {
+            let angle = |k: usize| 0.35 * (0.2 * k as f64).sin();
+            (0..200).map(|k| [640.0 + turned * 420.0 * angle(k).sin(), 80.0 + 420.0 * angle(k).cos()]).collect()
+        };
+        let arc = Arc::of(&swing(0.8), 18.0).unwrap();
+        let middle_px = [640.0, 490.0];
+        assert!(!arc.is_near([640.0, 80.0]) && arc.is_on_line([640.0, 80.0], middle_px), "{arc:?}");
+        assert!(!arc.is_on_line([605.0, 122.0], middle_px) && !arc.is_on_line([640.0, 900.0], middle_px));
+    }
+
     use super::*;
 
     fn swing(amplitude_rad: f64, noise_px: f64) -> Vec<[f64; 2]> {

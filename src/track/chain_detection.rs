@@ -3,6 +3,8 @@
 
 use super::TrackedObject;
 use super::arc::Arc;
+use super::choose::SAME_AREA;
+use super::steadiness::ROUGH_PX;
 
 /// Change of a distance over the motion beyond which two things are not on one link (judgement: a plane of swing turned by 45° out of
 /// the picture gives 0.1 at an amplitude of 30°).
@@ -19,10 +21,8 @@ pub const CHANCE: f64 = 0.5 * STRAY;
 /// marks, the clearer one counts (judgement).
 const BLURRED_ARC: f64 = 0.2;
 /// Change of the distance from a still thing, over the motion, up to which it is the hinge though the arc's centre is
-/// elsewhere: the plane of the swing is turned, and the arc an ellipse. And how far it may lie off the line towards
-/// that centre, rad (judgement).
+/// elsewhere on the line towards that centre: the plane of the swing is turned, and the arc an ellipse (judgement).
 const HINGE_STRETCH: f64 = 0.1;
-const HINGE_OFF_LINE_RAD: f64 = 0.1;
 /// How many times as large as all of its parts together a thing is that they are parts of, and how far from its middle
 /// they lie, in its radii (judgement).
 const PARTS_TIMES: f64 = 2.0;
@@ -35,8 +35,10 @@ pub const LEAST_TURN: f64 = 0.02;
 const LEAST_TURN_PX: f64 = 0.3;
 /// [`kurtosis`] of normally distributed noise (statistics).
 const KURTOSIS_OF_NOISE: f64 = 3.0;
-/// Part of its own radius by which a thing swings at least (judgement: what covers a thing at its edge shifts it by less).
+/// Part of its own radius by which a thing that is mostly at rest swings at least (judgement: what covers a thing at its edge shifts it by less).
 const LEAST_TRAVEL: f64 = 0.25;
+/// The same of what is never at rest: a part of its area that does not show at its size shifts it by so much.
+const LEAST_SHIFT: f64 = SAME_AREA / (1.0 - SAME_AREA);
 /// Correlation of two paths from which on one moves with the other (judgement: half).
 const MOVES_WITH: f64 = 0.5;
 /// What a chain whose first mark swings by less than its own radius is worth less: anything else that swings comes first (judgement).
@@ -127,7 +129,7 @@ fn of_look(
         sets.max_by(|(a, _), (b, _)| worth(a).total_cmp(&worth(b)).then(farthest_px(a).total_cmp(&farthest_px(b))))?;
     let slight = slight(&marks);
     let mut hinge_marked = false;
-    let blurred = arc.map_or(0.0, |arc| arc.residual_px / (MOST_OFF_ARC * things[marks[0]].travel_px));
+    let blurred = arc.map_or(0.0, |arc| arc.residual_px / most_off_arc_px(&things[marks[0]]));
     if let Some(arc) = arc
         && let Some(hinge) = hinge(things, belongs, &arc, marks[0])
     {
@@ -160,11 +162,16 @@ fn are_parts(things: &[TrackedObject], marks: &[usize], bears: &dyn Fn(&TrackedO
 fn hangs(things: &[TrackedObject], marks: &[usize]) -> Option<Option<Arc>> {
     let first = &things[*marks.first()?];
     let path = first.places_px();
-    let most_px = MOST_OFF_ARC * first.travel_px;
+    let most_px = most_off_arc_px(first);
     match Arc::of(&path, first.radius_px()) {
         Some(arc) => (arc.residual_px < most_px).then_some(Some(arc)),
         None => (off_line_px(&path) < most_px).then_some(None),
     }
+}
+
+/// How far a thing's path may lie off a circle; its places were looked at roughly.
+fn most_off_arc_px(thing: &TrackedObject) -> f64 {
+    ROUGH_PX.hypot(MOST_OFF_ARC * thing.travel_px)
 }
 
 /// The same of marks in the picture's order, of which an upper one swings farther: two links that swing in opposite phase, and so at one frequency.
@@ -174,15 +181,13 @@ fn hangs_against(things: &[TrackedObject], marks: &[usize]) -> Option<Arc> {
     hangs(things, marks)?.filter(|arc| shows_centre(arc, first) && marks.iter().all(together))
 }
 
-/// A still thing that something covers from time to time seems to move as well: by no more than its area changes for; by less than a quarter of its radius; or by less
-/// than its radius, about no clear centre or about a point within itself, and mostly in the middle of its way, where what swings seldom is until it has decayed.
+/// A still thing that something covers from time to time seems to move as well: by no more than its area changes for; or mostly in the middle of its way, where what
+/// swings seldom is until it has decayed, by less than its radius, about no clear centre or about a point within itself, or by less than a quarter of its radius.
 fn is_covered(thing: &TrackedObject) -> bool {
-    if !thing.moves_whole || thing.travel_px < LEAST_TRAVEL * thing.radius_px() {
-        return true;
-    }
-    let path = thing.places_px();
+    let (path, travel) = (thing.places_px(), thing.travel_px / thing.radius_px());
+    let rests = || is_slight(thing) && kurtosis(&path) > KURTOSIS_OF_NOISE;
     let shows = || Arc::of(&path, thing.radius_px()).is_some_and(|arc| shows_centre(&arc, thing));
-    is_slight(thing) && kurtosis(&path) > KURTOSIS_OF_NOISE && !shows()
+    !thing.moves_whole || travel < LEAST_SHIFT || rests() && (travel < LEAST_TRAVEL || !shows())
 }
 
 /// A thing's path shows where it hangs, and not within itself.
@@ -319,11 +324,7 @@ fn hinge(things: &[TrackedObject], belongs: &dyn Fn(&TrackedObject) -> bool, arc
     let still = |t: &TrackedObject| t.travel_px < 0.1 * things[first].travel_px;
     let stays = |t: &TrackedObject| t.stretch(&things[first]) < MOST_STRETCH;
     let middle = things[first].place_px();
-    let towards = |p: [f64; 2]| (p[1] - middle[1]).atan2(p[0] - middle[0]);
-    let on_line = |t: &TrackedObject| {
-        let turn = towards(t.place_px()) - towards(arc.centre_px);
-        turn.sin().abs() < HINGE_OFF_LINE_RAD && turn.cos() > 0.0 && t.stretch(&things[first]) < HINGE_STRETCH
-    };
+    let on_line = |t: &TrackedObject| arc.is_on_line(t.place_px(), middle) && t.stretch(&things[first]) < HINGE_STRETCH;
     let fits = |t: &TrackedObject| belongs(t) && t.presence > LEAST_PRESENCE && still(t) && like(t) && stays(t);
     (0..things.len())
         .filter(|i| *i != first && fits(&things[*i]) && (off(&things[*i]) < 1.0 || on_line(&things[*i])))
@@ -389,9 +390,11 @@ mod tests {
         };
         // an area of 300 px² has a radius of 9.8 px
         assert!(rocks(1.0).is_none());
-        assert!(rocks(4.0).is_some(), "an even swing of less than its radius");
-        let covered = |t: f64| [90.0 + 4.0 * (3.0 * t).sin().powi(9), 190.0 + 0.003 * (9.0 * t).cos()];
-        assert!(longest(&[thing(0, covered, true)], &names).is_none(), "mostly at rest");
+        assert!(rocks(2.0).is_some() && rocks(4.0).is_some(), "an even swing of less than its radius");
+        for size_px in [2.0, 4.0] {
+            let covered = |t: f64| [90.0 + size_px * (3.0 * t).sin().powi(9), 190.0 + 0.003 * (9.0 * t).cos()];
+            assert!(longest(&[thing(0, covered, true)], &names).is_none(), "mostly at rest");
+        }
         let swings = |t: f64| {
             let theta: f64 = 0.2 * (3.0 * t).sin();
             [400.0 + 40.0 * theta.sin(), 50.0 + 40.0 * theta.cos()]

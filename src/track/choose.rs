@@ -53,7 +53,7 @@ const LEAST_PRESENCE: f64 = 0.2;
 const SPARE_CANDIDATES: usize = 5;
 
 /// Part by which areas of one and the same thing, seen whole, differ.
-const SAME_AREA: f64 = 0.1;
+pub(super) const SAME_AREA: f64 = 0.1;
 
 /// A tracklet as a candidate.
 pub(super) struct Candidate {

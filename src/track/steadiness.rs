@@ -15,7 +15,7 @@ const ORDER: usize = 4;
 /// As few foretold places tell nothing of how well they are: there are nearly as many weights.
 const FEWEST: usize = 2 * ORDER;
 /// What a place that was looked at roughly is off, px.
-const ROUGH_PX: f64 = 0.2;
+pub(super) const ROUGH_PX: f64 = 0.2;
 /// What is foretold to this part of its motion is as likely a mark as not (training: marks of 40 films miss it by less than 0.011 of it, two by 0.06; spots of
 /// brick and wood by 0.04 to 0.6).
 const UNSTEADY: f64 = 0.03;

@@ -29,6 +29,10 @@ pub struct Scene {
     pub still: Vec<([f64; 2], f64, Rgb)>,
     pub exposure_s: f64,
     pub shake_px: f64,
+    /// The camera turns away, so far to the left a second.
+    pub drift_px_s: f64,
+    /// A wall of one grey shows no shift.
+    pub plain_wall: bool,
     /// From when to when the two lower marks are to be seen.
     pub uncovered_s: [f64; 2],
     /// A second pendulum beside the first.
@@ -50,6 +54,8 @@ impl Default for Scene {
             still: Vec::new(),
             exposure_s: 0.002,
             shake_px: 0.0,
+            drift_px_s: 0.0,
+            plain_wall: false,
             uncovered_s: [0.0, f64::MAX],
             twin: false,
             passing: false,
@@ -75,8 +81,9 @@ impl Scene {
 
     fn picture(&self, frame: usize) -> Canvas {
         let t_s = frame as f64 / RATE_HZ;
-        let shift = [1.0, 0.7].map(|part| part * self.shake_px * (7.0 * t_s + part).sin());
-        let mut canvas = Canvas::wall(shift);
+        let shaken = [1.0, 0.7].map(|part| part * self.shake_px * (7.0 * t_s + part).sin());
+        let shift = moved(shaken, [self.drift_px_s * t_s, 0.0]);
+        let mut canvas = Canvas::wall(shift, if self.plain_wall { 0.0 } else { 1.0 });
         for (at, radius_px, colour) in &self.still {
             canvas.disc(moved(*at, shift), *radius_px, *colour, 1.0);
         }
@@ -167,10 +174,10 @@ struct Canvas {
 
 impl Canvas {
     /// A grey wall with stains of many sizes, no two alike.
-    fn wall(shift: [f64; 2]) -> Self {
+    fn wall(shift: [f64; 2], stains: f64) -> Self {
         let at = |i: usize| {
             let [x, y] = [(i % SIZE[0]) as f64 - shift[0] + 40.0, (i / SIZE[0]) as f64 - shift[1] + 40.0];
-            (118.0 + 7.0 * stain(x / 9.0, y / 9.0) + 5.0 * stain(x / 31.0, y / 31.0)) as f32
+            (118.0 + stains * (7.0 * stain(x / 9.0, y / 9.0) + 5.0 * stain(x / 31.0, y / 31.0))) as f32
         };
         Self { rgb: (0..SIZE[0] * SIZE[1]).map(at).map(|v| [v, v * 0.99, v * 0.97]).collect() }
     }
