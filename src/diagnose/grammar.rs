@@ -2,7 +2,7 @@
 //!
 //! ```text
 //! a · place × state × shape × modulation
-//! place       hinge, joint, strip, tip
+//! place       hinge, joint (all of them, or one of several), strip, tip
 //! state       the angle there, its rate, the wind across the strip
 //! shape       |u|^p sgn u (p = 0 … 3), u², constant, one-sided, with play, a stop on one side, a bump, a pull near the middle, a sign that fades with speed
 //! modulation  1, growing with time, fading with time, from an instant on; of what goes with a rate also with the angle, as of a magnet at the lowest point;
@@ -30,13 +30,13 @@ pub struct Term {
     pub drifts: bool,
 }
 
-/// Place, state, shape and modulation of a term.
-pub type Form = (LawPlace, &'static str, &'static str, &'static str);
+/// Place, the only joint, state, shape and modulation of a term.
+pub type Form = (LawPlace, Option<usize>, &'static str, &'static str, &'static str);
 
 impl Term {
     /// What it is, whatever its coefficients are: place, state, shape and modulation.
     pub fn form(&self) -> Form {
-        (self.law.place, self.state, self.shape, self.modulation)
+        (self.law.place, self.law.joint, self.state, self.shape, self.modulation)
     }
 
     /// The same under the name of the place at which it stands in a law.
@@ -44,6 +44,13 @@ impl Term {
     pub fn named(&self, place: usize) -> Self {
         let law = Law { name: format!("learnt {}", place + 1), ..self.law.clone() };
         Self { law, ..self.clone() }
+    }
+
+    /// The same at one joint alone.
+    #[must_use]
+    pub fn at_joint(mut self, joint: usize) -> Self {
+        self.law.joint = Some(joint);
+        self
     }
 
     /// What it becomes where its further coefficients say nothing, or where it does not change: a sign that fades at a speed beyond all that were seen is a sign.
@@ -55,6 +62,7 @@ impl Term {
         };
         let shape = shapes().find(|shape| shape.words == words)?;
         let mut plain = term(self.law.place, self.state, (shape, &[]), None);
+        plain.law.joint = self.law.joint;
         plain.law.parameters.get_mut("a")?.start = self.law.parameters.get("a")?.start;
         Some(plain)
     }
@@ -261,7 +269,7 @@ fn term(
         let unit = if times.contains("angle") { "rad" } else { "s" };
         parameters.insert("d".to_owned(), coefficient(d, Some(1e-3 * d), unit));
     }
-    let law = Law { name: "learnt".to_owned(), place, formula, parameters };
+    let law = Law { name: "learnt".to_owned(), place, joint: None, formula, parameters };
     let modulation = changes.map_or(NO_MODULATION, |(modulation, _)| modulation.words);
     let drifts = WITH_TIME.iter().any(|own| own.words == modulation);
     Term { law, state, shape: shape.words, modulation, drifts }

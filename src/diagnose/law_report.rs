@@ -36,6 +36,8 @@ pub struct LearntLaw {
 pub struct WrittenTerm {
     /// Where it acts.
     pub place: &'static str,
+    /// The only joint, where it is not all of them.
+    pub joint: Option<usize>,
     /// On what it depends.
     pub state: &'static str,
     /// How.
@@ -93,6 +95,7 @@ impl WrittenTerm {
         });
         Self {
             place: law.place.id(),
+            joint: law.joint,
             state: term.state,
             shape: term.shape,
             modulation: term.modulation,
@@ -107,9 +110,10 @@ impl WrittenTerm {
 fn toml_of(term: &Term) -> String {
     let law = &term.law;
     let mut text = format!(
-        "[[model.law]]\nname = \"{}\"\nplace = \"{}\"\n{} = \"{}\"\n",
+        "[[model.law]]\nname = \"{}\"\nplace = \"{}\"\n{}{} = \"{}\"\n",
         law.name,
         law.place.id(),
+        law.joint.map_or(String::new(), |joint| format!("joint = {joint}\n")),
         law.place.key(),
         law.formula
     );
@@ -130,6 +134,7 @@ mod tests {
     fn a_file_takes_every_term_back() {
         for place in [LawPlace::Hinge, LawPlace::Joint, LawPlace::Strip, LawPlace::Tip] {
             for term in terms(place, StateRange { angle: 0.5, rate: 4.0, time_s: 30.0 }) {
+                let term = if place == LawPlace::Joint { term.at_joint(1) } else { term };
                 let read = Experiment::parse(&toml_of(&term), std::path::Path::new("e.toml")).unwrap();
                 assert_eq!(read.model.law, vec![term.law]);
             }

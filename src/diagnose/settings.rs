@@ -148,6 +148,9 @@ pub struct SearchSettings {
     pub fewest_pairs: usize,
     /// A pair that promises more than this many times the least χ² is not fitted (cost).
     pub promising: f64,
+    /// Of the largest error of the measurement that is possible, the part up to which one is usual, and what it explains is explained (statistics: two standard deviations
+    /// of three).
+    pub usual_error: f64,
     /// An effect that leaves less than this part of the base model's χ² leads the others (training bank)…
     pub leader_leaves: f64,
     /// … elsewhere, where a parameter of the base model differs by more than this part (training bank).
@@ -386,6 +389,7 @@ impl Default for SearchSettings {
             most_pairs: 20,
             fewest_pairs: 6,
             promising: 3.0,
+            usual_error: 2.0 / 3.0,
             leader_leaves: 0.5,
             elsewhere: 0.3,
             frequency_match_residual: 0.1,

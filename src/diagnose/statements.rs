@@ -320,12 +320,13 @@ impl Findings<'_> {
 
 /// A term of a law, with its place and unit.
 fn words_of_term(term: &Term) -> String {
-    let place = match term.law.place {
-        LawPlace::Hinge => "a torque at the hinge",
-        LawPlace::Joint => "a torque in the joint",
-        LawPlace::Strip => "a force per length across the strip",
-        LawPlace::Tip => "a force across the tip",
-        LawPlace::Support => "an acceleration of the support",
+    let place = match (term.law.place, term.law.joint) {
+        (LawPlace::Joint, Some(joint)) => &format!("a torque in the joint below link {joint}"),
+        (LawPlace::Hinge, _) => "a torque at the hinge",
+        (LawPlace::Joint, None) => "a torque in the joint",
+        (LawPlace::Strip, _) => "a force per length across the strip",
+        (LawPlace::Tip, _) => "a force across the tip",
+        (LawPlace::Support, _) => "an acceleration of the support",
     };
     format!("{place} of {} {}", term.formula_with_values(), term.law.place.unit())
 }

@@ -91,6 +91,9 @@ pub struct Law {
     pub name: String,
     /// Where it acts.
     pub place: LawPlace,
+    /// Of a law in the joints, the only one at which it acts: 1 is that below the first link.
+    #[serde(default)]
+    pub joint: Option<usize>,
     /// What it exerts, of the state there and its coefficients.
     #[serde(rename = "torque_n_m", alias = "force_n_per_m", alias = "force_n", alias = "acceleration_m_s2")]
     pub formula: String,
@@ -118,6 +121,9 @@ impl Law {
 
     pub(super) fn validate(&self) -> Result<(), String> {
         let wrong = |message: String| format!("model.law \"{}\": {message}", self.name);
+        if self.joint.is_some() && self.place != LawPlace::Joint {
+            return Err(wrong(format!("joint is for place = \"joint\", and its place is {}", self.place.id())));
+        }
         let expression = self.expression().map_err(wrong)?;
         let state = self.place.variables();
         for (index, (name, own)) in self.parameters.iter().enumerate() {
@@ -135,6 +141,20 @@ impl Law {
         }
         Ok(())
     }
+}
+
+/// Laws whose joints are there, of a specimen of so many links; `bends` is a strip that does all along, and has none.
+pub(super) fn validate_joints(laws: &[Law], links: usize, bends: bool) -> Result<(), String> {
+    let joints = if bends { 0 } else { links.saturating_sub(1) };
+    let absent = laws.iter().find_map(|law| Some((law, law.joint.filter(|joint| !(1..=joints).contains(joint))?)));
+    let Some((law, joint)) = absent else { return Ok(()) };
+    let there = match joints {
+        0 if bends => "a strip that bends all along has no joints to tell apart".to_owned(),
+        0 => "one link has no joint".to_owned(),
+        1 => "the only joint is 1".to_owned(),
+        more => format!("the joints are 1 to {more}"),
+    };
+    Err(format!("model.law \"{}\": joint = {joint}: {there}", law.name))
 }
 
 /// Laws with different names, each sound.
@@ -171,5 +191,20 @@ mod tests {
         assert_eq!(wrong, "e.toml: model.law \"rub\": parameters.a.start = -1 lies below its min = 0");
         let wrong = refused("torque_n_m = \"-t * rate\"\nparameters.t = { start = 1.0 }");
         assert!(wrong.contains("a parameter cannot be called t"), "{wrong}");
+    }
+
+    #[test]
+    fn a_joint_must_be_there() {
+        let refused = |law: &str| {
+            let text = format!("[[model.law]]\nname = \"pin\"\ntorque_n_m = \"-rate\"\n{law}\n");
+            Experiment::parse(&text, std::path::Path::new("e.toml")).err().map(|wrong| wrong.to_string())
+        };
+        assert_eq!(refused("place = \"joint\"\njoint = 1"), None);
+        let wrong = |law: &str| refused(law).unwrap();
+        assert!(wrong("place = \"joint\"\njoint = 2").ends_with("model.law \"pin\": joint = 2: the only joint is 1"));
+        assert!(wrong("place = \"joint\"\njoint = 0").ends_with("joint = 0: the only joint is 1"));
+        assert!(
+            wrong("place = \"hinge\"\njoint = 1").ends_with("joint is for place = \"joint\", and its place is hinge")
+        );
     }
 }

@@ -200,6 +200,9 @@ impl Experiment {
         experiment.specimen.validate().map_err(invalid)?;
         experiment.rig.validate().map_err(invalid)?;
         experiment.model.validate().map_err(invalid)?;
+        let bends = experiment.model.effects.distributed_flexibility.is_some();
+        let links = experiment.specimen.lengths_m().len();
+        law::validate_joints(&experiment.model.law, links, bends).map_err(invalid)?;
         experiment.render.validate().map_err(invalid)?;
         let length_m = experiment.specimen.length_m;
         experiment.light.as_ref().map_or(Ok(()), |light| light.validate(length_m)).map_err(invalid)?;

@@ -37,15 +37,17 @@ fn everything() -> ForwardModel {
 
 /// A law at every place.
 fn stated_laws() -> Vec<Law> {
-    let of = |place: &str, formula: &str| {
+    let named = |name: &str, place: &str, formula: &str| {
         let text = format!(
-            "[[model.law]]\nname = \"{place}\"\nplace = \"{place}\"\ntorque_n_m = \"{formula}\"\nparameters.a = {{ start = 0.1 }}\n"
+            "[[model.law]]\nname = \"{name}\"\nplace = \"{place}\"\ntorque_n_m = \"{formula}\"\nparameters.a = {{ start = 0.1 }}\n"
         );
         Experiment::parse(&text, std::path::Path::new("e.toml")).unwrap().model.law.remove(0)
     };
+    let of = |place: &str, formula: &str| named(place, place, formula);
     vec![
         of("hinge", "-1e-5 * a * rate * angle ^ 2 * exp(-t) * (1 + 1e3 * load ^ 2)"),
         of("joint", "-1e-5 * a * (max(rate, 0) + sin(angle)) * (1 + 1e3 * load)"),
+        Law { joint: Some(2), ..named("lower joint", "joint", "-3e-5 * a * rate * load") },
         of("strip", "-a * wind ^ 3 * t"),
         of("tip", "-1e-2 * a * abs(wind) * wind"),
         of("support", "a * cos(3 * t)"),
@@ -97,6 +99,34 @@ fn partials_are_the_differences_of_the_torques() {
     }
     close(partials.pivot_velocity.as_slice(), slope(&model, &motion, 1e-5, |m, e| m.pivot_m_s += e), "ẋₚ");
     close(partials.pivot_acceleration.as_slice(), slope(&model, &motion, 1e-3, |m, e| m.pivot_m_s2 += e), "ẍₚ");
+}
+
+#[test]
+fn a_law_at_one_joint_acts_on_its_two_links_alone() {
+    let mut experiment = experiment(0.0, 0.0, Effects::default());
+    experiment.specimen.link_lengths_m = vec![0.06, 0.09, 0.05];
+    let torques = |laws: Vec<Law>| {
+        let model = ForwardModel::of(&Experiment {
+            model: Model { law: laws, ..experiment.model.clone() },
+            ..experiment.clone()
+        });
+        let mut motion = model.as_ref().unwrap().motion(0.0, &[0.4, -0.3, 0.8], &[2.0, -3.0, 4.0]);
+        motion.acceleration.fill(0.0);
+        let mut q = vec![0.0; 3];
+        model.unwrap().torque(&motion, &mut q);
+        q
+    };
+    let law = |joint| {
+        let text = "[[model.law]]\nname = \"pin\"\nplace = \"joint\"\ntorque_n_m = \"-1e-5 * rate\"\n";
+        Law { joint, ..Experiment::parse(text, std::path::Path::new("e.toml")).unwrap().model.law.remove(0) }
+    };
+    let none = torques(Vec::new());
+    let of =
+        |joint| -> Vec<f64> { torques(vec![law(joint)]).iter().zip(&none).map(|(with, none)| with - none).collect() };
+    let [first, second, both] = [Some(1), Some(2), None].map(of);
+    let near = |a: &[f64], b: [f64; 3]| a.iter().zip(b).all(|(a, b)| (a - b).abs() < 1e-12);
+    assert!(near(&first, [-5e-5, 5e-5, 0.0]) && near(&second, [0.0, 7e-5, -7e-5]), "{first:?} {second:?}");
+    assert!(near(&both, [-5e-5, 12e-5, -7e-5]), "{both:?}");
 }
 
 #[test]
@@ -303,6 +333,7 @@ fn a_formula_with_the_sign_of_the_rate_at_the_hinge_is_dry_friction() {
         let law = Law {
             name: "own".to_owned(),
             place: LawPlace::Hinge,
+            joint: None,
             formula: text.to_owned(),
             parameters: parameters.into(),
         };

@@ -120,10 +120,18 @@ fn told_apart(torques: &DMatrix<f64>, the_same: f64) -> Vec<usize> {
 fn effects_of_terms(fit: &Refit<'_>, rows: usize) -> Option<(Vec<Term>, DMatrix<f64>, DMatrix<f64>)> {
     let around = Linearisation::of_all(fit)?;
     let swings = swings(fit, &around)?;
-    let places = [LawPlace::Hinge, LawPlace::Joint, LawPlace::Strip, LawPlace::Tip];
-    let places = places.into_iter().filter(|place| *place != LawPlace::Joint || fit.problem.marks() > 1);
-    let all: Vec<Term> =
-        places.flat_map(|place| terms(place, largest(&swings, place, fit.problem.longest_s()))).collect();
+    let at = |place: LawPlace, joint: Option<usize>| {
+        let terms = terms(place, largest(&swings, (place, joint), fit.problem.longest_s()));
+        terms.into_iter().map(move |term| joint.map_or(term.clone(), |joint| term.at_joint(joint)))
+    };
+    let joints = fit.problem.marks() - 1;
+    // all joints alike, and of several each by itself
+    let of_joints = (joints > 0).then_some(None).into_iter().chain((1..=joints).filter(|_| joints > 1).map(Some));
+    let all: Vec<Term> = at(LawPlace::Hinge, None)
+        .chain(of_joints.flat_map(|joint| at(LawPlace::Joint, joint)))
+        .chain(at(LawPlace::Strip, None))
+        .chain(at(LawPlace::Tip, None))
+        .collect();
     let column = |term: &Term| {
         let mut unit = term.law.clone();
         unit.parameters.get_mut("a")?.start = 1.0;
@@ -142,8 +150,8 @@ fn effects_of_terms(fit: &Refit<'_>, rows: usize) -> Option<(Vec<Term>, DMatrix<
     Some((all, matrix, torques))
 }
 
-/// The largest state at a place.
-fn largest(swings: &[Swing<'_>], place: LawPlace, time_s: f64) -> StateRange {
+/// The largest state at a place, or at one joint.
+fn largest(swings: &[Swing<'_>], (place, joint): (LawPlace, Option<usize>), time_s: f64) -> StateRange {
     let mut largest = StateRange { angle: 1e-6, rate: 1e-6, time_s };
     for (motion, swing) in swings.iter().flat_map(|swing| swing.motions().map(move |motion| (motion, swing))) {
         let links = motion.links();
@@ -153,7 +161,7 @@ fn largest(swings: &[Swing<'_>], place: LawPlace, time_s: f64) -> StateRange {
         };
         match place {
             LawPlace::Hinge | LawPlace::Support => meet(motion.theta_rad[0], motion.rate[0]),
-            LawPlace::Joint => (1..links).for_each(|i| {
+            LawPlace::Joint => (1..links).filter(|i| joint.is_none_or(|only| only == *i)).for_each(|i| {
                 meet(motion.theta_rad[i] - motion.theta_rad[i - 1], motion.rate[i] - motion.rate[i - 1]);
             }),
             LawPlace::Strip | LawPlace::Tip => meet(0.0, swing.fastest_m_s(motion)),

@@ -11,6 +11,8 @@ use crate::model::{Chain, Motion, Parameter, Partials};
 #[derive(Debug, Clone)]
 pub struct Formula {
     place: LawPlace,
+    /// The lower link of the only joint at which it acts.
+    only_at: Option<usize>,
     expression: Expression,
     coefficients: Vec<Parameter>,
     /// The state where it is looked at, then the values of the coefficients; last, where it is dry friction of the hinge, the sign of the rate.
@@ -59,6 +61,7 @@ impl Formula {
         let coefficients = law.coefficients().map(|(parameter, _)| parameter).collect();
         Some(Self {
             place: law.place,
+            only_at: law.joint,
             values: values.collect(),
             expression: dry.unwrap_or(stated),
             coefficients,
@@ -101,9 +104,9 @@ impl Formula {
         };
         match self.place {
             LawPlace::Hinge => act(&Acts::Hinge, theta[0], rate[0], 0),
-            LawPlace::Joint => {
-                (1..chain.count()).for_each(|i| act(&Acts::Joint(i), theta[i] - theta[i - 1], rate[i] - rate[i - 1], i))
-            }
+            LawPlace::Joint => (1..chain.count())
+                .filter(|i| self.only_at.is_none_or(|only| only == *i))
+                .for_each(|i| act(&Acts::Joint(i), theta[i] - theta[i - 1], rate[i] - rate[i - 1], i)),
             LawPlace::Support => each(&Acts::Support, self.at(&evaluate, &[t_s], motion.hinge.sign()), None),
             LawPlace::Strip | LawPlace::Tip => {}
         }
