@@ -5,7 +5,6 @@ use crate::experiment::Experiment;
 use crate::hand_hold::{caught_of, released_of};
 use crate::measure::{Measurement, Options, Steadying};
 use crate::statistics::median;
-
 use crate::track::chain_detection::{LEAST_TURN, MOST_MARKS};
 use crate::track::{Point, UnusedObject};
 

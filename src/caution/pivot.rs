@@ -50,8 +50,7 @@ pub(super) fn moves(m: &Measurement, options: &Options) -> Option<String> {
     let (cos, sin) = (dx / length_px, dy / length_px);
     let aside_px =
         (cos * (last.centre_px[1] - first.centre_px[1]) - sin * (last.centre_px[0] - first.centre_px[0])).abs();
-    let sd_px =
-        [first, last].map(|arc| (cos * arc.sd_px[1]).hypot(sin * arc.sd_px[0])).into_iter().fold(0.0, f64::hypot);
+    let sd_px = first.sd_across_px([cos, sin]).hypot(last.sd_across_px([cos, sin]));
     let sd_rad = usual_sd_rad(m.angles.links.first()?)?;
     (aside_px > PIVOT_MOVES * sd_px && aside_px / length_px > SHARED_DEVIATIONS * sd_rad).then(|| {
         format!(

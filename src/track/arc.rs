@@ -148,14 +148,18 @@ impl Arc {
         part(0).max(part(1))
     }
 
+    /// Standard deviation of the centre across a direction, of length 1.
+    pub fn sd_across_px(&self, [x, y]: [f64; 2]) -> f64 {
+        (y * self.sd_px[0]).hypot(x * self.sd_px[1])
+    }
+
     /// Whether a point lies on the line from the middle of the path to the centre, at whatever distance: a plane of swing that is turned moves the centre along it, not aside.
     pub fn is_on_line(&self, place_px: [f64; 2], middle_px: [f64; 2]) -> bool {
         let [x, y] = [0, 1].map(|k| self.centre_px[k] - middle_px[k]);
         let length_px = x.hypot(y).max(f64::MIN_POSITIVE);
         let (x, y) = (x / length_px, y / length_px);
         let [dx, dy] = [0, 1].map(|k| place_px[k] - middle_px[k]);
-        let sd_px = (y * self.sd_px[0]).hypot(x * self.sd_px[1]);
-        let limit_px = CENTRE_DEVIATIONS * sd_px + CENTRE_OFF_PX + CENTRE_OFF * self.radius_px;
+        let limit_px = CENTRE_DEVIATIONS * self.sd_across_px([x, y]) + CENTRE_OFF_PX + CENTRE_OFF * self.radius_px;
         (x * dy - y * dx).abs() < limit_px && x * dx + y * dy > 0.0
     }
 
@@ -180,6 +184,8 @@ fn algebraic(points: &[[f64; 2]]) -> Option<Vector3<f64>> {
 
 #[cfg(test)]
 mod tests {
+    use super::*;
+
     #[test]
     fn a_turned_plane_moves_the_centre_along_the_line_of_the_swing_and_not_aside() {
         let swing = |turned: f64| -> Vec<[f64; 2]> {
@@ -191,8 +197,6 @@ mod tests {
         assert!(!arc.is_near([640.0, 80.0]) && arc.is_on_line([640.0, 80.0], middle_px), "{arc:?}");
         assert!(!arc.is_on_line([605.0, 122.0], middle_px) && !arc.is_on_line([640.0, 900.0], middle_px));
     }
-
-    use super::*;
 
     fn swing(amplitude_rad: f64, noise_px: f64) -> Vec<[f64; 2]> {
         (0..400)

@@ -184,10 +184,13 @@ fn hangs_against(things: &[TrackedObject], marks: &[usize]) -> Option<Arc> {
 /// A still thing that something covers from time to time seems to move as well: by no more than its area changes for; or mostly in the middle of its way, where what
 /// swings seldom is until it has decayed, by less than its radius, about no clear centre or about a point within itself, or by less than a quarter of its radius.
 fn is_covered(thing: &TrackedObject) -> bool {
-    let (path, travel) = (thing.places_px(), thing.travel_px / thing.radius_px());
-    let rests = || is_slight(thing) && kurtosis(&path) > KURTOSIS_OF_NOISE;
+    let travel = thing.travel_px / thing.radius_px();
+    if !thing.moves_whole || travel < LEAST_SHIFT {
+        return true;
+    }
+    let path = thing.places_px();
     let shows = || Arc::of(&path, thing.radius_px()).is_some_and(|arc| shows_centre(&arc, thing));
-    !thing.moves_whole || travel < LEAST_SHIFT || rests() && (travel < LEAST_TRAVEL || !shows())
+    is_slight(thing) && kurtosis(&path) > KURTOSIS_OF_NOISE && (travel < LEAST_TRAVEL || !shows())
 }
 
 /// A thing's path shows where it hangs, and not within itself.

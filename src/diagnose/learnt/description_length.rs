@@ -42,9 +42,9 @@ impl Description<'_> {
     pub fn stand_for(&self, context: &FitContext<'_>, along: &Along) -> Vec<Vec<(Effect, f64)>> {
         let (law, misfit) = (&context.settings.law, &context.settings.misfit);
         let is_exact = self.fit.chi2 < chi2_noise_limit(self.fit.values(), misfit);
-        let of_term = |term: &Term| match term.plainer().filter(|_| term.is_by_load()) {
-            Some(plain) => along.stands_for((&plain, is_exact), law),
-            None => along.stands_for((term, is_exact), law),
+        let of_term = |term: &Term| {
+            let plain = if term.is_by_load() { term.plainer() } else { None };
+            along.stands_for((plain.as_ref().unwrap_or(term), is_exact), law)
         };
         self.terms.iter().map(of_term).collect()
     }

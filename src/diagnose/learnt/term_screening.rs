@@ -122,7 +122,10 @@ fn effects_of_terms(fit: &Refit<'_>, rows: usize) -> Option<(Vec<Term>, DMatrix<
     let swings = swings(fit, &around)?;
     let at = |place: LawPlace, joint: Option<usize>| {
         let terms = terms(place, largest(&swings, (place, joint), fit.problem.longest_s()));
-        terms.into_iter().map(move |term| joint.map_or(term.clone(), |joint| term.at_joint(joint)))
+        terms.into_iter().map(move |term| match joint {
+            Some(joint) => term.at_joint(joint),
+            None => term,
+        })
     };
     let joints = fit.problem.marks() - 1;
     // all joints alike, and of several each by itself

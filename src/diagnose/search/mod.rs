@@ -42,7 +42,7 @@ use super::hypothesis::Compared;
 use super::laws;
 use super::misfit::{Misfit, leaves_more_than_noise};
 use super::preparation::Prepared;
-use super::refit::{Refit, least, least_chi2, merged};
+use super::refit::{Refit, best, least, least_chi2, merged};
 use super::screen::{Score, Screen};
 use super::settings::{PriorSettings, Settings};
 use crate::error::Result;
@@ -430,7 +430,7 @@ impl<'a, 'p> Search<'a, 'p> {
             encoder_rad: search.usual_error * prior.encoder_rad,
             ..prior.clone()
         };
-        let best = self.fits.iter().filter(|fit| is_possible(fit, &usual)).min_by(|a, b| a.chi2.total_cmp(&b.chi2));
-        best.map(|best| Misfit::of(&self.context, best, &[]))
+        let foremost = best(&self.fits, 1, |fit| is_possible(fit, &usual), |fit| fit.chi2);
+        foremost.first().map(|i| Misfit::of(&self.context, &self.fits[*i], &[]))
     }
 }
