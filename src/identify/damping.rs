@@ -43,12 +43,12 @@ impl Damping {
             format!("the amplitude grows, by {percent:.1} % a cycle: driven, fed by another mode, or two beating")
         } else if whole.within(-1.0, 1.0) && whole.low > 0.0 {
             format!(
-                "the swing decays, as with ξ = {:.4} over the record, but it depends so strongly on amplitude that ξ at small amplitude cannot be determined; use --from for a later, smaller swing",
+                "the swing decays, as with ξ = {:.4} over the record, but what its amplitude, or another mode, does to ξ is not known well enough to tell ξ at small amplitude; use --from for a later, smaller swing",
                 whole.value
             )
         } else if bounded {
             format!(
-                "the decay over {duration_s:.3} s is smaller than its uncertainty: only ξ ≤ {:.2e} is known",
+                "the decay over {duration_s:.3} s is smaller than its uncertainty: only ξ ≤ {:.2e} is known, where nothing drives the swing",
                 estimate.high
             )
         } else {

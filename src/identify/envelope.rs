@@ -94,17 +94,16 @@ pub struct Envelope {
 }
 
 impl Envelope {
-    /// Of one mode of the windows, which has these bounds; `other_rad` is what may stand in its place at an instant.
+    /// Of one mode of the windows, in these of its moments, which has these bounds.
     ///
     /// # Errors
     /// In words, when the mode is clear of the noise, and of what else there is, in fewer than three windows.
     pub(super) fn of(
         windows: &Windows,
         mode: usize,
+        moments: &[WindowAmplitude],
         bounds: Bounds,
-        other_rad: impl Fn(f64) -> f64,
     ) -> Result<Self, String> {
-        let moments = &windows.clear_of(mode, other_rad);
         if moments.len() < 3 {
             let clear_of = if windows.moments[mode].len() < 3 { "the noise" } else { "the slowest mode's harmonics" };
             return Err(format!(
@@ -177,7 +176,7 @@ impl Envelope {
 
 /// Phases without jumps. Neighbours are joined by the frequency found within their windows; where the mode has become weak, by that of the step
 /// before, which is sharper.
-fn unwrapped(moments: &[WindowAmplitude]) -> Vec<f64> {
+pub(super) fn unwrapped(moments: &[WindowAmplitude]) -> Vec<f64> {
     let mut phases: Vec<f64> = moments.first().map(|m| m.amplitude_rad.arg()).into_iter().collect();
     let mut before: Option<f64> = None;
     for pair in moments.windows(2) {
@@ -362,7 +361,7 @@ impl<'a> Regression<'a> {
 }
 
 /// ∫Aᵖ dt from the first of `moments` to each of them, A taken from `source`; zero where `source` has died away.
-fn powers(moments: &[WindowAmplitude], source: &[WindowAmplitude], power: i32) -> Vec<f64> {
+pub(super) fn powers(moments: &[WindowAmplitude], source: &[WindowAmplitude], power: i32) -> Vec<f64> {
     let amplitude =
         |t: f64| source.iter().find(|m| (m.t_s - t).abs() < 1e-9).map_or(0.0, WindowAmplitude::amplitude_rad);
     let mut sum = 0.0;

@@ -5,6 +5,7 @@ use serde::Serialize;
 use super::consistency::Consistency;
 use super::damping::Trend;
 use super::decrement::Decrement;
+use super::driven::without_driven;
 use super::envelope::{Bounds, Envelope, FrequencyLaw};
 use super::estimate::Estimate;
 use super::excess::Excess;
@@ -13,7 +14,7 @@ use super::modulated::Modulated;
 use super::signal::Signal;
 use super::sinusoids::SinusoidFit;
 use super::spectrum::Spectrum;
-use super::windows::{Windows, over_stretches};
+use super::windows::{WindowAmplitude, Windows, over_stretches, while_clear};
 use crate::series::Measured;
 
 /// A way to a frequency or a damping ratio.
@@ -78,19 +79,34 @@ pub(super) struct Whole<'a> {
 }
 
 impl Whole<'_> {
-    /// What the third harmonic of the slowest mode may be taken for of a faster one, in a window of some length about an instant (rad): A³/20, see
-    /// [`harmonic_share`], and of that as much as a window shows at a frequency so far from its own,
+    /// A mode's moments in windows of this length, up to where it is no longer clear of the noise, nor of the slowest mode's third harmonic: what that is seen to drive
+    /// is taken away, else what it may be counts as noise.
+    pub fn clear_moments(&self, mode: usize, seen: &[WindowAmplitude], window_s: f64) -> Vec<WindowAmplitude> {
+        let pole = self.fit.poles[mode];
+        let apart_rad_s = (pole.omega_rad_s - 3.0 * self.fit.poles[0].omega_rad_s).abs();
+        // farther apart, a window tells the two from one another
+        let slowest = self.windows.as_ref().ok().filter(|_| mode > 0 && apart_rad_s * window_s < std::f64::consts::TAU);
+        let bounds = Bounds::of(mode == 0, self.measured);
+        match slowest.and_then(|windows| without_driven(seen, &windows.moments[0], pole, bounds)) {
+            Some(free) => while_clear(free.into_iter()),
+            None => while_clear(seen.iter().map(|own| own.beside(self.harmonic_rad(mode, own, window_s)))),
+        }
+    }
+
+    /// What the third harmonic of the slowest mode may be taken for of a faster one in a window of this length (rad): A³/20, see [`harmonic_share`], and of that as much
+    /// as shows at the frequency found there, or at the mode's, whichever is nearer,
     ///
     /// ```text
     /// A³/20 / √(1 + (Δω T/2)²)      Δω = ω − 3ω₁,  T: the window's length
     /// ```
-    pub fn harmonic_rad(&self, mode: usize, t_s: f64, window_s: f64) -> f64 {
+    fn harmonic_rad(&self, mode: usize, window: &WindowAmplitude, window_s: f64) -> f64 {
         if mode == 0 || self.measured == Measured::Displacement {
             return 0.0;
         }
-        let apart = 0.5 * (self.fit.poles[mode].omega_rad_s - 3.0 * self.fit.poles[0].omega_rad_s) * window_s;
-        let amplitude_rad = self.fit.last_amplitude_rad(0, t_s - self.fit.origin_s);
-        amplitude_rad.powi(3) * LARGEST_HARMONIC / 1f64.hypot(apart)
+        let apart = |omega_rad_s: f64| 0.5 * (omega_rad_s - 3.0 * self.fit.poles[0].omega_rad_s).abs() * window_s;
+        let nearest = apart(self.fit.poles[mode].omega_rad_s).min(apart(window.omega_rad_s));
+        let amplitude_rad = self.fit.last_amplitude_rad(0, window.t_s - self.fit.origin_s);
+        amplitude_rad.powi(3) * LARGEST_HARMONIC / 1f64.hypot(nearest)
     }
 }
 
@@ -218,7 +234,10 @@ impl Estimators {
             None if is_needed => {
                 // of second order in ξ, where the decay is not a linear damper's
                 let of_losses = if self.residual_excess > 1.0 { damping_ratio.value.powi(2) } else { 0.0 };
-                let over_the_record = [relatively_blurred(over_the_record[0], of_losses), over_the_record[1]];
+                let [f_hz, xi] = over_the_record;
+                // of a faster mode that lives shorter than the slowest one's harmonic, the whole record may show that
+                let f_hz = envelope.filter(|_| mode > 0).map_or(f_hz, |own| own.over_steps(f_hz));
+                let over_the_record = [relatively_blurred(f_hz, of_losses), xi];
                 let at_rad = felt.then(|| amplitudes_rad[mode] * weighed(decays).sqrt());
                 let in_windows = envelope.map(|e| (of_windows(e), e.linear_damping().is_some()));
                 Choice::of_widened_sinusoids(over_the_record, at_rad, in_windows)

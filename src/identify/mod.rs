@@ -16,11 +16,13 @@
 //! | [`mod@floor`] | the frequency below which nothing hung can swing |
 //! | [`consistency`] | whether the estimators agree |
 
+pub mod abrupt;
 mod close_pair;
 pub mod consistency;
 pub mod damping;
 pub mod decay_law;
 pub mod decrement;
+mod driven;
 pub mod envelope;
 pub mod equivalents;
 pub mod estimate;
@@ -61,6 +63,7 @@ use crate::error::Result;
 use crate::experiment::{Experiment, Rig};
 use crate::model::chain::Chain;
 use crate::series::{AngleSeries, Measured};
+use abrupt::AbruptChange;
 use envelope::PENDULUM;
 use equivalents::Equivalents;
 use estimators::Whole;
@@ -120,6 +123,10 @@ pub struct Identification {
     pub held_until_s: Option<f64>,
     /// From when on nothing swings any more, where that is a part of the record; only what precedes is identified.
     pub rests_from_s: Option<f64>,
+    /// When the swing changes at once, by a touch or by frames that are missing.
+    pub abrupt_changes: Vec<AbruptChange>,
+    /// From when to when the record is identified, where the swing changes at once: the longest part between such changes.
+    pub used_s: Option<[f64; 2]>,
     /// What keeps it from being a swing; then there are no modes.
     pub tumbling: Option<Tumbling>,
     /// How far each link's resting angle moves over the record, no part of any mode; zero where the data do not ask for a drift.
@@ -236,6 +243,8 @@ impl Identification {
             summary: String::new(),
             held_until_s: None,
             rests_from_s: None,
+            abrupt_changes: Vec::new(),
+            used_s: None,
             tumbling: None,
             drift_rad: Vec::new(),
             swing_mode: None,
@@ -259,7 +268,10 @@ impl Identification {
         };
         self.rests_from_s = rests_from_s.or(self.rests_from_s);
         match self.swing_of(signal) {
-            Ok((signal, chosen)) => self.add_modes(&signal, chosen, body),
+            Ok((signal, chosen)) => {
+                let (signal, chosen) = self.between_changes(signal, chosen);
+                self.add_modes(&signal, chosen, body);
+            }
             Err(reason) => self.notes.push(format!("{}{reason}", summary::NOTHING)),
         }
         self.summary = summary::summary(&self);
@@ -285,6 +297,27 @@ impl Identification {
         let signal = self.without_outliers(signal);
         let chosen = modes::choose_modes(&signal, &self.spectrum, self.record.measured)?;
         Ok((signal, chosen))
+    }
+
+    /// The longest part between changes at once, with its modes, where there are such.
+    fn between_changes(&mut self, signal: Signal, chosen: Chosen) -> (Signal, Chosen) {
+        let changes = abrupt::changes(&signal, &chosen.fit);
+        if changes.is_empty() {
+            return (signal, chosen);
+        }
+        let used_s = abrupt::longest_part_s(&signal, &changes, chosen.fit.poles[0].frequency_hz().recip());
+        let part = signal.from(used_s[0]).until(used_s[1]);
+        let spectrum = Spectrum::of(&part.levelled(), self.record.irregular_share);
+        let of_part = modes::choose_modes(&part, &spectrum, self.record.measured);
+        self.abrupt_changes = changes;
+        match of_part {
+            Ok(of_part) => {
+                self.spectrum = spectrum;
+                self.used_s = Some(used_s);
+                (part, of_part)
+            }
+            Err(_) => (signal, chosen),
+        }
     }
 
     fn without_outliers(&mut self, signal: Signal) -> Signal {
@@ -354,7 +387,7 @@ impl Identification {
         let (harmonics, modes): (Vec<Mode>, Vec<Mode>) = modes.into_iter().partition(|mode| mode.may_be_harmonic);
         self.notes.extend(harmonics.iter().map(|mode| {
             format!(
-                "the line at {:.3} Hz lies on the third harmonic of the slowest mode and is no stronger than that may be: only a forward model tells whether a mode is there, or a smaller swing, as with --from",
+                "the line at {:.3} Hz lies on the third harmonic of the slowest mode, and goes with it or is no stronger than that may be: only a forward model tells whether a mode is there, or a smaller swing, as with --from",
                 mode.frequency_hz.value
             )
         }));

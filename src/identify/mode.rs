@@ -5,6 +5,7 @@ use serde::Serialize;
 
 use super::consistency::Consistency;
 use super::damping::{Damping, Trend};
+use super::driven::is_all_driven;
 use super::envelope::{Bounds, Envelope, FrequencyLaw, PENDULUM, THEORY_TOLERANCE};
 use super::estimate::{Estimate, probability};
 use super::estimators::{Estimator, Estimators, Whole, harmonic_share};
@@ -192,9 +193,16 @@ impl Mode {
             } else {
                 String::new()
             };
-            Some(format!(
-                "f = f₀(1 − κA²) has {measured}, gravity alone makes {expected:.4}: a nonlinear stiffness is at work, or a swing in a second plane{scale}"
-            ))
+            // a spring beside gravity leaves κ gravity's share of the stiffness
+            let cause = if k.low > 0.0 && k.high < expected {
+                let part = 100.0 * (1.0 - k.value / expected);
+                format!(
+                    "a spring beside gravity, of {part:.0} % of the stiffness, does that, or a swing in a second plane"
+                )
+            } else {
+                "a nonlinear stiffness is at work, or a swing in a second plane".to_owned()
+            };
+            Some(format!("f = f₀(1 − κA²) has {measured}, gravity alone makes {expected:.4}: {cause}{scale}"))
         } else if !k.holds(0.0) && k.half() < 0.5 * expected.abs() {
             Some(format!("the frequency falls with amplitude as gravity makes it ({measured}, expected {expected:.4})"))
         } else {
@@ -249,7 +257,8 @@ impl Mode {
     }
 
     fn of_frequency(&self) -> Option<String> {
-        let test = self.frequency_consistency.filter(|t| !t.agree)?;
+        // what one oscillation describes needs no other reason
+        let test = self.frequency_consistency.filter(|t| !t.agree && self.modulated.is_none())?;
         let lawful = !self.is_no_swing_of_its_own();
         let meaning = if lawful && self.frequency_law().is_some_and(|l| l.p_constant < 0.01) {
             "the frequency depends on amplitude, which each estimator weighs differently; take f₀"
@@ -305,7 +314,7 @@ fn of_linear_damper(envelope: &Envelope, bounds: Bounds, measured: Measured) -> 
 fn envelope_of(whole: &Whole, mode: usize) -> Result<Envelope, String> {
     let bounds = Bounds::of(mode == 0, whole.measured);
     let of = |windows: &Windows, own: usize| {
-        Envelope::of(windows, own, bounds, |t_s| whole.harmonic_rad(mode, t_s, windows.window_s))
+        Envelope::of(windows, own, &whole.clear_moments(mode, &windows.moments[own], windows.window_s), bounds)
     };
     let shared = whole.windows.as_ref().map_err(Clone::clone).and_then(|windows| of(windows, mode));
     if shared.is_ok() || whole.fit.poles.len() == 1 {
@@ -316,8 +325,8 @@ fn envelope_of(whole: &Whole, mode: usize) -> Result<Envelope, String> {
     Ok(of(&own, 0)?.widened_for_other_modes(others))
 }
 
-/// Whether a mode is on the third harmonic of the slowest one throughout, and in the end no larger than that harmonic may be; where there are no windows, by the whole
-/// record's fit.
+/// Whether a mode is on the third harmonic of the slowest one throughout, and goes with it or is in the end no larger than that harmonic may be; where there are no
+/// windows, by the whole record's fit.
 fn may_be_harmonic(whole: &Whole, mode: usize) -> bool {
     let Ok(windows) = whole.windows else { return harmonic_share(whole.fit, mode) >= 1.0 };
     let (own, slowest) = (&windows.moments[mode], &windows.moments[0]);
@@ -327,7 +336,8 @@ fn may_be_harmonic(whole: &Whole, mode: usize) -> bool {
         let beside = slowest.iter().find(|beside| beside.t_s == moment.t_s);
         beside.is_some_and(|beside| (moment.omega_rad_s / beside.omega_rad_s / 3.0 - 1.0).abs() < LOCKED)
     });
-    is_locked && last.amplitude_rad() < MOST_OF_HARMONIC * beside.amplitude_rad().powi(3)
+    let is_small = last.amplitude_rad() < MOST_OF_HARMONIC * beside.amplitude_rad().powi(3);
+    is_locked && (is_small || is_all_driven(own, slowest))
 }
 
 fn shape(whole: &Whole, mode: usize) -> Vec<LinkMotion> {

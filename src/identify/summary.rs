@@ -1,6 +1,7 @@
 //! The answer in one line.
 
 use super::Identification;
+use super::abrupt::AbruptChange;
 use super::damping::Damping;
 use super::estimate::Estimate;
 use super::mode::Mode;
@@ -33,8 +34,23 @@ pub(super) fn summary(found: &Identification) -> String {
     let rest = found.rests_from_s.map(|rest_s| {
         format!(" — at rest from t = {rest_s:.2} s on; only what precedes is used, as with `--until {rest_s:.2}`")
     });
+    let changed = (!found.abrupt_changes.is_empty()).then(|| format!(" — {}", changes(found)));
     let part = found.tumbling.iter().map(|t| format!(" — {}", t.statement));
-    modes.join("; ") + &held.into_iter().chain(rest).chain(part).chain(doubts).chain(floor).collect::<String>()
+    modes.join("; ")
+        + &held.into_iter().chain(rest).chain(changed).chain(part).chain(doubts).chain(floor).collect::<String>()
+}
+
+/// When the swing changes at once, and what of it is used.
+fn changes(found: &Identification) -> String {
+    let one = |change: &AbruptChange| {
+        let [before, after] = [change.before_rad, change.after_rad].map(|rad| found.record.measured.show(rad, 1));
+        format!("t = {:.2} s (amplitude from {before} to {after}, {:+.2} cycles)", change.t_s, change.ahead_cycles)
+    };
+    let each: Vec<String> = found.abrupt_changes.iter().map(one).collect();
+    let used = found.used_s.map_or(String::new(), |[from_s, until_s]| {
+        format!("; only {from_s:.2} to {until_s:.2} s is used, as with `--from {from_s:.2} --until {until_s:.2}`")
+    });
+    format!("the swing changes at once at {}: a touch, or missing frames{used}", each.join(" and "))
 }
 
 fn of_mode(mode: &Mode) -> String {

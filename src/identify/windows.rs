@@ -15,7 +15,7 @@ use crate::statistics::median;
 /// Cycles of the slowest mode in a window.
 const WINDOW_CYCLES: f64 = 4.0;
 /// Beats of the slowest mode with its neighbour in a window: over fewer of them the amplitudes of both are not told apart.
-const WINDOW_BEATS: f64 = 2.0;
+pub(super) const WINDOW_BEATS: f64 = 2.0;
 /// Cycles of a stretch that shows a frequency, at least.
 const STRETCH_CYCLES: f64 = 2.2;
 /// Windows that show a law of three terms.
@@ -42,10 +42,20 @@ impl WindowAmplitude {
         (self.amplitude_rad.norm_sqr() - self.sd_rad * self.sd_rad).max(0.0).sqrt()
     }
 
+    /// The same beside something else of this size (rad), which may stand in its place.
+    pub fn beside(&self, other_rad: f64) -> Self {
+        Self { sd_rad: self.sd_rad.hypot(other_rad), ..*self }
+    }
+
     /// Whether its phase can be followed.
     fn is_clear(&self) -> bool {
         self.amplitude_rad.norm() > CLEAR_OF_NOISE * self.sd_rad
     }
+}
+
+/// The moments up to where the mode is no longer clear of noise and all else.
+pub(super) fn while_clear(moments: impl Iterator<Item = WindowAmplitude>) -> Vec<WindowAmplitude> {
+    moments.take_while(WindowAmplitude::is_clear).collect()
 }
 
 /// The windows of a recording.
@@ -97,7 +107,7 @@ impl Windows {
             // the last sample belongs to the last window
             let until_s = from_s + window_s + if k + 1 == count as usize { signal.step_s } else { 0.0 };
             let window = signal.between(from_s, until_s);
-            if let Some(local) = window_fit(&window, from_s + 0.5 * window_s, &previous, &fit.poles) {
+            if let Some(local) = window_fit(&window, from_s + 0.5 * window_s, &[&previous, &fit.poles]) {
                 previous.clone_from(&local.poles);
                 previous.extend_from_slice(&fit.poles[local.poles.len()..]);
                 fits.push(local);
@@ -129,13 +139,6 @@ impl Windows {
         }
         windows.fits = fits;
         Ok(windows)
-    }
-
-    /// The moments of a mode, up to where something else of a size that is known at each instant (rad) may stand in its place.
-    pub fn clear_of(&self, mode: usize, other_rad: impl Fn(f64) -> f64) -> Vec<WindowAmplitude> {
-        let beside_other =
-            |own: &WindowAmplitude| WindowAmplitude { sd_rad: own.sd_rad.hypot(other_rad(own.t_s)), ..*own };
-        self.moments[mode].iter().map(beside_other).take_while(WindowAmplitude::is_clear).collect()
     }
 
     /// One mode alone in windows of its own cycles, every other one taken away as the whole record's fit has it.
@@ -181,7 +184,7 @@ pub(super) fn over_stretches(signal: &Signal, fit: &SinusoidFit) -> Option<[[f64
     let of_stretch = |k: usize| {
         let from_s = signal.span_s[0] + k as f64 * stretch_s;
         let stretch = signal.between(from_s, from_s + stretch_s);
-        window_fit(&stretch, from_s + 0.5 * stretch_s, &fit.poles, &fit.poles)
+        window_fit(&stretch, from_s + 0.5 * stretch_s, &[&fit.poles])
     };
     let local: Vec<Pole> = (0..count as usize).filter_map(of_stretch).map(|fit| fit.poles[0]).collect();
     let ends = |of: fn(&Pole) -> f64| {
@@ -190,13 +193,13 @@ pub(super) fn over_stretches(signal: &Signal, fit: &SinusoidFit) -> Option<[[f64
     (local.len() >= 2).then(|| [ends(Pole::frequency_hz), ends(Pole::damping_ratio)])
 }
 
-/// Fits a window with all modes, or with fewer when the weaker ones have died away.
-fn window_fit(window: &Signal, origin_s: f64, previous: &[Pole], whole: &[Pole]) -> Option<SinusoidFit> {
+/// Fits a window with all modes, or with fewer when the weaker ones have died away, from each of these starts; what is found is near the first of them.
+pub(super) fn window_fit(window: &Signal, origin_s: f64, starts: &[&[Pole]]) -> Option<SinusoidFit> {
+    let first = starts.first()?;
     let best = |modes: usize| {
-        let starts = [&previous[..modes], &whole[..modes]];
-        let fits = starts.iter().filter_map(|start| SinusoidFit::from_start(window, origin_s, start));
+        let fits = starts.iter().filter_map(|start| SinusoidFit::from_start(window, origin_s, &start[..modes]));
         let near = |f: &SinusoidFit| {
-            f.poles.iter().zip(previous).all(|(a, b)| (a.omega_rad_s / b.omega_rad_s - 1.0).abs() < 0.25)
+            f.poles.iter().zip(*first).all(|(a, b)| (a.omega_rad_s / b.omega_rad_s - 1.0).abs() < 0.25)
         };
         fits.filter(near).min_by(|a, b| a.deviance.total_cmp(&b.deviance))
     };
@@ -204,7 +207,7 @@ fn window_fit(window: &Signal, origin_s: f64, previous: &[Pole], whole: &[Pole])
         (0..f.poles.len())
             .all(|m| f.links.iter().any(|l| l.amplitudes_rad[m].norm() > CLEAR_OF_NOISE * l.amplitude_sd_rad[m]))
     };
-    (1..=whole.len()).rev().filter_map(best).find(clear)
+    (1..=first.len()).rev().filter_map(best).find(clear)
 }
 
 /// Takes the pooled noise for a window's own where the two differ by no more than chance: the pooled one is better known.
@@ -265,5 +268,5 @@ fn moments(local: &[&SinusoidFit], mode: usize, shape: &[Complex<f64>]) -> Vec<W
         }
     });
     let sound = |m: &WindowAmplitude| m.sd_rad > 0.0 && m.sd_rad.is_finite();
-    each.filter(sound).take_while(WindowAmplitude::is_clear).collect()
+    while_clear(each.filter(sound))
 }
