@@ -197,6 +197,7 @@ fn recordings(
             ));
             kept = swing;
         }
+        warn_of_changes(&kept, console);
         let record = Record::of(&kept, marks)?;
         let Some(rows) = foretold(&record, experiment) else { return Ok(record) };
         let [first_s, last_s] = [record.t_s[rows.start], record.t_s[rows.end - 1]];
@@ -217,6 +218,24 @@ fn recordings(
         Ok(record.rows(rows))
     };
     all.iter().map(record).collect()
+}
+
+/// A longer table is not searched for changes at once (cost: a second or two).
+const MOST_ROWS_SEARCHED: usize = 20_000;
+
+/// Says where a swing changes at once, which no free motion does.
+fn warn_of_changes(series: &AngleSeries, console: &Console) {
+    if series.len() > MOST_ROWS_SEARCHED {
+        return;
+    }
+    let Ok(found) = crate::identify::identify(series, None) else { return };
+    for change in &found.abrupt_changes {
+        console.warning(format!(
+            "{}: {}; no model of a free motion can follow that: use what lies before or after it, with --until or --from",
+            series.path.display(),
+            change.statement(found.record.measured)
+        ));
+    }
 }
 
 /// What is wrong with a key of the experiment file, told by the options that gave it: `(key, option)`.

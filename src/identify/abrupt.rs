@@ -10,6 +10,7 @@ use serde::Serialize;
 use super::signal::Signal;
 use super::sinusoids::SinusoidFit;
 use super::windows::{WINDOW_BEATS, window_fit};
+use crate::series::Measured;
 use crate::statistics::median;
 
 /// Instants looked at in a cycle of the slowest mode.
@@ -149,6 +150,17 @@ impl Stretch {
         let of_noise = local.links.iter().zip(&left_rad);
         let of_noise = of_noise.map(|(link, left)| link.amplitude_sd_rad[grid.slowest] / left).collect();
         Some(Self { ends_rad: [at(-half_s), at(half_s)], of_noise, left_rad })
+    }
+}
+
+impl AbruptChange {
+    /// In words.
+    pub fn statement(&self, measured: Measured) -> String {
+        let [before, after] = [self.before_rad, self.after_rad].map(|rad| measured.show(rad, 1));
+        format!(
+            "the swing changes at once at t = {:.2} s (amplitude from {before} to {after}, {:+.2} cycles): a touch, or missing frames",
+            self.t_s, self.ahead_cycles
+        )
     }
 }
 

@@ -42,15 +42,12 @@ pub(super) fn summary(found: &Identification) -> String {
 
 /// When the swing changes at once, and what of it is used.
 fn changes(found: &Identification) -> String {
-    let one = |change: &AbruptChange| {
-        let [before, after] = [change.before_rad, change.after_rad].map(|rad| found.record.measured.show(rad, 1));
-        format!("t = {:.2} s (amplitude from {before} to {after}, {:+.2} cycles)", change.t_s, change.ahead_cycles)
-    };
+    let one = |change: &AbruptChange| change.statement(found.record.measured);
     let each: Vec<String> = found.abrupt_changes.iter().map(one).collect();
     let used = found.used_s.map_or(String::new(), |[from_s, until_s]| {
         format!("; only {from_s:.2} to {until_s:.2} s is used, as with `--from {from_s:.2} --until {until_s:.2}`")
     });
-    format!("the swing changes at once at {}: a touch, or missing frames{used}", each.join(" and "))
+    format!("{}{used}", each.join("; "))
 }
 
 fn of_mode(mode: &Mode) -> String {
