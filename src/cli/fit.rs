@@ -226,7 +226,7 @@ impl Report<'_> {
         if self.fitted.fit.coloured {
             text.push_str(&paragraph("  ", "The residuals are correlated in time; the intervals are widened for it."));
         }
-        let is_reproduced = self.fitted.verdicts.iter().all(Verdict::is_reproduced);
+        let is_reproduced = self.is_reproduced();
         let line = match is_reproduced {
             true => {
                 "The intervals are valid only if nothing else acts: the fitted parameters would take up a missing force."
@@ -325,6 +325,11 @@ impl Report<'_> {
         }
     }
 
+    /// Whether every recording is: elsewhere the parameters take up what the model lacks.
+    fn is_reproduced(&self) -> bool {
+        self.fitted.verdicts.iter().all(Verdict::is_reproduced)
+    }
+
     fn json(&self) -> Value {
         json!({
             "schema": "freeswing.fit/1",
@@ -336,6 +341,7 @@ impl Report<'_> {
             "correlation": rows(&self.fitted.fit.correlation),
             "undetermined": self.fitted.fit.undetermined.iter().map(|c| c.iter().map(|(p, share)| json!([p.id(), share])).collect()).collect::<Vec<Value>>(),
             "coloured_residuals": self.fitted.fit.coloured,
+            "intervals_valid": self.is_reproduced(),
             "converged": self.fitted.fit.ending == fit::Ending::Converged,
             "recordings": (0..self.records.len()).map(|i| self.recording_json(i)).collect::<Vec<_>>(),
         })

@@ -141,17 +141,23 @@ impl Envelope {
 }
 
 impl Envelope {
-    /// With intervals that allow for other modes of these amplitudes, where the windows do not follow them.
-    pub(super) fn widened_for_other_modes(mut self, others_rad: impl Iterator<Item = f64>) -> Self {
+    /// With intervals that allow for other modes of these amplitudes, where the windows do not follow them, and for what is not known of those modes: they are taken away
+    /// as the whole record's fit has them, and the two are known no better than this fit knows them.
+    pub(super) fn widened_for_other_modes(
+        mut self,
+        others_rad: impl Iterator<Item = f64>,
+        [frequency_hz, damping_ratio]: [Estimate; 2],
+    ) -> Self {
         let fourth: f64 = others_rad.map(|a| a.powi(4)).sum();
         let squares = fourth.sqrt();
         let [kappa, lambda] = [Bounds::OTHER.kappa[1], Bounds::OTHER.lambda[1]].map(|sd| sd * squares);
         if let Some(law) = &mut self.frequency {
-            law.f0_hz = law.f0_hz.blurred(kappa * law.f0_hz.value);
+            law.f0_hz = law.f0_hz.blurred((kappa * law.f0_hz.value).hypot(frequency_hz.sd));
         }
         if let Some(law) = &mut self.damping {
-            law.xi0 = law.xi0.blurred(lambda * law.xi0.value.abs());
+            law.xi0 = law.xi0.blurred((lambda * law.xi0.value).hypot(damping_ratio.sd));
         }
+        self.damping_ratio = self.damping_ratio.blurred(damping_ratio.sd);
         self
     }
 

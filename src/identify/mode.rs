@@ -322,7 +322,8 @@ fn envelope_of(whole: &Whole, mode: usize) -> Result<Envelope, String> {
     }
     let own = Windows::of_mode(whole.signal, whole.fit, mode)?;
     let others = (0..whole.fit.poles.len()).filter(|m| *m != mode).map(|m| whole.fit.amplitude_rad(m));
-    Ok(of(&own, 0)?.widened_for_other_modes(others))
+    let known = [whole.fit.frequency_hz(mode), whole.fit.damping_ratio(mode)];
+    Ok(of(&own, 0)?.widened_for_other_modes(others, known))
 }
 
 /// Whether a mode is on the third harmonic of the slowest one throughout, and goes with it or is in the end no larger than that harmonic may be; where there are no
