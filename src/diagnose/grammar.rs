@@ -67,6 +67,11 @@ impl Term {
         Some(plain)
     }
 
+    /// Whether it goes with its state alone.
+    pub fn is_unchanging(&self) -> bool {
+        self.modulation == NO_MODULATION
+    }
+
     /// Whether it goes with the load of its bearing.
     pub fn is_by_load(&self) -> bool {
         self.modulation == WITH_LOAD.words

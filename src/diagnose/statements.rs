@@ -31,6 +31,11 @@ impl Findings<'_> {
             Status::Adequate => {
                 format!("Nothing is missing that this recording could show: the base model leaves only noise ({sure}).")
             }
+            // names that leave no more than noise, and one of them for which another law does better
+            Status::Unknown if verdict.probability > verdict.unknown => format!(
+                "Something is missing that is not in the table of effects ({sure}): effects of the table leave little more than noise, but with a law of no table in the place of one of them the recording is described better{}.",
+                self.nearest()
+            ),
             Status::Unknown => format!(
                 "Something is missing that is not in the table of effects ({sure}): no effect of the table, and no combination that was tried, leaves only noise{}.",
                 self.nearest()

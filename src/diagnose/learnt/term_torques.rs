@@ -19,6 +19,11 @@ pub fn is_of_kind(term: &Term, effect: Effect) -> bool {
     entry.shapes.contains(&term.shape) && (term.state == "angle") == (entry.phase == Some(Phase::Position))
 }
 
+/// Whether it has the shape that an effect's law has where nothing changes it.
+fn is_law_of(term: &Term, effect: Effect) -> bool {
+    term.is_unchanging() && effect.entry().shapes.first() == Some(&term.shape)
+}
+
 /// The place of the table at which a law acts.
 pub fn place_of(law: LawPlace) -> Place {
     match law {
@@ -95,7 +100,8 @@ impl Along {
 
     /// The effects that a term stands for, with the share of each: of its kind and at its place the one with whose torques it goes best, and all that do the
     /// same as that one along this motion, wherever they act. Of a description that leaves only noise a term `is_exact`: it is an effect's law, or another one. Of one
-    /// that leaves more no term is, and a neighbouring power is within its error.
+    /// that leaves more no term is, and a neighbouring power is within its error. A term with the effect's own shape at its place is no other law, whether it lets the
+    /// link stick or not.
     pub fn stands_for(&self, (term, is_exact): (&Term, bool), law: &LawSettings) -> Vec<(Effect, f64)> {
         let Some(own) = self.of_term(term) else { return Vec::new() };
         let goes_with = |(effect, other): &(Effect, DVector<f64>)| {
@@ -106,7 +112,8 @@ impl Along {
         let of_kind = self.effects.iter().filter(|(effect, _)| is_of_kind(term, *effect));
         let cosines: Vec<(Effect, f64)> = of_kind.map(goes_with).collect();
         let is_it = |(effect, cosine): &&(Effect, f64)| {
-            *cosine > if !is_exact && self.is_at_place(term, *effect) { law.the_same_law } else { law.the_same }
+            let is_near = !is_exact || is_law_of(term, *effect);
+            *cosine > if is_near && self.is_at_place(term, *effect) { law.the_same_law } else { law.the_same }
         };
         let Some(best) = cosines.iter().filter(is_it).max_by(|a, b| a.1.total_cmp(&b.1)) else { return Vec::new() };
         let is_as_good = |own: &&(Effect, f64)| own.1 > law.the_same * best.1;
@@ -172,5 +179,11 @@ mod tests {
         let mut term = terms(LawPlace::Strip, largest).into_iter().find(|term| term.shape == "sign").unwrap();
         term.law.parameters.get_mut("a").unwrap().start = 0.03;
         assert_eq!(along.stands_for((&term, false), &LawSettings::default()), [(Effect::HingeCoulomb, 1.0)]);
+        // whatever is left: along one link it is that friction, and friction that fades with speed is not
+        assert_eq!(along.stands_for((&term, true), &LawSettings::default()), [(Effect::HingeCoulomb, 1.0)]);
+        let is_fading = |term: &Term| term.shape == "sign that fades with speed" && term.is_unchanging();
+        let mut fading = terms(LawPlace::Hinge, largest).into_iter().find(is_fading).unwrap();
+        fading.law.parameters.get_mut("a").unwrap().start = 0.03;
+        assert_eq!(along.stands_for((&fading, true), &LawSettings::default()), []);
     }
 }
