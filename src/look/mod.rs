@@ -32,6 +32,8 @@ const STRETCHES: usize = 3;
 
 /// Chains of a stretch that are measured, the best first, until one of them hangs together throughout.
 const CHAINS: usize = 3;
+/// Marks without a hue.
+const SHADES: [&str; 2] = ["dark", "light"];
 
 /// One mark of the chain.
 #[derive(Debug, Clone, PartialEq)]
@@ -105,7 +107,7 @@ pub fn look(path: &Path, options: &Options, folder: &Path, progress: &dyn Progre
             worn.sort_unstable();
             worn.dedup();
             if !chain.is_steady(&all) {
-                if !unsteady.iter().any(|own: &(f64, Vec<u8>)| own.1 == worn) {
+                if chain.may_tumble(&all) && !unsteady.iter().any(|own: &(f64, Vec<u8>)| own.1 == worn) {
                     unsteady.push((chain.worth, worn));
                 }
             } else if !tried.contains(&worn) {
@@ -134,7 +136,7 @@ pub fn look(path: &Path, options: &Options, folder: &Path, progress: &dyn Progre
     Err(nothing_swings(path, &seen, &names, session.stream().stated_frames))
 }
 
-/// What swings before things of its own hue is one with them now and then, and lost among many: as `track` finds a single mark of that colour, by the threshold at which
+/// What swings before things of its own hue or shade is one with them now and then, and lost among many: as `track` finds a single mark of that colour, by the threshold at which
 /// something swings.
 fn one_mark(
     path: &Path,
@@ -142,20 +144,21 @@ fn one_mark(
     (folder, progress): (&Path, &dyn Progress),
     (names, album): (&[String], &Album),
 ) -> Result<Option<Finding>> {
-    let mut colours: Vec<(&String, MarkColour)> = Vec::new();
-    for name in names.iter().filter(|name| name.starts_with('#')) {
-        let Ok(colour) = name.parse::<MarkColour>() else { continue };
+    let mut colours: Vec<(&str, MarkColour)> = Vec::new();
+    let parsed = |name| Some((name, str::parse::<MarkColour>(name).ok()?));
+    for (name, colour) in names.iter().map(String::as_str).filter(|name| name.starts_with('#')).filter_map(parsed) {
         // `track` looks for the hues around the one that is named
         if colours.iter().all(|(_, other)| !album.is_of_family(other, &colour)) {
             colours.push((name, colour));
         }
     }
     colours.truncate(CHAINS);
+    colours.extend(SHADES.into_iter().filter_map(parsed));
     for (name, colour) in colours {
         let options = Options { marks: vec![colour], ..options.clone() };
         // where there is no mark of that colour there may be one of the next
         let Ok(mut session) = Session::open(path, &options, folder, progress) else { continue };
-        let looks = session.hues().iter().map(|hue| (hue.clone(), name.clone())).collect();
+        let looks = session.hues().iter().map(|hue| (hue.clone(), name.to_owned())).collect();
         if let Some(finding) = measured(&mut session, looks, true, progress)? {
             return Ok(Some(finding));
         }
@@ -277,7 +280,7 @@ fn looks(album: &Album) -> Result<Vec<(Hue, String)>> {
     for peak in hues {
         add(album.try_hue(peak.angle_rad, &COUNTS, None)?, None);
     }
-    for (dark, name) in [(true, "dark"), (false, "light")] {
+    for (dark, name) in [true, false].into_iter().zip(SHADES) {
         add(album.try_luma(dark, &COUNTS, None)?, Some(name));
     }
     // what shows more spots than there can be marks is a wall or a shadow

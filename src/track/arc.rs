@@ -148,6 +148,16 @@ impl Arc {
         part(0).max(part(1))
     }
 
+    /// The angle about the centre that some points span (rad), of directions all round: a turn less the widest gap between them.
+    pub fn span_rad(&self, points: &[[f64; 2]]) -> f64 {
+        let turn = std::f64::consts::TAU;
+        let angle = |p: &[f64; 2]| (p[1] - self.centre_px[1]).atan2(p[0] - self.centre_px[0]);
+        let mut angles: Vec<f64> = points.iter().map(angle).collect();
+        angles.sort_unstable_by(f64::total_cmp);
+        let around = angles.first().zip(angles.last()).map_or(turn, |(first, last)| first + turn - last);
+        turn - angles.windows(2).map(|pair| pair[1] - pair[0]).fold(around, f64::max)
+    }
+
     /// Standard deviation of the centre across a direction, of length 1.
     pub fn sd_across_px(&self, [x, y]: [f64; 2]) -> f64 {
         (y * self.sd_px[0]).hypot(x * self.sd_px[1])

@@ -66,6 +66,15 @@ impl Chain {
         let moving = || self.marks.iter().map(|i| &things[*i]).filter(|thing| thing.moves);
         moving().map(|thing| thing.steadiness).sum::<f64>() > 0.5 * moving().count() as f64
     }
+
+    /// Whether a hung body may move so that does not swing steadily: a chain of links, or one link that turns over.
+    pub fn may_tumble(&self, things: &[TrackedObject]) -> bool {
+        let mut moving = self.marks.iter().map(|i| &things[*i]).filter(|thing| thing.moves);
+        match (moving.next(), moving.next()) {
+            (Some(only), None) => self.arc.is_some_and(|arc| arc.span_rad(&only.places_px()) > std::f64::consts::PI),
+            (_, next) => next.is_some(),
+        }
+    }
 }
 
 /// The chains that the looks show, the best one first, and before it that which other looks add to.
@@ -320,18 +329,25 @@ fn orders(things: &[TrackedObject], mut marks: Vec<usize>) -> [Vec<usize>; 2] {
     [marks, by_picture]
 }
 
-/// The still thing at the centre of the first mark's arc.
+/// The still thing at the centre of the first mark's arc; or on the line to it, where most things like it that stand still are: of a patterned wall some always lie there.
 fn hinge(things: &[TrackedObject], belongs: &dyn Fn(&TrackedObject) -> bool, arc: &Arc, first: usize) -> Option<usize> {
-    let off = |t: &TrackedObject| arc.off_centre(t.place_px());
-    let like = |t: &TrackedObject| (t.area_px2 / things[first].area_px2).ln().abs() < MOST_UNLIKE;
-    let still = |t: &TrackedObject| t.travel_px < 0.1 * things[first].travel_px;
-    let stays = |t: &TrackedObject| t.stretch(&things[first]) < MOST_STRETCH;
+    let off = |i: &usize| arc.off_centre(things[*i].place_px());
     let middle = things[first].place_px();
-    let on_line = |t: &TrackedObject| arc.is_on_line(t.place_px(), middle) && t.stretch(&things[first]) < HINGE_STRETCH;
-    let fits = |t: &TrackedObject| belongs(t) && t.presence > LEAST_PRESENCE && still(t) && like(t) && stays(t);
-    (0..things.len())
-        .filter(|i| *i != first && fits(&things[*i]) && (off(&things[*i]) < 1.0 || on_line(&things[*i])))
-        .min_by(|a, b| off(&things[*a]).total_cmp(&off(&things[*b])))
+    let is_on_line = |i: &usize| arc.is_on_line(things[*i].place_px(), middle);
+    let stretch = |i: &usize| things[*i].stretch(&things[first]);
+    let is_like = |i: &usize| {
+        let thing = &things[*i];
+        let still = thing.travel_px < 0.1 * things[first].travel_px;
+        let like = (thing.area_px2 / things[first].area_px2).ln().abs() < MOST_UNLIKE;
+        *i != first && belongs(thing) && thing.presence > LEAST_PRESENCE && still && like
+    };
+    let alike: Vec<usize> = (0..things.len()).filter(is_like).collect();
+    let on_line = alike.iter().filter(|i| is_on_line(i)).count();
+    let is_hinge = |i: &usize| {
+        let by_line = 2 * on_line >= alike.len() && is_on_line(i) && stretch(i) < HINGE_STRETCH;
+        stretch(i) < MOST_STRETCH && (off(i) < 1.0 || by_line)
+    };
+    alike.iter().copied().filter(is_hinge).min_by(|a, b| off(a).total_cmp(&off(b)))
 }
 
 #[cfg(test)]
@@ -363,6 +379,31 @@ mod tests {
         let things = [thing(0, tip, true), knob, thing(0, joint, true), thing(0, |_| [400.0, 50.0], false)];
         let chain = longest(&things, &["#c01010".to_owned()]).unwrap();
         assert_eq!((chain.marks, chain.hinge_marked), (vec![3, 2, 0], true));
+    }
+
+    #[test]
+    fn of_a_patterned_wall_no_thing_is_the_hinge_because_it_lies_on_the_line() {
+        let pattern = |k: usize| {
+            let place = [40.0 + 90.0 * (k % 9) as f64, 110.0 + 45.0 * (k / 9) as f64];
+            thing(0, move |_| place, false)
+        };
+        let mut things: Vec<TrackedObject> = (0..18).map(pattern).collect();
+        things.push(thing(0, joint, true));
+        let chain = longest(&things, &["#c01010".to_owned()]).unwrap();
+        assert_eq!((chain.marks, chain.hinge_marked), (vec![18], false));
+    }
+
+    #[test]
+    fn one_thing_that_goes_round_may_tumble_and_one_that_walks_past_may_not() {
+        let names = ["#c01010".to_owned()];
+        let round = |t: f64| [400.0 + 150.0 * (1.3 * t).sin(), 300.0 + 150.0 * (1.3 * t).cos()];
+        let things = [thing(0, round, true)];
+        assert!(longest(&things, &names).unwrap().may_tumble(&things));
+        let walks = |t: f64| [40.0 + 50.0 * t, 200.0 + 0.02 * t * t];
+        let things = [thing(0, walks, true)];
+        assert!(longest(&things, &names).is_none_or(|chain| !chain.may_tumble(&things)));
+        let both = [thing(0, tip, true), thing(0, joint, true)];
+        assert!(longest(&both, &names).unwrap().may_tumble(&both));
     }
 
     #[test]
