@@ -32,6 +32,8 @@ const STRETCHES: usize = 3;
 
 /// Chains of a stretch that are measured, the best first, until one of them hangs together throughout.
 const CHAINS: usize = 3;
+/// A thing is aside where it is farther from its usual place than this part of its whole range (judgement).
+const FAR_ASIDE: f64 = 0.05;
 /// Marks without a hue.
 const SHADES: [&str; 2] = ["dark", "light"];
 
@@ -195,7 +197,8 @@ fn measured(
         let t_s: Vec<f64> = frames.iter().map(|frame| frame.t_s).collect();
         let is_there = |i: &usize| session.makes_a_difference(&t_s, &all[*i]) != Some(false);
         let chain = chain_detection::longest(all, &names)?;
-        ((!steady || chain.is_steady(all)) && chain.marks.iter().all(is_there)).then_some(chain)
+        let swings = || chain.is_steady(all) && chain.marks.iter().all(|i| !all[*i].moves || comes_back(&all[*i]));
+        ((!steady || swings()) && chain.marks.iter().all(is_there)).then_some(chain)
     };
     let Some(mut chain) = found(&frames, &all) else { return Ok(None) };
     // a hand that holds a mark covers part of it, at one end of its arc
@@ -320,14 +323,30 @@ fn nothing_swings(
     Error::NothingSwings { path: path.to_owned(), frames, found }
 }
 
+/// From end to end of a thing's motion along an axis.
+fn range_px(thing: &TrackedObject, axis: usize) -> f64 {
+    let values = thing.path.iter().flatten().map(|p| p[axis]);
+    values.clone().fold(f64::MIN, f64::max) - values.fold(f64::MAX, f64::min)
+}
+
+/// The axis along which it moves farther.
+fn longer_axis(thing: &TrackedObject) -> usize {
+    usize::from(range_px(thing, 1) > range_px(thing, 0))
+}
+
+/// Whether a thing goes to one side of its usual place, to the other and back, as what swings does and what walks past does not.
+fn comes_back(thing: &TrackedObject) -> bool {
+    let (axis, middle) = (longer_axis(thing), thing.place_px());
+    let far_px = FAR_ASIDE * range_px(thing, axis);
+    let aside = thing.path.iter().flatten().map(|p| p[axis] - middle[axis]).filter(|off_px| off_px.abs() > far_px);
+    let mut sides: Vec<bool> = aside.map(|off_px| off_px > 0.0).collect();
+    sides.dedup();
+    sides.len() > 2
+}
+
 /// Full turns a second of a thing's motion along its longer axis.
 fn turns_per_second(thing: &TrackedObject, t_s: &[f64]) -> Option<f64> {
-    let middle = thing.place_px();
-    let range = |axis: usize| {
-        let values = thing.path.iter().flatten().map(|p| p[axis]);
-        values.clone().fold(f64::MIN, f64::max) - values.fold(f64::MAX, f64::min)
-    };
-    let axis = usize::from(range(1) > range(0));
+    let (axis, middle) = (longer_axis(thing), thing.place_px());
     let rows: Vec<(f64, f64)> =
         thing.path.iter().zip(t_s).filter_map(|(p, t)| p.map(|p| (*t, p[axis] - middle[axis]))).collect();
     let rises: Vec<f64> = rows
@@ -345,4 +364,31 @@ fn background(album: &Album) -> Background {
         p.luma.iter().zip(&p.cb).zip(&p.cr).map(|((y, b), r)| album.rgb([*y, *b, *r])).collect()
     });
     Background { width, rgb, shifts: album.shifts }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn thing(path: impl Fn(f64) -> [f64; 2]) -> TrackedObject {
+        let path = (0..240).map(|frame| Some(path(f64::from(frame) / 24.0))).collect();
+        TrackedObject {
+            hue: 0,
+            presence: 1.0,
+            area_px2: 300.0,
+            travel_px: 100.0,
+            moves: true,
+            moves_whole: true,
+            steadiness: 1.0,
+            path,
+        }
+    }
+
+    #[test]
+    fn what_swings_comes_back_and_what_walks_past_does_not() {
+        assert!(comes_back(&thing(|t| [300.0 + 80.0 * (6.0 * t).sin(), 200.0])));
+        // one swing to and fro
+        assert!(comes_back(&thing(|t| [300.0, 200.0 - 80.0 * (0.9 * t).cos()])));
+        assert!(!comes_back(&thing(|t| [40.0 + 110.0 * t, 200.0 + 4.0 * (9.0 * t).sin()])));
+    }
 }
