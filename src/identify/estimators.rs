@@ -257,7 +257,7 @@ const FARTHEST_LAW: f64 = 0.5;
 const HARMONIC_BAND: f64 = 0.06;
 
 /// The third harmonic of a swing of amplitude A, over A³ (1/rad²), without resonance.
-const LARGEST_HARMONIC: f64 = 1.0 / 20.0;
+pub(super) const LARGEST_HARMONIC: f64 = 1.0 / 20.0;
 
 /// Whether a mode lies at three times the slowest frequency.
 pub(super) fn is_on_third_harmonic(fit: &SinusoidFit, mode: usize) -> bool {

@@ -8,7 +8,7 @@ use super::damping::{Damping, Trend};
 use super::driven::is_all_driven;
 use super::envelope::{Bounds, Envelope, FrequencyLaw, PENDULUM, THEORY_TOLERANCE};
 use super::estimate::{Estimate, probability};
-use super::estimators::{Estimator, Estimators, Whole, harmonic_share};
+use super::estimators::{Estimator, Estimators, LARGEST_HARMONIC, Whole, is_on_third_harmonic};
 use super::floor::amplitude_dependence;
 use super::modulated::Modulated;
 use super::windows::Windows;
@@ -22,8 +22,8 @@ const FASTEST_SWING_HZ: f64 = 15.8;
 
 /// A line this near three times the slowest frequency, in each window, goes with it (judgement: a mode's frequency depends on amplitude otherwise).
 const LOCKED: f64 = 0.06;
-/// The third harmonic of a swing of amplitude A is at most this times A³: twice the 1/20 of a chain without resonance (judgement).
-const MOST_OF_HARMONIC: f64 = 0.1;
+/// The third harmonic of a swing is at most this many times that of a chain without resonance (judgement).
+const RESONANCE: f64 = 2.0;
 
 /// One link's part in a mode.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
@@ -326,19 +326,25 @@ fn envelope_of(whole: &Whole, mode: usize) -> Result<Envelope, String> {
     Ok(of(&own, 0)?.widened_for_other_modes(others, known))
 }
 
-/// Whether a mode is on the third harmonic of the slowest one throughout, and goes with it or is in the end no larger than that harmonic may be; where there are no
-/// windows, by the whole record's fit.
+/// Whether a mode is on the third harmonic of the slowest one, over the record and in each window, and goes with it or is in the end no larger than that harmonic may be;
+/// where there are no windows, over the record.
 fn may_be_harmonic(whole: &Whole, mode: usize) -> bool {
-    let Ok(windows) = whole.windows else { return harmonic_share(whole.fit, mode) >= 1.0 };
+    // a window may follow the harmonic where the record shows another line
+    if !is_on_third_harmonic(whole.fit, mode) {
+        return false;
+    }
+    let is_small = |own_rad: f64, slowest_rad: f64| own_rad < RESONANCE * LARGEST_HARMONIC * slowest_rad.powi(3);
+    let Ok(windows) = whole.windows else {
+        return is_small(whole.fit.amplitude_rad(mode), whole.fit.amplitude_rad(0));
+    };
     let (own, slowest) = (&windows.moments[mode], &windows.moments[0]);
     let last = own.last().and_then(|last| Some((last, slowest.iter().find(|moment| moment.t_s == last.t_s)?)));
-    let Some((last, beside)) = last.filter(|_| mode > 0) else { return false };
+    let Some((last, beside)) = last else { return false };
     let is_locked = own.iter().all(|moment| {
         let beside = slowest.iter().find(|beside| beside.t_s == moment.t_s);
         beside.is_some_and(|beside| (moment.omega_rad_s / beside.omega_rad_s / 3.0 - 1.0).abs() < LOCKED)
     });
-    let is_small = last.amplitude_rad() < MOST_OF_HARMONIC * beside.amplitude_rad().powi(3);
-    is_locked && (is_small || is_all_driven(own, slowest))
+    is_locked && (is_small(last.amplitude_rad(), beside.amplitude_rad()) || is_all_driven(own, slowest))
 }
 
 fn shape(whole: &Whole, mode: usize) -> Vec<LinkMotion> {
