@@ -5,11 +5,10 @@ use std::path::Path;
 use serde::Serialize;
 
 use crate::angles::AngleSource;
-use crate::caution::cautions;
+use crate::caution::{cautions, longest_gap};
 use crate::digest;
 use crate::error::Result;
 use crate::measure::{Measurement, Options};
-use crate::track::Point;
 use crate::video::Timing;
 
 /// The file, ready to be written.
@@ -230,22 +229,6 @@ impl Sidecar {
                 m.decoded.packets
             ));
         }
-        for (i, mark) in self.marks.iter().enumerate() {
-            if mark.share_measured < 0.98 {
-                warnings.push(format!(
-                    "mark {} ({}) was measured in {:.1} % of the frames, longest gap {} frames; {}",
-                    i + 1,
-                    mark.colour,
-                    100.0 * mark.share_measured,
-                    mark.longest_gap_frames,
-                    if self.options.roi_px.is_some() || self.options.mask.is_some() {
-                        "where it leaves the region of --roi or --mask, widen that"
-                    } else {
-                        "look with --overlay where it is covered, or dark: then a lower --threshold finds it"
-                    }
-                ));
-            }
-        }
         if m.stream.streams > 1 && m.stream.other_videos > 0 {
             warnings.push(format!("the file holds several video streams; stream {} was measured", m.stream.stream));
         }
@@ -308,21 +291,15 @@ impl Mark {
             colour: m.marks[index].name.clone(),
             frames_measured: measured.len(),
             share_measured: measured.len() as f64 / points.len().max(1) as f64,
-            longest_gap_frames: longest_gap(points),
+            longest_gap_frames: longest_gap(points).len(),
             partial_frames: points.iter().filter(|p| p.flags.contains(crate::track::Flags::PARTIAL)).count(),
             median_area_px2: m.tracks.area_px2[index],
             noise_px: [rms(0), rms(1)],
             scatter_factor_at_rest: m.tracks.scatter[index].resting,
-            scatter_factor_in_motion: m.tracks.scatter[index].moving,
+            scatter_factor_in_motion: [0, 1].map(|axis: usize| m.tracks.scatter[index].moving[axis].mean()),
             acceleration_psd_px2_s3: m.tracks.motion[index].acceleration_psd_px2_s3,
         }
     }
-}
-
-fn longest_gap(points: &[Point]) -> usize {
-    points
-        .chunk_by(|a, b| a.measured.is_some() == b.measured.is_some())
-        .fold(0, |longest, run| if run[0].measured.is_some() { longest } else { longest.max(run.len()) })
 }
 
 impl Link {

@@ -8,9 +8,11 @@ use crate::statistics::median;
 use crate::track::chain_detection::{LEAST_TURN, MOST_MARKS};
 use crate::track::{Point, UnusedObject};
 
+mod gap;
 mod link;
 mod pivot;
 
+pub use gap::longest_gap;
 pub use link::MOST_LENGTH_SPREAD;
 
 /// Frames below which nothing is said about a link or a mark.
@@ -67,6 +69,7 @@ pub fn cautions(m: &Measurement, options: &Options) -> Vec<String> {
         // a hand's trembling is no noise of a mark's
         cautions.extend(mark_noise(m, mark).filter(|_| held.is_none()));
         cautions.extend(blur(m, mark));
+        cautions.extend(gap::unmeasured(m, options, mark));
     }
     cautions.extend(held);
     cautions.extend(caught(m));

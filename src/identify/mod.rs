@@ -75,6 +75,8 @@ use spectrum::Spectrum;
 use tumbling::Tumbling;
 use windows::Windows;
 
+/// Farthest that the angle at rest of what hangs can move, rad: it rests within a quarter turn of the vertical.
+const MOST_DRIFT_RAD: f64 = std::f64::consts::FRAC_PI_2;
 /// A value whose own standard deviation is so many times the usual one is left out: all values count alike here, and its weight should be a twenty-fifth.
 const UNSURE: f64 = 5.0;
 
@@ -337,6 +339,7 @@ impl Identification {
         let needs_no_drift = modulated.as_ref().is_some_and(|own| own.drift_terms == 0);
         let fit = if needs_no_drift { fit.with_drift_terms(recorded, 0) } else { fit };
         self.drift_rad = fit.drift_ranges_rad(recorded);
+        self.note_impossible_drift();
         let signal = &fit.without_drift(recorded);
         let windows = Windows::of(signal, &fit);
         self.record.noise_rad = match (&windows, &modulated) {
@@ -380,6 +383,21 @@ impl Identification {
         if signal.links.len() == 1 {
             self.notes.extend(close_pair::of_one_link(&self.modes));
         }
+    }
+
+    /// A note of each angle at rest that moves farther than what hangs can.
+    fn note_impossible_drift(&mut self) {
+        let measured = self.record.measured;
+        let angles = self.drift_rad.iter().enumerate().filter(|_| measured == Measured::Angles);
+        let notes = angles.filter(|(_, drift_rad)| **drift_rad > MOST_DRIFT_RAD).map(|(link, drift_rad)| {
+            format!(
+                "{}: its angle at rest moves by {}, as that of nothing that hangs does: a mark was lost, or another taken for it; look with `track --overlay`, and leave that part out with --from or --until",
+                measured.name(link),
+                measured.show(*drift_rad, 0)
+            )
+        });
+        let notes: Vec<String> = notes.collect();
+        self.notes.extend(notes);
     }
 
     /// The modes without those that may be the harmonic of a large swing, and those without one frequency; a note says so of each.

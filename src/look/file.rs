@@ -165,6 +165,12 @@ fn pivot(text: &mut String, finding: &Finding) {
         return;
     };
     let ([x, y], [sx, sy]) = (arc.centre_px, arc.sd_px);
+    if sx.hypot(sy) > arc.radius_px && !finding.hinge_marked {
+        text.push_str(
+            "# the first mark's path is too straight to show where it hangs: set pivot_px = [x, y] if that is known\n",
+        );
+        return;
+    }
     let (width, height) = finding.stream.orientation.size(finding.stream.stored_size_px);
     let inside = (0.0..width as f64).contains(&x) && (0.0..height as f64).contains(&y);
     let beside = if inside { "" } else { ", outside the picture" };

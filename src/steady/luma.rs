@@ -5,24 +5,32 @@ use crate::video::Picture;
 /// Half the side of a patch.
 pub(super) const HALF: i64 = crate::area::PATCH_HALF_PX as i64;
 
-/// The luma of a picture as 8-bit codes.
-pub(super) struct Luma<'a> {
-    picture: &'a Picture<'a>,
+/// The luma of a picture as 8-bit codes, row by row: each is read some hundred times.
+pub(super) struct Luma {
+    codes: Vec<f32>,
     pub width: usize,
     pub height: usize,
-    scale: f32,
 }
 
-impl<'a> Luma<'a> {
-    pub fn of(picture: &'a Picture<'a>) -> Self {
+impl Luma {
+    pub fn of(picture: &Picture<'_>) -> Self {
         let layout = picture.layout;
         let scale = 1.0 / f32::from(1u16 << (layout.bits - 8)) / f32::from(1u16 << layout.low_bits);
-        Self { picture, width: layout.width_px, height: layout.height_px, scale }
+        let (width, height, wide) = (layout.width_px, layout.height_px, picture.wide());
+        let mut codes = Vec::with_capacity(width * height);
+        (0..height).for_each(|y| codes.extend((0..width).map(|x| f32::from(picture.luma.code(wide, x, y)) * scale)));
+        Self { codes, width, height }
     }
 
     #[inline]
     pub fn code(&self, x: i64, y: i64) -> f32 {
-        f32::from(self.picture.luma.code(self.picture.wide(), x as usize, y as usize)) * self.scale
+        self.codes[y as usize * self.width + x as usize]
+    }
+
+    /// A row from a pixel on.
+    #[inline]
+    pub fn row(&self, x: i64, y: i64) -> &[f32] {
+        &self.codes[y as usize * self.width + x as usize..]
     }
 
     /// A patch about this pixel lies inside.

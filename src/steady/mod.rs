@@ -31,8 +31,10 @@ const FEWEST_AGREEING: usize = 6;
 const AGREEING_SHARE: f64 = 0.5;
 /// Share of the picture's width that they span, at least: what swings is a smaller thing.
 const LEAST_SPAN: f64 = 0.4;
-/// First shifts within which two patches say the same, px.
-const SAME_PX: f64 = 3.5;
+/// Coarse shifts of least difference that are looked at closer: a wall repeats itself along both directions.
+const MOST_MINIMA: usize = 8;
+/// Standard errors within which two shifts explain the patches equally well: 95 % of chance.
+const BY_CHANCE: f64 = 2.0;
 /// Residual within which a patch agrees, px, at least.
 const AGREEMENT_PX: f64 = 0.25;
 /// Fewer patches do not tell a turn from a shift.
@@ -68,17 +70,32 @@ impl Background {
         self.agree(&found, start)
     }
 
-    /// A first shift in whole pixels: the one that most patches say. What swings may hold the clearest patches.
-    fn scout(&self, luma: &Luma<'_>) -> Option<[f64; 2]> {
-        let shifts: Vec<[f64; 2]> = self.patches.iter().filter_map(|p| p.search(luma)).collect();
-        let near = |a: &[f64; 2], b: &[f64; 2]| (a[0] - b[0]).hypot(a[1] - b[1]) < SAME_PX;
-        let agreeing = |a: &[f64; 2]| shifts.iter().filter(|b| near(a, b)).count();
-        let best = shifts.iter().max_by_key(|a| agreeing(a))?;
-        let mean = |axis: usize| {
-            let said = shifts.iter().filter(|b| near(best, b));
-            said.map(|b| b[axis]).sum::<f64>() / agreeing(best) as f64
+    /// A first shift, to a pixel: that of the least mean difference of all patches. What swings may hold the clearest patches, and a wall repeats itself: of shifts that
+    /// explain the patches equally well it is the smallest.
+    fn scout(&self, luma: &Luma) -> Option<[f64; 2]> {
+        let shifts = patch::coarse_shifts();
+        let coarse = self.differences(luma, &shifts);
+        let is_least_around =
+            |at: usize| neighbours(at, patch::COARSE_SIDE).all(|other| coarse[at].mean <= coarse[other].mean);
+        let mut minima: Vec<usize> =
+            (0..shifts.len()).filter(|at| coarse[*at].mean < 1.0 && is_least_around(*at)).collect();
+        minima.sort_by(|a, b| coarse[*a].mean.total_cmp(&coarse[*b].mean));
+        // a fine texture hardly shows three pixels beside its place
+        let finest = |at: &usize| {
+            let fine = patch::fine_shifts(shifts[*at]);
+            let differences = self.differences(luma, &fine).into_iter();
+            differences.zip(fine).min_by(|a, b| a.0.mean.total_cmp(&b.0.mean))
         };
-        Some([mean(0), mean(1)])
+        let finest: Vec<(Differences, [i64; 2])> = minima.iter().take(MOST_MINIMA).filter_map(finest).collect();
+        let (best, _) = finest.iter().min_by(|a, b| a.0.mean.total_cmp(&b.0.mean))?;
+        let equals = finest.iter().filter(|(own, _)| own.equals(best));
+        equals.map(|(_, shift)| *shift).min_by_key(|[dx, dy]| dx * dx + dy * dy).map(|shift| shift.map(|s| s as f64))
+    }
+
+    /// Of all patches at each of some shifts.
+    fn differences(&self, luma: &Luma, shifts: &[[i64; 2]]) -> Vec<Differences> {
+        let by_patch: Vec<_> = self.patches.iter().map(|patch| patch.differences(luma, shifts)).collect();
+        (0..shifts.len()).map(|at| Differences::of(by_patch.iter().map(|own| own[at]).collect())).collect()
     }
 
     /// Keeps the patches that agreed in at least half of some pictures.
@@ -170,6 +187,39 @@ impl Background {
         let variance = kept.iter().map(square).sum::<f64>() / freedom.max(1.0);
         Some(CameraShift { covariance: inverse * variance, ..camera })
     }
+}
+
+/// How much the patches differ from a picture at one shift.
+struct Differences {
+    each: Vec<Option<f64>>,
+    /// Infinite where most patches would lie outside the picture.
+    mean: f64,
+}
+
+impl Differences {
+    fn of(each: Vec<Option<f64>>) -> Self {
+        let count = each.iter().flatten().count();
+        let is_seen = 2 * count >= each.len().max(1);
+        let mean = if is_seen { each.iter().flatten().sum::<f64>() / count as f64 } else { f64::INFINITY };
+        Self { each, mean }
+    }
+
+    /// No larger than another's but by chance, patch by patch.
+    fn equals(&self, best: &Self) -> bool {
+        let pairs = self.each.iter().zip(&best.each).filter_map(|(own, other)| Some((*own)? - (*other)?));
+        let pairs: Vec<f64> = pairs.collect();
+        let n = pairs.len() as f64;
+        let mean = pairs.iter().sum::<f64>() / n;
+        let variance = pairs.iter().map(|own| (own - mean).powi(2)).sum::<f64>() / (n - 1.0);
+        std::ptr::eq(self, best) || mean <= BY_CHANCE * (variance / n).sqrt()
+    }
+}
+
+/// What lies around a place of a square grid.
+fn neighbours(at: usize, side: usize) -> impl Iterator<Item = usize> {
+    let (x, y) = (at % side, at / side);
+    let around = move |own: usize| own.saturating_sub(1)..=(own + 1).min(side - 1);
+    around(y).flat_map(move |j| around(x).map(move |i| j * side + i)).filter(move |other| *other != at)
 }
 
 /// A patch, and by how much it has shifted.

@@ -5,8 +5,14 @@ use nalgebra::{Matrix2, Vector2};
 use super::luma::{HALF, Luma};
 use super::smooth::Smooth;
 
-/// Farthest that a patch is sought, px.
-const REACH_PX: i64 = 21;
+/// Farthest that a patch is sought along each axis, px: twice the way that a camera held by hand moves, for the reference picture may be taken at an end of it.
+const REACH_PX: i64 = 30;
+/// Pixels of a row, and rows, of which one is compared.
+const EVERY: usize = 4;
+/// From one coarse shift to the next, px.
+const STEP_PX: i64 = 2;
+/// How far a patch lies from the edge, px, at least: as far as most shifts.
+const MARGIN_PX: i64 = 10;
 /// Columns and rows of cells, each with one patch.
 const CELLS: [usize; 2] = [8, 6];
 /// Mean square of the weaker gradient of the smoothed picture, codes²/px², below which a patch is too plain to be found
@@ -36,7 +42,7 @@ pub(super) struct Patch {
 
 impl Patch {
     /// About a pixel, unless it lies too near to the edge or is plain.
-    fn at(luma: &Luma<'_>, x: i64, y: i64) -> Option<Self> {
+    fn at(luma: &Luma, x: i64, y: i64) -> Option<Self> {
         if !luma.holds(x, y) {
             return None;
         }
@@ -73,37 +79,36 @@ impl Patch {
         })
     }
 
-    /// The shift with the least difference, to two pixels, every fourth pixel compared: near enough to go on from.
-    pub fn search(&self, luma: &Luma<'_>) -> Option<[f64; 2]> {
-        let mut best: Option<(f32, [i64; 2])> = None;
-        let side = 2 * HALF + 1;
-        let mut consider = |dx: i64, dy: i64| {
-            if !luma.holds(self.x + dx, self.y + dy) {
-                return;
+    /// The variance of the difference at each of some shifts, over the patch's own and at most 1, one pixel in [`EVERY`]² compared; `None` where the patch would lie outside
+    /// the picture.
+    pub fn differences(&self, luma: &Luma, shifts: &[[i64; 2]]) -> Vec<Option<f64>> {
+        let side = (2 * HALF + 1) as usize;
+        let own_variance = self.squares as f32 / self.values.len() as f32;
+        let rows = || (1..side).step_by(EVERY);
+        let own: Vec<f32> =
+            rows().flat_map(|j| self.values[j * side + 1..][..side - 1].iter().step_by(EVERY)).copied().collect();
+        let difference = |&[dx, dy]: &[i64; 2]| {
+            let [x, y] = [self.x + dx, self.y + dy];
+            if !luma.holds(x, y) {
+                return None;
             }
-            let (mut sum, mut squares, mut count) = (0.0f32, 0.0f32, 0.0f32);
-            for j in (1..side).step_by(4) {
-                for i in (1..side).step_by(4) {
-                    let value = luma.code(self.x + dx + i - HALF, self.y + dy + j - HALF);
-                    let difference = value - self.values[(j * side + i) as usize];
-                    (sum, squares, count) = (sum + difference, squares + difference * difference, count + 1.0);
+            let (mut sum, mut squares) = (0.0f32, 0.0f32);
+            for (j, own) in rows().zip(own.chunks_exact((side - 1).div_ceil(EVERY))) {
+                let row = luma.row(x + 1 - HALF, y + j as i64 - HALF);
+                for (value, own) in row.iter().step_by(EVERY).zip(own) {
+                    let difference = value - own;
+                    (sum, squares) = (sum + difference, squares + difference * difference);
                 }
             }
+            let count = own.len() as f32;
             let variance = squares / count - (sum / count).powi(2);
-            if best.is_none_or(|(least, _)| variance < least) {
-                best = Some((variance, [dx, dy]));
-            }
+            Some(f64::from((variance / own_variance).min(1.0)))
         };
-        for dy in (-REACH_PX..=REACH_PX).step_by(3) {
-            for dx in (-REACH_PX..=REACH_PX).step_by(3) {
-                consider(dx, dy);
-            }
-        }
-        best.map(|(_, shift)| shift.map(|s| s as f64))
+        shifts.iter().map(difference).collect()
     }
 
     /// The shift to a fraction of a pixel, from a first one.
-    pub fn find(&self, luma: &Luma<'_>, start: [f64; 2]) -> Option<[f64; 2]> {
+    pub fn find(&self, luma: &Luma, start: [f64; 2]) -> Option<[f64; 2]> {
         let mut shift = start;
         let mut values = Vec::with_capacity(self.values.len());
         for _ in 0..20 {
@@ -129,8 +134,26 @@ impl Patch {
     }
 }
 
+/// Shifts near enough to one another to go on from, row by row, [`COARSE_SIDE`] in each.
+pub(super) fn coarse_shifts() -> Vec<[i64; 2]> {
+    grid(REACH_PX, STEP_PX)
+}
+
+/// How many [`coarse_shifts`] lie in a row.
+pub(super) const COARSE_SIDE: usize = (2 * REACH_PX / STEP_PX + 1) as usize;
+
+/// Shifts about a coarse one, a pixel apart.
+pub(super) fn fine_shifts([x, y]: [i64; 2]) -> Vec<[i64; 2]> {
+    grid(STEP_PX - 1, 1).into_iter().map(|[dx, dy]| [x + dx, y + dy]).collect()
+}
+
+fn grid(reach_px: i64, step_px: i64) -> Vec<[i64; 2]> {
+    let along = || (-reach_px..=reach_px).step_by(step_px as usize);
+    along().flat_map(|dy| along().map(move |dx| [dx, dy])).collect()
+}
+
 /// Patches around points (px), without those that are too plain.
-pub(super) fn about(points_px: &[[f64; 2]], luma: &Luma<'_>) -> Vec<Patch> {
+pub(super) fn about(points_px: &[[f64; 2]], luma: &Luma) -> Vec<Patch> {
     let smooth = Smooth::of(luma);
     let places = points_px.iter().map(|p| (p[0].round() as i64, p[1].round() as i64));
     let clear = places.filter(|(x, y)| smooth.weaker_gradient(luma, *x, *y) > LEAST_GRADIENT);
@@ -138,10 +161,10 @@ pub(super) fn about(points_px: &[[f64; 2]], luma: &Luma<'_>) -> Vec<Patch> {
 }
 
 /// The best patch of every cell, the clearest first.
-pub(super) fn clearest(luma: &Luma<'_>) -> Vec<Patch> {
+pub(super) fn clearest(luma: &Luma) -> Vec<Patch> {
     let smooth = Smooth::of(luma);
     let mut patches = Vec::new();
-    let margin = HALF + REACH_PX / 2;
+    let margin = HALF + MARGIN_PX;
     for row in 0..CELLS[1] {
         for column in 0..CELLS[0] {
             let range = |cell: usize, cells: usize, size: usize| {

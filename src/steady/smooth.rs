@@ -17,7 +17,7 @@ pub(super) struct Smooth {
 }
 
 impl Smooth {
-    pub fn of(luma: &Luma<'_>) -> Self {
+    pub fn of(luma: &Luma) -> Self {
         let (width, height, side) = (luma.width, luma.height, 2 * SMOOTH_HALF + 1);
         // whole rows at a time, in loops that the compiler can turn into vector instructions
         let add = |sums: &mut [f32], row: &[f32]| sums.iter_mut().zip(row).for_each(|(sum, value)| *sum += value);
@@ -40,7 +40,7 @@ impl Smooth {
 
     /// Mean square of the weaker gradient of the patch at (x, y), of what of it has smooth surroundings; 0 outside the
     /// picture.
-    pub fn weaker_gradient(&self, luma: &Luma<'_>, x: i64, y: i64) -> f64 {
+    pub fn weaker_gradient(&self, luma: &Luma, x: i64, y: i64) -> f64 {
         if !luma.holds(x, y) {
             return 0.0;
         }

@@ -4,7 +4,7 @@
 use super::choose::UnusedObject;
 use super::follower::measurement;
 use super::kalman::{Belief, Motion};
-use super::noise::{Scatter, speeds_along, variance_factor};
+use super::noise::{Scatter, speeds_along};
 use super::smooth::smooth;
 use super::{Filtered, Flags, Measured, Point};
 use crate::statistics::median;
@@ -47,7 +47,7 @@ impl Tracks {
         let usual_px2 = usual_area(&measured, &speeds, area);
         for (i, ((m, f), speed)) in measured.iter_mut().zip(&mut flags).zip(speeds).enumerate() {
             if let Some(m) = m {
-                let factor = |axis: usize| variance_factor(along[axis][i], scatter.resting[axis], scatter.moving[axis]);
+                let factor = |axis: usize| scatter.variance_factor(along[axis][i], axis);
                 let [x, y] = [0, 1].map(factor);
                 m.covariance_px2[0] *= x;
                 m.covariance_px2[1] *= y;

@@ -51,6 +51,8 @@ pub struct Timing {
 
 /// Gaps that are listed one by one.
 const LISTED_GAPS: usize = 100;
+/// Scatter of the steps between gaps, over the usual one, of a camera whose rate varies: one of a constant rate rounds its stamps, or repeats a picture now and then.
+const VARYING_RATE: f64 = 0.1;
 /// Relative difference of stated and real rate that is worth a warning.
 pub const RATE_TOLERANCE: f64 = 2e-3;
 
@@ -101,17 +103,27 @@ impl Timing {
         }
     }
 
+    /// The camera takes its frames at no constant rate, so that a long step is no gap.
+    pub fn varies(&self) -> bool {
+        self.jitter_sd_s > VARYING_RATE * self.median_step_s
+    }
+
     /// What a person should know.
     pub fn warnings(&self) -> Vec<String> {
         let mut warnings = Vec::new();
-        if let (Some(nominal), Some(real)) = (self.nominal_rate_hz, self.real_rate_hz)
+        if self.varies() {
+            warnings.push(format!(
+                "the frame rate varies, from one frame to the next it is {:.3} to {:.3} s; the time stamps are used; whether frames are missing, they do not tell",
+                self.shortest_step_s, self.longest_step_s
+            ));
+        } else if let (Some(nominal), Some(real)) = (self.nominal_rate_hz, self.real_rate_hz)
             && (real / nominal - 1.0).abs() > RATE_TOLERANCE
         {
             warnings.push(format!(
                 "the file states {nominal:.3} frames per second, its time stamps say {real:.3} between gaps; the stamps are used"
             ));
         }
-        if self.gap_count > 0 {
+        if self.gap_count > 0 && !self.varies() {
             warnings.push(format!(
                 "{} gap{} in the time stamps, {} frame{} missing, the longest {:.3} s",
                 self.gap_count,
@@ -155,6 +167,15 @@ mod tests {
         let warnings = Timing::audit(&t, Some(30.0), 1e-3).warnings();
         assert_eq!(warnings.len(), 1);
         assert!(warnings[0].contains("states 30.000") && warnings[0].contains("25.000"), "{warnings:?}");
+    }
+
+    #[test]
+    fn a_rate_that_varies_has_no_gaps() {
+        let t: Vec<f64> =
+            (0..100).scan(0.0, |t, i| Some(std::mem::replace(t, *t + [1.0, 2.0, 3.0][i * i % 7 % 3] / 60.0))).collect();
+        let warnings = Timing::audit(&t, Some(30.0), 1e-3).warnings();
+        assert_eq!(warnings.len(), 1, "{warnings:?}");
+        assert!(warnings[0].contains("0.017 to 0.050 s"), "{warnings:?}");
     }
 
     #[test]

@@ -86,12 +86,16 @@ fn audit(track: &Track) -> String {
     let repeated = stamps.repeated_or_backward_frames.len();
     let rates = stamps.real_rate_hz.zip(stamps.nominal_rate_hz);
     let rate = match rates {
-        Some((real, stated)) if ((real - stated) / stated).abs() > 2e-3 => {
+        Some((real, stated)) if !stamps.varies() && ((real - stated) / stated).abs() > 2e-3 => {
             "The file states another rate than its time stamps have."
         }
         _ => "",
     };
-    let found = if stamps.missing_frames == 0 && repeated == 0 {
+    let found = if stamps.varies() {
+        format!(
+            "The frame rate varies; whether frames are missing, the stamps do not tell. {repeated} repeat a time stamp or run backwards."
+        )
+    } else if stamps.missing_frames == 0 && repeated == 0 {
         "No frame is missing and none repeats.".to_owned()
     } else {
         format!(
