@@ -12,7 +12,7 @@ use crate::experiment::Experiment;
 use crate::fit::{self, Fit, Pace, Record, Seen, Verdict};
 use crate::model::{Chain, ForwardModel, Parameter};
 use crate::output::OutputFile;
-use crate::progress::Progress;
+use crate::progress::{Progress, Silent};
 
 /// Fit the forward model to recordings: parameters, simulated against measured, does it reproduce the decay.
 #[derive(Debug, clap::Args)]
@@ -84,10 +84,21 @@ impl FitArgs {
         bar.begin("fitting", Some(fit::stages(&[]) + fit::stages(&free)));
         let side = |free: &[Parameter]| Ok(Side::of(fit::fit_watched(&records, &experiment, free, &bar)?, window_s));
         let of_links = Chain::of(&experiment.specimen)?.parameters();
+        let given = side(&[])?;
+        let fitted = side(&free)?;
+        let bends = experiment.model.effects.distributed_flexibility.is_some();
+        let (fitted, pieces) = if bends && !experiment.model.states_pieces && !fitted.is_reproduced() {
+            let (fit, pieces) = fit::with_best_rods(fitted.fit, &records, &experiment, &free, &Silent)?;
+            (Side::of(fit, window_s), pieces)
+        } else {
+            (fitted, experiment.model.pieces)
+        };
         let report = Report {
+            pieces: bends.then_some(pieces),
+            usual_pieces: experiment.model.pieces,
             links_taken: !experiment.specimen.links.is_empty() && !free.iter().any(|p| of_links.contains(p)),
-            given: side(&[])?,
-            fitted: side(&free)?,
+            given,
+            fitted,
             start: free.iter().map(|p| model.value(*p).unwrap_or(0.0)).collect(),
             paces: seen.iter().map(|seen| Pace::of(seen.as_ref()?, &experiment)).collect(),
             records: &records,
@@ -155,6 +166,10 @@ impl Side {
         let verdicts = (0..fit.residuals.len()).map(|record| Verdict::of_fit(&fit, record, window_s)).collect();
         Self { fit, verdicts }
     }
+
+    fn is_reproduced(&self) -> bool {
+        self.verdicts.iter().all(Verdict::is_reproduced)
+    }
 }
 
 struct Report<'a> {
@@ -166,6 +181,10 @@ struct Report<'a> {
     specimen: &'a str,
     /// General links of which nothing is free.
     links_taken: bool,
+    /// Rods between two marks of a strip that bends all along.
+    pieces: Option<usize>,
+    /// As many as the file, or the program by itself, takes.
+    usual_pieces: usize,
 }
 
 impl Report<'_> {
@@ -225,6 +244,13 @@ impl Report<'_> {
         }
         if self.fitted.fit.coloured {
             text.push_str(&paragraph("  ", "The residuals are correlated in time; the intervals are widened for it."));
+        }
+        if let Some(pieces) = self.pieces.filter(|pieces| *pieces != self.usual_pieces) {
+            let line = format!(
+                "The strip is taken as {pieces} rods between two marks, which follow the recording better than the usual {}; the file's values are compared with the usual number. `pieces` in [model] sets it.",
+                self.usual_pieces
+            );
+            text.push_str(&paragraph("  ", &line));
         }
         let is_reproduced = self.is_reproduced();
         let line = match is_reproduced {
@@ -327,7 +353,7 @@ impl Report<'_> {
 
     /// Whether every recording is: elsewhere the parameters take up what the model lacks.
     fn is_reproduced(&self) -> bool {
-        self.fitted.verdicts.iter().all(Verdict::is_reproduced)
+        self.fitted.is_reproduced()
     }
 
     fn json(&self) -> Value {
@@ -341,6 +367,7 @@ impl Report<'_> {
             "correlation": rows(&self.fitted.fit.correlation),
             "undetermined": self.fitted.fit.undetermined.iter().map(|c| c.iter().map(|(p, share)| json!([p.id(), share])).collect()).collect::<Vec<Value>>(),
             "coloured_residuals": self.fitted.fit.coloured,
+            "pieces": self.pieces,
             "intervals_valid": self.is_reproduced(),
             "converged": self.fitted.fit.ending == fit::Ending::Converged,
             "recordings": (0..self.records.len()).map(|i| self.recording_json(i)).collect::<Vec<_>>(),

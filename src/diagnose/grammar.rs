@@ -72,6 +72,11 @@ impl Term {
         self.modulation == NO_MODULATION
     }
 
+    /// Whether it sets in at an instant.
+    pub fn sets_in(&self) -> bool {
+        self.modulation == SETTING_IN
+    }
+
     /// Whether it goes with the load of its bearing.
     pub fn is_by_load(&self) -> bool {
         self.modulation == WITH_LOAD.words
@@ -182,11 +187,18 @@ struct Modulation {
 
 /// It does not.
 const NO_MODULATION: &str = "none";
+const SETTING_IN: &str = "from an instant on";
 /// With time.
 const WITH_TIME: [Modulation; 3] = [
     Modulation { words: "growing with time", formula: "t", starts: &[], powers: [0, 1, 0] },
     Modulation { words: "fading with time", formula: "exp(-t / d)", starts: &[0.3], powers: [0, 0, 0] },
-    Modulation { words: "from an instant on", formula: "step(t - d)", starts: &[0.35, 0.65], powers: [0, 0, 0] },
+    // within some steps of an integrator, without which no derivative tells where the instant lies
+    Modulation {
+        words: SETTING_IN,
+        formula: "(1 + tanh((t - d) / 0.1)) / 2",
+        starts: &[0.2, 0.4, 0.6, 0.8],
+        powers: [0, 0, 0],
+    },
 ];
 /// Of what goes with a rate, with the angle.
 const WITH_ANGLE: [Modulation; 2] = [

@@ -7,6 +7,9 @@ use super::refit::Refit;
 use super::settings::Settings;
 use crate::fit::{Residuals, Verdict, recordings};
 
+/// What makes fewer cycles in a recording has no frequency.
+pub const FEWEST_CYCLES: usize = 2;
+
 /// Where something unknown acts: sought around the base model, near the effect that explains most.
 pub fn place_of_unknown(posterior: &Posterior<'_>, settings: &Settings) -> Option<Place> {
     let of_nearest = posterior.by_contribution(posterior.best()).first().map(|effect| effect.place());
@@ -63,20 +66,21 @@ fn goes_with(residuals: &Residuals) -> Option<Phase> {
     })
 }
 
-/// The frequency at which what is left is strongest.
+/// The frequency at which what is left is strongest, up to half the rate of the rows; `None` of what makes less than two cycles: that is an offset or a drift.
 fn strongest_hz(residuals: &Residuals, characteristic_rad_s: f64) -> Option<f64> {
     let values = residuals.values.iter().max_by_key(|v| v.len())?;
     let span_s = values.last()?.t_s - values.first()?.t_s;
     let swing_hz = characteristic_rad_s / std::f64::consts::TAU;
-    let count = (8.0 * swing_hz * span_s) as usize;
+    let count = ((8.0 * swing_hz * span_s) as usize).min(values.len() / 2);
     let power = |k: usize| {
         let rate = std::f64::consts::TAU * k as f64 / span_s;
         let sum = values.iter().fold([0.0; 2], |s, r| {
             let (sin, cos) = (rate * r.t_s).sin_cos();
             [s[0] + r.left_rad() * sin, s[1] + r.left_rad() * cos]
         });
-        sum[0] * sum[0] + sum[1] * sum[1]
+        // an offset has twice the sum of a sine of its size
+        (sum[0] * sum[0] + sum[1] * sum[1]) / if k == 0 { 4.0 } else { 1.0 }
     };
-    let best = (1..count).map(|k| (k, power(k))).max_by(|a, b| a.1.total_cmp(&b.1))?;
-    Some(best.0 as f64 / span_s)
+    let best = (0..count).map(|k| (k, power(k))).max_by(|a, b| a.1.total_cmp(&b.1))?.0;
+    (best >= FEWEST_CYCLES).then(|| best as f64 / span_s)
 }

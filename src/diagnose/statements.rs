@@ -14,6 +14,10 @@ use crate::model::Parameter;
 
 /// A change of a probability that is worth a sentence (judgement: a percent).
 const SLIGHT_CHANGE: f64 = 0.01;
+/// Times the noise that read as one (format: two digits are told).
+const NEXT_TO_NOISE: f64 = 1.05;
+/// The least error of a length that is worth measuring again (judgement: 0.05 mm of 250 mm).
+const FINEST_PERCENT: f64 = 0.02;
 /// Rivals that are named in a sentence (judgement).
 const MOST_RIVALS: usize = 3;
 /// Ratios of frequencies that differ by less are one: the swing is slower at large angles (physics: by so much at 80°).
@@ -41,7 +45,7 @@ impl Findings<'_> {
                 self.nearest()
             ),
             Status::Identified => {
-                format!("Missing: {} ({sure}).{}{}", words(&verdict.effects), self.remark(), self.more())
+                format!("Missing: {} ({sure}).{}{}", words(&self.foremost_first()), self.remark(), self.more())
             }
             Status::Ambiguous => {
                 let is_rival =
@@ -56,7 +60,7 @@ impl Findings<'_> {
                     let unknown = percent(verdict.unknown);
                     let _ = write!(others, ", or an effect outside the table that looks like this ({unknown})");
                 }
-                let (effects, remark, more) = (words(&verdict.effects), self.remark(), self.more());
+                let (effects, remark, more) = (words(&self.foremost_first()), self.remark(), self.more());
                 let statement = format!("Missing: most likely {effects} ({sure}){others}.{remark}{more}");
                 match self.posterior.candidate(&[]).map(|base| base.probability) {
                     // the names of the class together are likelier than none of them, each set by itself is not
@@ -70,6 +74,14 @@ impl Findings<'_> {
             }
         };
         statement + &self.law() + &reservation
+    }
+
+    /// The names, what explains most first.
+    fn foremost_first(&self) -> Vec<Effect> {
+        let mut effects = self.verdict.effects.clone();
+        let order = self.posterior.by_contribution(self.named());
+        effects.sort_by_key(|effect| order.iter().position(|other| other == effect));
+        effects
     }
 
     /// The probability of the answer; of names whatever else may be missing, and where that is much less, that they are all.
@@ -105,10 +117,17 @@ impl Findings<'_> {
             );
         }
         let is_named = matches!(self.verdict.status, Status::Identified | Status::Ambiguous);
-        if is_named && !self.named().is_certified(&self.context.settings.certificate) {
-            return " The fit of this answer is not certified.".to_owned();
+        let fit = self.named();
+        if !is_named || fit.is_certified(&self.context.settings.certificate) {
+            return String::new();
         }
-        String::new()
+        let why = match (fit.converged, fit.certificate.nested_ok, fit.certificate.starts_agreeing) {
+            (false, ..) => "it has not converged".to_owned(),
+            (_, false, _) => "fewer effects leave less".to_owned(),
+            (.., 0 | 1) => "there was time for one start only".to_owned(),
+            (.., starts) => format!("only {starts} starts led to it"),
+        };
+        format!(" The fit of this answer is not certified: {why}.")
     }
 
     /// What of the table comes nearest to something that is not in it, and what is not told from that.
@@ -156,11 +175,16 @@ impl Findings<'_> {
             [] => "That".to_owned(),
             some => format!("Together with {}, less sure, that", words(some)),
         };
+        let is_small = over_noise < NEXT_TO_NOISE;
+        let size = if is_small {
+            "as much as the noise, yet not at random".to_owned()
+        } else {
+            format!("{} times the noise", number(over_noise, 2))
+        };
         let mut words = format!(
-            " {with} takes {} of what the base model leaves beyond the noise; {} mrad remain, {} times the noise",
+            " {with} takes {} of what the base model leaves beyond the noise; {} mrad remain, {size}",
             percent_of_all(self.explained()),
             number(1e3 * rms(&left.rmse_rad), 2),
-            number(over_noise, 2)
         );
         if let Some(place) = self.remains_at() {
             let _ = write!(words, ", {}", in_place(place));
@@ -168,7 +192,12 @@ impl Findings<'_> {
         if let Some(hz) = self.remaining.frequency_hz {
             let _ = write!(words, ", {}", self.in_swings(hz));
         }
-        words + if self.is_of_table() { "." } else { ": not in the table." }
+        words
+            + match (self.is_of_table(), is_small) {
+                (true, _) => ".",
+                (false, true) => ": something small that is not in the table.",
+                (false, false) => ": not in the table.",
+            }
     }
 
     /// The law that was learnt of what the names leave.
@@ -248,10 +277,9 @@ impl Findings<'_> {
         }
         if let Some(off) = self.length_off() {
             let (percent, long) = (1e2 * off.abs(), if off > 0.0 { "long" } else { "short" });
-            let _ = write!(
-                remark,
-                " Lengths in the file that are {percent:.2} % too {long} would do the same: measure them again."
-            );
+            let advice = if percent < FINEST_PERCENT { "no ruler tells so little" } else { "measure them again" };
+            let percent = number(percent, 2);
+            let _ = write!(remark, " Lengths in the file that are {percent} % too {long} would do the same: {advice}.");
         }
         remark
     }
@@ -365,11 +393,16 @@ fn words_of_torque(torque: &MissingTorque, phase: Option<Phase>) -> String {
     let place = in_place(torque.place);
     let mut words =
         format!("The missing torque {place}, estimated without a law, is {} N m rms", number(torque.rms, 2));
-    if let Some(hz) = torque.frequency_hz {
-        let _ = write!(words, ", strongest at {hz:.2} Hz");
+    match torque.frequency_hz {
+        Some(hz) => {
+            let _ = write!(words, ", strongest at {hz:.2} Hz");
+        }
+        None if torque.steady => words.push_str(", most of it steady"),
+        None => {}
     }
-    // what goes with the position takes and gives back
-    if let Some(share) = torque.energy_share.filter(|_| phase != Some(Phase::Position)) {
+    // what is steady or goes with the position takes and gives back
+    let takes = phase != Some(Phase::Position) && !torque.steady;
+    if let Some(share) = torque.energy_share.filter(|_| takes) {
         let does = if share < 0.0 { "it supplies as much as" } else { "it takes" };
         // it is estimated beside the energy lost, and nothing takes more than all of it
         let part = if share.abs() < 1.0 { format!("{:.0} %", 1e2 * share.abs()) } else { "about all".to_owned() };

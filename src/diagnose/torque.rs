@@ -5,6 +5,7 @@ use super::effect::{Phase, Place};
 use super::latent::{Filter, Form, LatentConfig, LatentForce};
 use super::latent_forces::unknowns;
 use super::linearisation::{Input, Linearisation};
+use super::locate::FEWEST_CYCLES;
 use super::refit::Refit;
 use super::{energy, noise};
 
@@ -32,6 +33,8 @@ pub struct MissingTorque {
     pub phase: Option<Phase>,
     /// Its strongest frequency.
     pub frequency_hz: Option<f64>,
+    /// Whether most of it is constant.
+    pub steady: bool,
     /// What it takes from the swing, as a share of all that the fit dissipates.
     pub energy_share: Option<f64>,
 }
@@ -60,12 +63,15 @@ impl MissingTorque {
         let strongest = (1..power.len()).max_by(|a, b| power[*a].total_cmp(&power[*b]));
         // with fewer rows per cycle it is noise
         let strongest = strongest.filter(|k| ROWS_A_CYCLE * k <= torque.len());
+        let mean = torque.iter().sum::<f64>() / torque.len().max(1) as f64;
+        let steady = mean * mean > 0.5 * rms * rms;
         let mut missing = Self {
             place: input.place(),
             record,
             rms,
             phase: None,
-            frequency_hz: strongest.map(|k| k as f64 / span_s),
+            frequency_hz: strongest.filter(|k| !steady && *k >= FEWEST_CYCLES).map(|k| k as f64 / span_s),
+            steady,
             energy_share: None,
             works_on: Vec::new(),
             t_s: around.t_s.clone(),
@@ -97,7 +103,7 @@ impl MissingTorque {
         }
         let part = |work: f64, of: f64| (work / (torque * of).sqrt().max(1e-300)).abs();
         let (angle, rate) = (part(with_angle, angle), part(with_rate, rate));
-        if angle.max(rate) > NO_PHASE {
+        if angle.max(rate) > NO_PHASE && !self.steady {
             self.phase = Some(if angle > rate { Phase::Position } else { Phase::Velocity });
         }
         let lost_j: f64 = energy::dissipated_j(fit, self.record).iter().sum();

@@ -141,6 +141,7 @@ impl Experiment {
         let states = |key: &str| keys.get("model").is_some_and(|model| model.get(key).is_some());
         let (links, model) = (self.specimen.lengths_m().len(), &mut self.model);
         model.states_damping = states("c_eq_n_m_s_per_rad");
+        model.states_pieces = states("pieces");
         if !states("release_rad") {
             model.release_rad = (0..links.max(1)).map(|link| 0.5 + 0.1 * link as f64).collect();
         }

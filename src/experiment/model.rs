@@ -115,6 +115,9 @@ pub struct Model {
     pub release_rad: Vec<f64>,
     /// Rods between two marks, where the strip bends everywhere (`distributed_flexibility`).
     pub pieces: usize,
+    /// Whether the file states that number.
+    #[serde(skip)]
+    pub states_pieces: bool,
     /// Physics beyond the base model.
     pub effects: Effects,
     /// Laws stated by a formula.
@@ -129,6 +132,7 @@ impl Default for Model {
             states_damping: false,
             release_rad: vec![0.5, 0.6],
             pieces: 8,
+            states_pieces: false,
             effects: Effects::default(),
             law: Vec::new(),
         }

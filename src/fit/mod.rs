@@ -34,6 +34,7 @@ pub mod predict;
 pub mod predictability;
 pub mod problem;
 pub mod record;
+pub mod rod_count;
 pub mod search;
 pub mod shooting;
 pub mod start_values;
@@ -55,6 +56,7 @@ pub use observed_modes::Seen;
 pub use predict::Prediction;
 pub use problem::{Belief, Problem};
 pub use record::{Record, recordings};
+pub use rod_count::with_best_rods;
 pub use verdict::Verdict;
 
 /// Residuals beyond this many standard deviations of their neighbours are outliers.

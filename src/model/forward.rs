@@ -154,6 +154,17 @@ impl ForwardModel {
         (self.gravity_m_s2.abs() * moment / self.chain.inertia_kg_m2().trace()).sqrt().max(1.0)
     }
 
+    /// The angle (rad) by which a unit of the laws' own variables moves the specimen: its torque against gravity, and at most what the law itself allows.
+    pub fn hidden_rad(&self) -> f64 {
+        let n = self.chain.count();
+        let moment: f64 = (0..n).map(|i| self.chain.static_moment_kg_m(i)).sum();
+        let held_n_m = self.gravity_m_s2.abs() * moment / n as f64;
+        let of = |[torque_n_m, most_rad]: [f64; 2]| {
+            if torque_n_m < most_rad * held_n_m { torque_n_m / held_n_m } else { most_rad }
+        };
+        self.effects.iter().map(|effect| of(effect.of_hidden())).fold(0.0, f64::max)
+    }
+
     /// Sideways position of the pivot (m).
     pub fn pivot_m(&self, t_s: f64) -> f64 {
         self.support().map_or(0.0, |s| s.at(t_s)[0])

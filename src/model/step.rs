@@ -169,6 +169,8 @@ pub struct Stages<'a> {
     elimination: Elimination,
     /// 1 / own inertia, by row.
     scale: Vec<f64>,
+    /// What a unit of the laws' own variables is worth.
+    hidden_rad: f64,
 }
 
 /// Where a step begins.
@@ -197,6 +199,7 @@ impl<'a> Stages<'a> {
             matrix: vec![0.0; STAGES * m * STAGES * m],
             elimination: Elimination::default(),
             scale: (0..m).map(|i| if i < n { 1.0 / balance.inertia_kg_m2(i) } else { 1.0 }).collect(),
+            hidden_rad: model.hidden_rad(),
             balance,
         }
     }
@@ -248,7 +251,7 @@ impl<'a> Stages<'a> {
         let right = inertia * &rate - with_theta * &angle * gamma;
         let Some(rate) = matrix.lu().solve(&right) else { return f64::INFINITY };
         let characteristic_rad_s = self.balance.model().characteristic_rad_s();
-        let hidden = rate.rows(n, m - n).amax();
+        let hidden = self.hidden_rad * rate.rows(n, m - n).amax();
         let of_coordinate = |i: usize| {
             self.balance.seen(i) * (angle[i] + gamma * rate[i]).abs().max(rate[i].abs() / characteristic_rad_s)
         };

@@ -52,9 +52,9 @@ pub fn candidates(
     let left_out = left_out(names);
     let lower = best.problem.lower();
     let (apart, alone) = (told_apart(&torques, settings.the_same), recordings(best.problem.records).len() == 1);
-    // in a single release the amplitude falls with time, and a loss that drifts stands for any loss
+    // in a single release the amplitude falls with time, and a loss that drifts stands for any loss; one that sets in bends the decay at an instant
     let of_loss = alone && names.iter().any(|effect| effect.entry().acts == Acts::Loss);
-    let drifts = |term: &Term| of_loss && term.drifts && term.state != "angle";
+    let drifts = |term: &Term| of_loss && term.drifts && !term.sets_in() && term.state != "angle";
     let promise = |out: &Vec<Effect>| {
         let parameters: Vec<Parameter> = out.iter().flat_map(|effect| effect.parameters()).copied().collect();
         let gone: Vec<usize> = parameters.iter().filter_map(|parameter| best.place(*parameter)).collect();

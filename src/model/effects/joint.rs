@@ -131,6 +131,11 @@ impl Effect for Hysteresis {
         chain.count() - 1
     }
 
+    /// T_h, and the bend Δ_y at which it yields.
+    fn of_hidden(&self) -> [f64; 2] {
+        [self.torque_n_m.abs(), self.yield_rad]
+    }
+
     fn add_torque(&self, chain: &Chain, motion: &Motion, q: &mut [f64]) {
         let n = chain.count();
         for bend in bends(chain, motion) {

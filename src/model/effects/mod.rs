@@ -72,6 +72,11 @@ pub trait Effect: std::fmt::Debug + Send + Sync {
         0
     }
 
+    /// The torque (N·m) of a unit of those variables, and the angle (rad) that it moves at most.
+    fn of_hidden(&self) -> [f64; 2] {
+        [0.0; 2]
+    }
+
     /// What it adds to the cost of a step, where that is not next to nothing, in the unit of [`Work`](crate::model::Work).
     fn work(&self, _chain: &Chain) -> u64 {
         0
