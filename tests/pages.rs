@@ -223,8 +223,9 @@ fn the_stated_defaults_are_those_of_the_program() {
         let Some(value) = default else { continue };
         let (table, name) = key.rsplit_once('.').unwrap();
         let mut with = parse(&format!("[{table}]\n{name} = {value}\n"));
-        // whether a damper is stated is remembered, not a value
+        // whether a damper, or the number of rods, is stated is remembered, not a value
         with.1.states_damping = false;
+        with.1.states_pieces = false;
         assert_eq!(with, parse(""), "{key} = {value}");
         count += 1;
     }

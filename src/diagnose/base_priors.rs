@@ -2,7 +2,7 @@
 
 use super::settings::SearchSettings;
 use crate::error::Result;
-use crate::experiment::Experiment;
+use crate::experiment::{Experiment, Sensor};
 use crate::fit::{Belief, base_parameters};
 use crate::model::{Chain, LinkProperty, Parameter};
 
@@ -23,7 +23,7 @@ impl DampingAssumption {
 }
 
 /// The base model's parameters and what is known of them. Inertias, centres of mass and lengths of general links were measured, and so are free within what such
-/// measurements are worth: an inertia that is off by a hundredth would otherwise pass for a clock or a spring.
+/// measurements are worth: an inertia that is off by a hundredth would otherwise pass for a clock or a spring. So is an encoder's zero, which lies anywhere within a step.
 ///
 /// # Errors
 /// [`crate::error::Error::Simulation`] for a specimen that cannot swing.
@@ -49,6 +49,13 @@ pub fn base_with_priors(
             let value = chain.value(parameter).unwrap_or(0.0);
             base.push(parameter);
             beliefs.push(Belief { parameter, value, sd: share(of) * value.abs().max(1e-12) });
+        }
+    }
+    if experiment.rig.sensor == Sensor::Encoder {
+        let zeros = [Parameter::CameraTilt, Parameter::DifferentialZero].into_iter().take(marks.min(2));
+        for parameter in zeros.filter(|zero| !stated(experiment, marks, taken).contains(zero)) {
+            base.push(parameter);
+            beliefs.push(Belief { parameter, value: 0.0, sd: settings.encoder_zero_rad });
         }
     }
     Ok((base, beliefs))

@@ -72,6 +72,16 @@ impl Term {
         self.modulation == NO_MODULATION
     }
 
+    /// Whether it goes with a rate, and so with what is lost.
+    pub fn is_loss(&self) -> bool {
+        self.state != "angle"
+    }
+
+    /// Whether it is dry friction that acts in a part of the swing.
+    pub fn acts_in_a_part(&self) -> bool {
+        self.shape == "sign" && [BESIDE, NEAR, AT_THE_MIDDLE].contains(&self.modulation)
+    }
+
     /// Whether it sets in at an instant.
     pub fn sets_in(&self) -> bool {
         self.modulation == SETTING_IN
@@ -177,10 +187,10 @@ const OF_RATE: [Shape; 1] = [Shape {
 /// How an amplitude changes.
 struct Modulation {
     words: &'static str,
-    /// What the shape is multiplied by; d is a time, or an angle.
+    /// What the shape is multiplied by; d is a time or an angle, or a width about the angle c.
     formula: &'static str,
-    /// Starts of d, as parts of the recordings' length, or of the largest angle.
-    starts: &'static [f64],
+    /// Starts of d, or of c and d, as parts of the recordings' length, or of the largest angle.
+    starts: &'static [&'static [f64]],
     /// The powers of rad, s and N that it has.
     powers: [i32; 3],
 }
@@ -191,25 +201,51 @@ const SETTING_IN: &str = "from an instant on";
 /// With time.
 const WITH_TIME: [Modulation; 3] = [
     Modulation { words: "growing with time", formula: "t", starts: &[], powers: [0, 1, 0] },
-    Modulation { words: "fading with time", formula: "exp(-t / d)", starts: &[0.3], powers: [0, 0, 0] },
+    Modulation { words: "fading with time", formula: "exp(-t / d)", starts: &[&[0.3]], powers: [0, 0, 0] },
     // within some steps of an integrator, without which no derivative tells where the instant lies
     Modulation {
         words: SETTING_IN,
         formula: "(1 + tanh((t - d) / 0.1)) / 2",
-        starts: &[0.2, 0.4, 0.6, 0.8],
+        starts: &[&[0.25], &[0.5], &[0.75]],
         powers: [0, 0, 0],
     },
 ];
-/// Of what goes with a rate, with the angle.
-const WITH_ANGLE: [Modulation; 2] = [
+/// Of what goes with a rate, with the angle: a magnet; of dry friction also a brush, or a thread that touches in a part of the swing.
+const WITH_ANGLE: [Modulation; 5] = [
     Modulation { words: "growing with the square of the angle", formula: "angle ^ 2", starts: &[], powers: [2, 0, 0] },
     Modulation {
-        words: "strongest at the middle",
+        words: AT_THE_MIDDLE,
         formula: "exp(-(angle / d) ^ 2)",
-        starts: &[0.15, 0.5],
+        starts: &[&[0.15], &[0.5]],
+        powers: [0, 0, 0],
+    },
+    Modulation {
+        words: NEAR,
+        formula: "exp(-((angle - c) / d) ^ 2)",
+        starts: &[&[-0.2, 0.25], &[0.2, 0.25]],
+        powers: [0, 0, 0],
+    },
+    // within some steps of an integrator, as in time
+    Modulation {
+        words: BESIDE,
+        formula: "(1 + tanh((angle - d) / 0.02)) / 2",
+        starts: PLACES_OF_SIDES,
+        powers: [0, 0, 0],
+    },
+    Modulation {
+        words: BESIDE,
+        formula: "(1 - tanh((angle - d) / 0.02)) / 2",
+        starts: PLACES_OF_SIDES,
         powers: [0, 0, 0],
     },
 ];
+const AT_THE_MIDDLE: &str = "strongest at the middle";
+/// On either side of it.
+const NEAR: &str = "strongest beside the middle";
+/// On either.
+const BESIDE: &str = "on one side of an angle";
+/// From the middle on, or beyond it.
+const PLACES_OF_SIDES: &[&[f64]] = &[&[-0.4], &[0.05], &[0.4]];
 
 /// Of dry friction, with the load of its bearing: the amplitude is the coefficient of friction times the radius at which it rubs.
 const WITH_LOAD: Modulation =
@@ -243,27 +279,34 @@ fn of_state(place: LawPlace, state: &'static str, largest: StateRange) -> Vec<Te
         // what changes is plain: a damper, a spring, a dry friction
         let is_plain = shape.starts.is_empty() && shape.words != "one-sided";
         let of_time = WITH_TIME.iter().filter(|_| is_plain && shape.power < 2);
-        // a magnet's brake goes with the rate; what friction does with the angle a swing that dies away hardly shows
-        let is_brake = |own: &&Modulation| own.starts.is_empty() || shape.power == 1;
-        let of_angle = WITH_ANGLE.iter().filter(|_| is_plain && state == "rate").filter(is_brake);
+        // a magnet's brake goes with the rate, and has its place; what rubs on the first link may do so in any part of the swing
+        let acts = |own: &&Modulation| match (own.starts.is_empty(), shape.power) {
+            (true, _) => true,
+            (false, 0) => place == LawPlace::Hinge,
+            (false, 1) => own.words == AT_THE_MIDDLE,
+            _ => false,
+        };
+        let of_angle = WITH_ANGLE.iter().filter(|_| is_plain && state == "rate").filter(acts);
         let of_time = of_time.map(|modulation| (modulation, largest.time_s));
         let is_dry = shape.formula == "sign(u)" && state == "rate";
         let of_load = is_dry.then_some((&WITH_LOAD, 0.0));
         for (modulation, most) in of_time.chain(of_angle.map(|modulation| (modulation, largest.angle))).chain(of_load) {
-            let times = modulation.starts.iter().map(|part| Some(part * most));
-            let times: Vec<Option<f64>> = if modulation.starts.is_empty() { vec![None] } else { times.collect() };
-            all.extend(times.into_iter().map(|d| term(place, state, (shape, &[]), Some((modulation, d)))));
+            let none: &[&[f64]] = &[&[]];
+            for starts in if modulation.starts.is_empty() { none } else { modulation.starts } {
+                let starts: Vec<f64> = starts.iter().map(|part| part * most).collect();
+                all.push(term(place, state, (shape, &[]), Some((modulation, &starts))));
+            }
         }
     }
     all
 }
 
-/// A shape of a state, its further coefficients b, c beginning as given, and how it changes, with the start of d.
+/// A shape of a state, its further coefficients b, c beginning as given, and how it changes, with the start of d, or of c and d.
 fn term(
     place: LawPlace,
     state: &'static str,
     (shape, starts): (&Shape, &[f64]),
-    changes: Option<(&Modulation, Option<f64>)>,
+    changes: Option<(&Modulation, &[f64])>,
 ) -> Term {
     let coefficient = |start: f64, min: Option<f64>, unit: &str| Coefficient { start, min, unit: unit.to_owned() };
     let times = changes.map_or(String::new(), |(modulation, _)| format!(" * {}", modulation.formula));
@@ -282,9 +325,12 @@ fn term(
         let least = (name == "c" || !shape.has_place()).then_some(1e-3 * start.abs());
         parameters.insert(name.to_owned(), coefficient(*start, least, of_state));
     }
-    if let Some(d) = changes.and_then(|(_, d)| d) {
-        let unit = if times.contains("angle") { "rad" } else { "s" };
-        parameters.insert("d".to_owned(), coefficient(d, Some(1e-3 * d), unit));
+    for (name, start) in changes.iter().flat_map(|(_, starts)| ["c", "d"][2 - starts.len()..].iter().zip(*starts)) {
+        let of_angle = times.contains("angle");
+        // a place may lie on either side, a width or a time has no meaning below nothing
+        let is_place = *name == "c" || times.contains("tanh((angle");
+        let least = (!is_place).then_some(1e-3 * start);
+        parameters.insert((*name).to_owned(), coefficient(*start, least, if of_angle { "rad" } else { "s" }));
     }
     let law = Law { name: "learnt".to_owned(), place, joint: None, formula, parameters };
     let modulation = changes.map_or(NO_MODULATION, |(modulation, _)| modulation.words);
@@ -343,16 +389,21 @@ mod tests {
         motion.place(&[0.3, -0.1]);
         motion.rate.copy_from_slice(&[2.0, 3.5]);
         motion.t_s = 25.0;
+        let mut on_the_other_side = motion.clone();
+        on_the_other_side.place(&[-0.3, 0.1]);
         for place in PLACES {
             let mut formulas = Vec::new();
             for mut term in terms(place, LARGEST) {
                 term.law.parameters.get_mut("a").unwrap().start = 1.0;
-                let mut q = [0.0; 2];
-                Formula::of(&term.law)
-                    .unwrap_or_else(|| panic!("{:?}", term.law.expression()))
-                    .add_torque(&chain, &motion, &mut q);
+                let formula = Formula::of(&term.law).unwrap_or_else(|| panic!("{:?}", term.law.expression()));
+                let acts = |motion: &Motion| {
+                    let mut q = [0.0; 2];
+                    formula.add_torque(&chain, motion, &mut q);
+                    q.iter().any(|q| *q != 0.0)
+                };
                 let one_sided_or_far = matches!(term.shape, "one-sided" | "bump" | "with play" | STOP);
-                assert!(q.iter().any(|q| *q != 0.0) || one_sided_or_far, "{} does nothing", term.law.formula);
+                let acts = acts(&motion) || term.acts_in_a_part() && acts(&on_the_other_side);
+                assert!(acts || one_sided_or_far, "{} does nothing", term.law.formula);
                 let starts: Vec<String> = term.law.parameters.values().map(|own| own.start.to_string()).collect();
                 formulas.push(format!("{} {starts:?}", term.law.formula));
             }

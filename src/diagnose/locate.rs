@@ -41,6 +41,10 @@ pub fn departure(null: &Refit<'_>) -> Departure {
         let (Some(first), Some(last)) = (wrong.first(), wrong.last()) else { continue };
         let amplitudes = wrong.iter().flat_map(|w| w.links.iter().map(|l| l.amplitude_rad));
         let (least, most) = amplitudes.fold((f64::INFINITY, 0.0f64), |(a, b), v| (a.min(v), b.max(v)));
+        // a window's amplitude is that of a sine, which a wide swing is not
+        let seen = residuals.values.iter().flatten().map(|r| (r.predicted_rad + r.left_rad()).abs());
+        let largest = seen.fold(0.0, f64::max);
+        let (least, most) = (least.min(largest), most.min(largest));
         return Departure {
             time_s: Some([first.from_s, last.until_s]),
             amplitude_rad: Some([least, most]),

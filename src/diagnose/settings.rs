@@ -132,6 +132,8 @@ pub struct SearchSettings {
     pub com_share: f64,
     /// The distance of its two pivots to this one (judgement: a millimetre in a fifth of a metre, with a ruler).
     pub length_share: f64,
+    /// An encoder's zero is known to this angle (rad; judgement: a step or two of a tenth of a degree).
+    pub encoder_zero_rad: f64,
     /// Sets of the largest number of laws that is worth its coefficients which are fitted because short stretches ask for them (cost).
     pub asked: usize,
     /// Fits from which pairs are built (cost).
@@ -260,7 +262,7 @@ pub struct PriorSettings {
     pub within_law_error: f64,
     /// That little, in standard deviations (training bank).
     pub slight: f64,
-    /// A clock that jumps by a part of a frame is with these odds a camera's (training bank).
+    /// A clock that jumps by a part of a frame, or runs back, is with these odds a camera's (judgement: frames are missing whole; it took up the errors of other laws).
     pub part_of_a_frame: f64,
 }
 
@@ -321,8 +323,6 @@ pub struct LawSettings {
     pub asked: f64,
     /// The foremost fits are begun along the motion that names follow, too, where it allows so many (cost).
     pub along: f64,
-    /// Odds of a term that gives energy: what hangs and is let go takes none from anywhere, and such a term corrects others (judgement: one in ten).
-    pub active: f64,
     /// The shortest descriptions of which it is asked what they predict (cost).
     pub foretold: usize,
     /// Of none that is longer than the shortest by more nats, nor is one that is made simpler (statistics: odds are e⁻²⁵).
@@ -381,6 +381,7 @@ impl Default for SearchSettings {
             inertia_share: 0.1,
             com_share: 0.02,
             length_share: 0.005,
+            encoder_zero_rad: 3e-3,
             asked: 3,
             pair_seeds: 6,
             expensive_seeds: 3,
@@ -447,7 +448,7 @@ impl Default for PriorSettings {
             support_in_step: 0.8,
             within_law_error: 0.35,
             slight: 25.0,
-            part_of_a_frame: 0.6,
+            part_of_a_frame: 0.05,
         }
     }
 }
@@ -501,7 +502,6 @@ impl Default for LawSettings {
             in_place_after: 2,
             asked: 8000.0,
             along: 400.0,
-            active: 0.1,
             foretold: 12,
             far: 25.0,
             alternatives: 5.0,

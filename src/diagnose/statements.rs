@@ -335,8 +335,8 @@ impl Findings<'_> {
         if let Some(torque) = self.missing_torque.as_ref().filter(|t| t.place != Place::Camera && t.place == place) {
             let _ = write!(statement, ". {}", words_of_torque(torque, phase));
         }
-        // names that are not the answer do not say where the energy goes
-        let is_known = self.verdict.status != Status::Unknown;
+        // names that are not the answer, or not all of it, do not say where the energy goes
+        let is_known = self.verdict.status != Status::Unknown && self.learnt.is_none();
         let shares = energy_shares;
         if is_known && shares.iter().sum::<f64>() > 0.0 {
             let [hinge, joint, air] = shares.map(|share| format!("{:.0} %", 1e2 * share));

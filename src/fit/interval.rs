@@ -30,7 +30,7 @@ pub struct Estimate {
     pub parameter: Parameter,
     /// Least squares.
     pub value: f64,
-    /// Standard deviation, from the curvature of the least squares.
+    /// Standard deviation, from the curvature of the least squares; no larger than that of a normal error with the interval below.
     pub sd: f64,
     /// 95 % interval; from the profile of the likelihood where the curvature alone would mislead, or a bound cuts it.
     pub low: f64,
@@ -80,7 +80,10 @@ pub(super) fn uncertainty(problem: &Problem<'_>, outcome: &Outcome, progress: &d
             let [low, high] = [-1.0, 1.0].map(|side| profile.end(side));
             progress.advance(1);
             let at_bound = outcome.x[i] <= lower[i];
-            Estimate { parameter: problem.free[i], value: outcome.x[i], sd: sd[i], low, high, at_bound }
+            // the curvature of a narrow, bent valley is not its width
+            let of_interval = (high - low) / (2.0 * Z95);
+            let sd = if at_bound || !of_interval.is_finite() { sd[i] } else { sd[i].min(of_interval) };
+            Estimate { parameter: problem.free[i], value: outcome.x[i], sd, low, high, at_bound }
         })
         .collect();
     Uncertainty { estimates, correlation, undetermined: undetermined(problem, outcome, &covariance), coloured }

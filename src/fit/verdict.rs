@@ -210,7 +210,11 @@ impl Verdict {
         let Departure { link, from_s, amplitude_rad, rms_rad, share } = departure;
         // of a model that does not follow the motion neither means anything
         let follows = self.explained[link] >= EXPLAINED;
-        let last = self.windows.iter().rev().find_map(|w| w.links.get(link)).copied().filter(|_| follows);
+        let last = self.windows.iter().rev().find_map(|w| Some((w, *w.links.get(link)?)));
+        // of what rests neither does either
+        let swings =
+            |(w, l): &(&Window, WindowLink)| l.lag_s.abs() < 0.5 * (w.until_s - w.from_s) && l.gain.abs() < 1.0;
+        let last = last.filter(|_| follows).filter(swings).map(|(_, l)| l);
         let drift = last.map_or(String::new(), |l| {
             let when = if l.lag_s < 0.0 { "ahead of" } else { "behind" };
             let size = if l.gain < 0.0 { "smaller" } else { "larger" };

@@ -231,7 +231,7 @@ fn scanned(screen: &Screen<'_, '_>) -> Option<Score> {
     screen.score(Effect::DroppedFrames, column, &[Parameter::DroppedFrames], Some((record, at_s)))
 }
 
-/// Whether a fit misses frames, and not a whole number of them.
+/// Whether a fit misses frames, and not a whole number of them, one or more.
 fn misses_part_of_a_frame(fit: &Refit<'_>) -> bool {
     let (Some(missing_s), Some((record, _))) = (fit.value(Parameter::DroppedFrames), fit.hypothesis.dropped) else {
         return false;
@@ -239,6 +239,6 @@ fn misses_part_of_a_frame(fit: &Refit<'_>) -> bool {
     let Some(frame_s) = median_step_s(&fit.problem.records[record].t_s) else { return false };
     let sd = fit.covariance(&[Parameter::DroppedFrames])[(0, 0)].sqrt() / frame_s;
     let frames = missing_s / frame_s;
-    let whole = frames.round().abs().max(1.0).copysign(frames);
+    let whole = frames.round().max(1.0);
     (frames - whole).abs() > (WHOLE_SD * sd).max(WHOLE)
 }

@@ -38,12 +38,12 @@ impl Description<'_> {
         (self.fit.hypothesis.clone(), self.terms.iter().map(Term::form).collect())
     }
 
-    /// The effects that each of its terms stands for along a motion, with the share of each. Friction that goes with its load is friction.
+    /// The effects that each of its terms stands for along a motion, with the share of each. Friction that goes with its load, or acts in a part of the swing, is friction.
     pub fn stand_for(&self, context: &FitContext<'_>, along: &Along) -> Vec<Vec<(Effect, f64)>> {
         let (law, misfit) = (&context.settings.law, &context.settings.misfit);
         let is_exact = self.fit.chi2 < chi2_noise_limit(self.fit.values(), misfit);
         let of_term = |term: &Term| {
-            let plain = if term.is_by_load() { term.plainer() } else { None };
+            let plain = if term.is_by_load() || term.acts_in_a_part() { term.plainer() } else { None };
             along.stands_for((plain.as_ref().unwrap_or(term), is_exact), law)
         };
         self.terms.iter().map(of_term).collect()
@@ -155,8 +155,6 @@ struct Prior {
     of_effect: f64,
     /// That something outside the table is at work, and to say which term.
     of_term: f64,
-    /// More of a term that gives energy.
-    of_active: f64,
     /// The motion along which it does.
     along: Along,
     law: LawSettings,
@@ -169,7 +167,6 @@ impl Prior {
         Some(Self {
             of_effect,
             of_term: which - context.settings.prior.unknown.ln(),
-            of_active: -law.active.ln(),
             along: Along::of(context, best, effects, terms.iter())?,
             law: law.clone(),
         })
@@ -179,15 +176,18 @@ impl Prior {
         // under whatever name, it is the table's
         let is_of_table = |term: &Term| !self.along.stands_for((term, true), &self.law).is_empty();
         let of_term = |term: &Term| if is_of_table(term) { self.of_effect } else { self.of_term };
-        let is_active = |term: &&Term| term.state != "angle" && self.along.adds_energy(term);
-        hypothesis.effects.len() as f64 * self.of_effect
-            + terms.iter().map(of_term).sum::<f64>()
-            + terms.iter().filter(is_active).count() as f64 * self.of_active
+        hypothesis.effects.len() as f64 * self.of_effect + terms.iter().map(of_term).sum::<f64>()
+    }
+
+    /// Whether a term is no law of what hangs and is let go, which takes energy from nowhere: it corrects another one.
+    fn is_impossible(&self, term: &Term) -> bool {
+        term.is_loss() && self.along.adds_energy(term)
     }
 }
 
-/// The fits with the lengths of their descriptions, the shortest first, each kind once.
-fn described<'a>(fitted: Vec<Begun<'a>>, prior: &Prior) -> Option<Vec<Description<'a>>> {
+/// The fits with the lengths of their descriptions, the shortest first, each kind once; without those of which a term gives energy.
+fn described<'a>(mut fitted: Vec<Begun<'a>>, prior: &Prior) -> Option<Vec<Description<'a>>> {
+    fitted.retain(|(terms, _)| !terms.iter().any(|term| prior.is_impossible(term)));
     let least = fitted.iter().map(|(_, fit)| fit).min_by(|a, b| a.chi2.total_cmp(&b.chi2))?;
     let scatter = Scatter::of(least, least.values());
     let together = (scatter.of_all / scatter.of_values).max(1.0);

@@ -12,9 +12,9 @@
 //!
 //! ```text
 //! L = χ²/(2vτ) + ½ k ln(n/τ) + Σ ln N − ln p     k: coefficients, two for the instant of a jump; N: out of how many effects, or terms, each was chosen
-//!                                                p: odds of a term, that something outside the table is at work; and of one that gives energy
+//!                                                p: odds of a term, that something outside the table is at work
 //! ```
-//!    A term that exerts the torque of an effect of the table is that effect.
+//!    A term that exerts the torque of an effect of the table is that effect. One that goes with a rate and gives energy is no law of what hangs and is let go.
 //! 5. The shortest are fitted to a part, and predict the rest. With what they predict in the length,
 //!
 //! ```text

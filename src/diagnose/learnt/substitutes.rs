@@ -30,8 +30,8 @@ pub fn substitute_terms(
     let in_place = |name: &Effect| {
         let own = along.of_effect(*name) * best.value(name.parameters()[0]).unwrap_or(0.0);
         let goes: Vec<f64> = units.iter().map(|unit| cosine(&own.as_view(), &unit.as_view()).abs()).collect();
-        let may_differ =
-            |k: usize| !every_start[k].drifts && (goes[k] < law.the_same || every_start[k].law.parameters.len() > 1);
+        let differs = |k: usize| goes[k] < law.the_same || every_start[k].law.parameters.len() > 1;
+        let may_differ = |k: usize| !every_start[k].drifts && !every_start[k].acts_in_a_part() && differs(k);
         let mut near: Vec<usize> = (0..units.len()).filter(|k| goes[*k] > law.the_same_law && may_differ(*k)).collect();
         near.sort_by(|a, b| goes[*b].total_cmp(&goes[*a]));
         let mut forms = each_form_once(near.iter().copied(), every_start);

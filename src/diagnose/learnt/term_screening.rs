@@ -21,6 +21,9 @@ use crate::model::effects::Effect as _;
 use crate::model::effects::formula::Formula;
 use crate::model::{Motion, Parameter};
 
+/// For so many terms, or pairs, that are begun beside each set of names one more is begun that acts in a part of the swing (cost), the first after so many others (cost).
+const FEW: usize = 4;
+const AFTER: usize = 6;
 /// Of what the derivatives do not tell apart nothing moves: part of a variable's own curvature.
 const DAMPING: f64 = 1e-8;
 
@@ -72,10 +75,25 @@ pub fn candidates(
             |k: usize| of_names.column_iter().any(|name| cosine(&projected.column(k), &name).abs() > settings.the_same);
         let does_something = |k: usize| projected.column(k).norm() > settings.nothing_left * columns.column(k).norm();
         let is_new = |k: &usize| does_something(*k) && !is_a_name(*k) && !drifts(&all[*k]);
-        let single =
-            apart.iter().copied().filter(is_new).map(|k| of_one(&projection.residual, &projected, k)).collect();
-        let foremost = foremost_of_forms(single, &all);
-        let promising = promising(&projection.residual, &projected, foremost, (settings.most, settings.paired));
+        let single = |is_asked: &dyn Fn(&Term) -> bool| {
+            let new = apart.iter().copied().filter(is_new).filter(|k| is_asked(&all[*k]));
+            let each = new.map(|k| of_one(&projection.residual, &projected, k));
+            // what goes with a rate takes energy, and gives none
+            foremost_of_forms(each.filter(|own| own.is_possible(&all)).collect(), &all)
+        };
+        let of_all_the_swing = single(&|term| !term.acts_in_a_part());
+        let of_a_part = single(&Term::acts_in_a_part);
+        let pairs = |alone, many| promising(&projection.residual, &projected, alone, many);
+        // what touches in a part of the swing follows many motions nearly, and is seldom there
+        let few = settings.most / FEW;
+        let foremost = of_a_part.len().min(few);
+        let beside = of_all_the_swing.iter().take(settings.paired).cloned();
+        let with_a_part = of_a_part.into_iter().take(few).chain(beside).collect();
+        let mut promising = pairs(of_all_the_swing, (settings.most, settings.paired));
+        let later = |own: Promising| Promising { rank: own.rank + AFTER, ..own };
+        let is_of_a_part = |own: &Promising| own.terms.iter().any(|(k, _)| all[*k].acts_in_a_part());
+        promising.extend(pairs(with_a_part, (few, foremost)).into_iter().filter(is_of_a_part).map(later));
+        promising.retain(|own| own.is_possible(&all));
         let steps = steps(&left, &own, &columns, &promising);
         let candidate = |(i, Promising { gain, terms, rank }): (usize, Promising)| {
             let mut step = vec![0.0; best.x.len()];
@@ -88,7 +106,9 @@ pub fn candidates(
     // what promises most beside each set of names comes first
     let mut candidates: Vec<Candidate> = left_out.iter().flat_map(promise).collect();
     candidates.sort_by_key(|candidate| candidate.rank);
-    Some((candidates, apart.iter().map(|k| all[*k].clone()).collect(), all))
+    // short stretches do not ask for what touches in a part of the swing: each of them is one
+    let of_stretches = apart.iter().map(|k| &all[*k]).filter(|term| !term.acts_in_a_part()).cloned().collect();
+    Some((candidates, of_stretches, all))
 }
 
 /// Of some names those that are left out at a time: none, each, all that are no camera's, and all.
@@ -174,6 +194,7 @@ fn largest(swings: &[Swing<'_>], (place, joint): (LawPlace, Option<usize>), time
 }
 
 /// Terms that lower χ².
+#[derive(Clone)]
 struct Promising {
     gain: f64,
     /// Their places, with the amplitudes of which they do.
@@ -185,6 +206,11 @@ struct Promising {
 impl Promising {
     const fn of(gain: f64, terms: Vec<(usize, f64)>) -> Self {
         Self { gain, terms, rank: 0 }
+    }
+
+    /// None of its terms is a loss that gives energy.
+    fn is_possible(&self, all: &[Term]) -> bool {
+        self.terms.iter().all(|(k, amplitude)| !all[*k].is_loss() || *amplitude > 0.0)
     }
 }
 
