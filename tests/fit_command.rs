@@ -370,3 +370,27 @@ fn a_beginning_that_a_hand_holds_is_left_out_unless_it_is_asked_for() {
     let kept = fit(&["--from", "0.5"]);
     kept.stderr(contains("leave that out with --from 2.")).stdout(contains("not reproduced"));
 }
+
+#[test]
+fn a_strip_is_fitted_with_as_many_rods_as_its_recording_asks_for() {
+    let folder = Folder::new();
+    let strip = |pieces: &str| {
+        format!(
+            "[specimen]\nlink_lengths_m = [0.12, 0.12]\nwidth_m = 0.04\nthickness_m = 50e-6\ndensity_kg_m3 = 1420.0\nyoung_modulus_pa = 2.9e9\n\
+             [model]\n{pieces}release_rad = [0.6, 0.6]\nc_eq_n_m_s_per_rad = 2e-8\n[model.effects]\nhinge_viscous = 1e-7\n"
+        )
+    };
+    let (made, asked) = (folder.write("made.toml", &strip("pieces = 16\n")), folder.write("asked.toml", &strip("")));
+    let (angles, json) = (folder.path("angles.csv"), folder.path("fit.json"));
+    let mut simulate = freeswing("simulate");
+    simulate.args(["--duration", "8", "--noise-rad", "2e-4"]).arg("--config").arg(made).arg("--out").arg(&angles);
+    simulate.assert().success();
+    let told = contains("taken as 16 rods between two marks, which follow the recording better than the usual");
+    freeswing("fit").arg(&angles).arg("--config").arg(asked).arg("--json").arg(&json).assert().success().stdout(told);
+    let fit: serde_json::Value = serde_json::from_str(&fs::read_to_string(json).unwrap()).unwrap();
+    assert!(fit["pieces"].as_u64().unwrap() >= 12, "{}", fit["pieces"]);
+    assert_eq!(fit["intervals_valid"], true);
+    // E w t³/12
+    let bending_n_m2 = fit["parameters"]["distributed_flexibility"]["value"].as_f64().unwrap();
+    assert!((bending_n_m2 / 1.208_333e-6 - 1.0).abs() < 2e-3, "{bending_n_m2:e}");
+}

@@ -475,4 +475,17 @@ mod tests {
         assert_eq!(unit(LawPlace::Hinge, "-a * rate * exp(-(angle / d) ^ 2)"), "N m s/rad");
         assert_eq!(unit(LawPlace::Strip, "-a * wind * abs(wind)"), "N/m s2/m2");
     }
+
+    #[test]
+    fn friction_that_rubs_in_a_part_of_the_swing_is_plainly_friction() {
+        let all = terms(LawPlace::Hinge, LARGEST);
+        let of_a_part: Vec<&Term> = all.iter().filter(|term| term.acts_in_a_part()).collect();
+        let words: std::collections::BTreeSet<&str> = of_a_part.iter().map(|term| term.modulation).collect();
+        assert_eq!(words.into_iter().collect::<Vec<_>>(), [BESIDE, AT_THE_MIDDLE, NEAR]);
+        for term in of_a_part {
+            let plain = term.plainer().unwrap();
+            assert_eq!((plain.shape, plain.modulation, plain.is_loss()), ("sign", NO_MODULATION, true));
+        }
+        assert!(terms(LawPlace::Joint, LARGEST).iter().all(|term| !term.acts_in_a_part()));
+    }
 }

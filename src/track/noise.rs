@@ -242,4 +242,26 @@ mod tests {
         // errors without memory are stated a little too large, never too small
         assert!((2.0..2.5).contains(&factor), "{factor}");
     }
+
+    #[test]
+    fn a_mark_that_errs_more_where_it_is_fast_is_believed_less_there() {
+        let mut seed = 7u64;
+        let mut uniform = || {
+            seed = seed.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
+            (seed >> 11) as f64 / (1u64 << 53) as f64
+        };
+        let t_s: Vec<f64> = (0..1800).map(|i| f64::from(i) / 30.0).collect();
+        let point = |t: &f64| {
+            let speed = (2.0 * t).cos().abs();
+            let error = (0.02 + 0.06 * speed) * ((0..12).map(|_| uniform()).sum::<f64>() - 6.0);
+            let position_px = [100.0 * (2.0 * t).sin() + error, 0.0];
+            Some(Measured { position_px, covariance_px2: [0.02f64.powi(2), 1.0, 0.0], area_px2: 1.0 })
+        };
+        let points: Vec<Option<Measured>> = t_s.iter().map(point).collect();
+        let moving = moving_factor(&points, &speeds_along(&points, 0), &t_s, 0).unwrap();
+        // it goes through the middle by 6.7 px a frame
+        let [slow, fast] = [moving.at(1.0), moving.at(6.5)];
+        assert!(fast > 1.5 * slow && (3.0..6.5).contains(&fast), "{slow} {fast}");
+        assert!(slow <= moving.mean() && moving.mean() <= fast && moving.least() <= slow);
+    }
 }
