@@ -206,6 +206,15 @@ fn binomial(order: usize) -> Vec<f64> {
 mod tests {
     use super::*;
 
+    /// A linear congruential generator: twelve uniform numbers make one nearly normal one.
+    fn normal_numbers(mut seed: u64) -> impl FnMut() -> f64 {
+        let mut uniform = move || {
+            seed = seed.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
+            (seed >> 11) as f64 / (1u64 << 53) as f64
+        };
+        move || (0..12).map(|_| uniform()).sum::<f64>() - 6.0
+    }
+
     #[test]
     fn binomial_weights_annihilate_polynomials() {
         let weights = binomial(6);
@@ -218,18 +227,13 @@ mod tests {
 
     #[test]
     fn a_swing_with_known_scatter_gives_it_back() {
-        // a linear congruential generator: twelve uniform numbers make one nearly normal one
-        let mut seed = 1u64;
-        let mut uniform = || {
-            seed = seed.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
-            (seed >> 11) as f64 / (1u64 << 53) as f64
-        };
+        let mut normal = normal_numbers(1);
         let t_s: Vec<f64> = (0..900).map(|i| i as f64 / 30.0).collect();
         let points: Vec<Option<Measured>> = t_s
             .iter()
             .map(|t| {
                 let swing = 200.0 * (8.5 * t).sin() + 20.0 * (22.6 * t).cos();
-                let error: f64 = 0.04 * ((0..12).map(|_| uniform()).sum::<f64>() - 6.0);
+                let error = 0.04 * normal();
                 Some(Measured {
                     position_px: [swing + error, 0.0],
                     covariance_px2: [0.02f64.powi(2), 1.0, 0.0],
@@ -245,15 +249,11 @@ mod tests {
 
     #[test]
     fn a_mark_that_errs_more_where_it_is_fast_is_believed_less_there() {
-        let mut seed = 7u64;
-        let mut uniform = || {
-            seed = seed.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
-            (seed >> 11) as f64 / (1u64 << 53) as f64
-        };
+        let mut normal = normal_numbers(7);
         let t_s: Vec<f64> = (0..1800).map(|i| f64::from(i) / 30.0).collect();
         let point = |t: &f64| {
             let speed = (2.0 * t).cos().abs();
-            let error = (0.02 + 0.06 * speed) * ((0..12).map(|_| uniform()).sum::<f64>() - 6.0);
+            let error = (0.02 + 0.06 * speed) * normal();
             let position_px = [100.0 * (2.0 * t).sin() + error, 0.0];
             Some(Measured { position_px, covariance_px2: [0.02f64.powi(2), 1.0, 0.0], area_px2: 1.0 })
         };
