@@ -182,6 +182,13 @@ impl<'a> FitContext<'a> {
         Some(Refit { certificate: fit.certificate, ..again })
     }
 
+    /// A fit that has come to its end, and on by steps that are hardly damped: in a narrow valley a damped step promises little up to a standard deviation from the least.
+    pub fn to_the_least(&self, fit: Refit<'a>) -> Refit<'a> {
+        let further =
+            self.descend(&fit.hypothesis, fit.problem.clone(), fit.x.clone(), self.settings.descent.few_steps);
+        further.map_or(fit.clone(), |further| Refit { certificate: fit.certificate, ..further })
+    }
+
     /// The same judged by another noise.
     pub fn with_noise(&self, noise: &[RecordNoise], fit: &Refit<'a>, steps: usize) -> Option<Refit<'a>> {
         let mut problem = fit.problem.clone();

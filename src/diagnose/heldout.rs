@@ -260,7 +260,7 @@ fn plain<'a>(fit: &Refit<'a>) -> Refit<'a> {
 fn refit_to_its_end<'a>(context: &FitContext<'a>, hypothesis: &Hypothesis, near: &Refit<'_>) -> Option<Refit<'a>> {
     let begun = context.refit(hypothesis, near, &[])?;
     let further = (!begun.converged).then(|| context.go_on(&begun, context.settings.descent.most_steps)).flatten();
-    Some(further.unwrap_or(begun))
+    Some(context.to_the_least(further.unwrap_or(begun)))
 }
 
 fn along(context: &FitContext<'_>, fit: &Refit<'_>, rows: usize, is_continued: bool) -> Option<Prediction> {

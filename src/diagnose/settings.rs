@@ -104,9 +104,11 @@ pub struct BudgetShares {
     pub certified: f64,
     /// From the beginning on, more effects and fewer (cost). What is left is for further starts of what that found.
     pub further: f64,
-    /// A law that no table holds is learnt beside all of that, with this much (cost: no recording comes near a minute with it).
+    /// A law that no table holds is learnt beside all of that, with this much…
     pub law: f64,
-    /// And made simpler, turn by turn, until so much is spent (cost).
+    /// … while all together is not more than this (cost: no recording takes more than a minute on two cores)…
+    pub all: f64,
+    /// … and made simpler, turn by turn, with so much more (cost).
     pub simpler: f64,
 }
 
@@ -314,13 +316,13 @@ pub struct LawSettings {
     pub most: usize,
     /// … up to this part of what the budget allows; the rest is for those that are fitted to the end (cost).
     pub begun: f64,
+    /// This part of the budget is for those that act in all of the swing; where none of them leaves only noise, this part of the rest is for those that short stretches ask
+    /// for, and what is left for those that act in a part of the swing, too (cost).
+    pub first: f64,
     /// Terms begun in the place of a name whose torque they nearly exert (cost).
     pub in_place: usize,
     /// After so many that promise more beside each set of names (cost).
     pub in_place_after: usize,
-    /// Short stretches of the recordings are asked first where the budget allows so many motions with derivatives, twice what that took of the dearest recording; elsewhere
-    /// with what is left of it (cost).
-    pub asked: f64,
     /// The foremost fits are begun along the motion that names follow, too, where it allows so many (cost).
     pub along: f64,
     /// The shortest descriptions of which it is asked what they predict (cost).
@@ -373,7 +375,15 @@ impl Default for SearchSettings {
     fn default() -> Self {
         Self {
             budget: 160_000_000,
-            shares: BudgetShares { usual: 0.45, restarts: 0.6, certified: 0.7, further: 0.9, law: 0.9, simpler: 1.1 },
+            shares: BudgetShares {
+                usual: 0.45,
+                restarts: 0.6,
+                certified: 0.7,
+                further: 0.9,
+                law: 0.9,
+                all: 2.0,
+                simpler: 0.2,
+            },
             evaluations: 6400.0,
             early_swings: 12.0,
             part_worth: 0.6,
@@ -498,10 +508,10 @@ impl Default for LawSettings {
             paired: 12,
             most: 16,
             begun: 0.6,
+            first: 0.5,
             in_place: 2,
             in_place_after: 2,
-            asked: 8000.0,
-            along: 400.0,
+            along: 1000.0,
             foretold: 12,
             far: 25.0,
             alternatives: 5.0,

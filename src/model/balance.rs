@@ -169,4 +169,20 @@ impl<'a> Balance<'a> {
         }
         self.model.corners(&self.motion)
     }
+
+    /// Quantities at whose zeros a force bends.
+    pub fn kinks(&mut self, t_s: f64, theta: &[f64], rate: &[f64]) -> Vec<f64> {
+        match self.shapes {
+            None => {
+                self.motion.theta_rad.copy_from_slice(theta);
+                self.motion.rate.copy_from_slice(rate);
+            }
+            Some(shapes) => {
+                shapes.expand(theta, &mut self.motion.theta_rad);
+                shapes.expand(rate, &mut self.motion.rate);
+            }
+        }
+        self.motion.t_s = t_s;
+        self.model.kinks(&self.motion)
+    }
 }

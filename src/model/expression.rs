@@ -185,15 +185,21 @@ impl Expression {
 
     /// The value.
     pub fn value(&self, variables: &[f64]) -> f64 {
-        self.evaluate(variables, 0)
+        self.evaluate(variables, 0, |_| ())
+    }
+
+    /// Adds the quantities at whose zeros it bends: the difference of what a `max` or a `min` is of, in the order of evaluation.
+    pub fn add_kinks(&self, variables: &[f64], kinks: &mut Vec<f64>) {
+        _ = self.evaluate::<f64>(variables, 0, |difference| kinks.push(difference));
     }
 
     /// The value and its derivatives with K variables from one on.
     pub fn at<const K: usize>(&self, variables: &[f64], from: usize) -> Dual<K> {
-        self.evaluate(variables, from)
+        self.evaluate(variables, from, |_| ())
     }
 
-    fn evaluate<N: Number>(&self, variables: &[f64], from: usize) -> N {
+    /// With derivatives from a variable on; the difference of what each `max` or `min` is of is handed to `compared`.
+    fn evaluate<N: Number>(&self, variables: &[f64], from: usize, mut compared: impl FnMut(f64)) -> N {
         let mut stack: Stack<N> = Stack::new();
         for node in &self.nodes {
             let result = match *node {
@@ -206,6 +212,9 @@ impl Expression {
                 Node::Call(function) if function.takes_one() => of_one(pop(&mut stack), |v| function.of(v)),
                 two => {
                     let (b, a) = (pop(&mut stack), pop(&mut stack));
+                    if matches!(two, Node::Call(_)) {
+                        compared(a.value() - b.value());
+                    }
                     of_two(two, a, b)
                 }
             };

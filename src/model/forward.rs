@@ -184,6 +184,13 @@ impl ForwardModel {
         corners
     }
 
+    /// Quantities at whose zeros a force bends.
+    pub fn kinks(&self, motion: &Motion) -> Vec<f64> {
+        let mut kinks = Vec::new();
+        self.effects.iter().for_each(|e| e.add_kinks(&self.chain, motion, &mut kinks));
+        kinks
+    }
+
     /// An instant with the pivot where it then is.
     pub fn motion(&self, t_s: f64, theta_rad: &[f64], rate: &[f64]) -> Motion {
         let mut motion = Motion::zero(self.chain.count(), self.hidden);

@@ -46,7 +46,7 @@ pub(super) struct Place {
     pub rate: Vec<f64>,
 }
 
-/// Where the laws have more corners than this, steps do not end at each of them.
+/// Where the laws have more corners than this, or kinks, steps do not end at each of them.
 const MOST_CORNERS: usize = 4;
 /// Points of a step where a reversal is looked for.
 const LOOKS: usize = 12;
@@ -80,6 +80,8 @@ struct Run<'a> {
     hinge: Hinge,
     /// Sides of the laws' corners; empty where there are none, or too many to stop at.
     sides: Vec<f64>,
+    /// Sides of the places at which a force bends; empty where there are none, or too many to stop at.
+    kinks: Vec<f64>,
     /// Accelerations at the place.
     first: Vec<f64>,
     length_s: f64,
@@ -98,6 +100,7 @@ enum Turn {
     Reverses,
     Lets,
     Corner(usize),
+    Kink(usize),
 }
 
 impl<'a> Run<'a> {
@@ -133,6 +136,7 @@ impl<'a> Run<'a> {
             is_dry: model.is_dry(),
             hinge: Hinge::SlidesForward,
             sides: Vec::new(),
+            kinks: Vec::new(),
             first: vec![0.0; rates],
             length_s: 0.1 * accuracy.longest_step_s,
             last: None,
@@ -143,6 +147,7 @@ impl<'a> Run<'a> {
         run.hinge = run.hinge_at_start()?;
         run.first = run.accelerations(run.hinge)?;
         run.sides = run.sides_at_start();
+        run.kinks = run.kinks_at_start();
         Ok(run)
     }
 
@@ -304,7 +309,7 @@ impl<'a> Run<'a> {
     /// Where in the step the hinge first reverses or is let go, or a law comes to a corner.
     fn turn_in(&mut self, step: &Step) -> Option<(f64, Turn)> {
         let turn = if self.hinge == Hinge::Sticks { Turn::Lets } else { Turn::Reverses };
-        if !self.is_dry && self.sides.is_empty() {
+        if !self.is_dry && self.sides.is_empty() && self.kinks.is_empty() {
             return None;
         }
         let mut inside = 0.0;
@@ -314,11 +319,19 @@ impl<'a> Run<'a> {
             if self.is_dry && self.hinge_goes_on(step, tau, turn) < 0.0 {
                 first = Some((root(inside, tau, |tau| self.hinge_goes_on(step, tau, turn)), turn));
             }
+            let is_earlier = |at: f64, first: Option<(f64, Turn)>| first.is_none_or(|(earliest, _)| at < earliest);
             let corners = self.before_corners(step, tau);
             for which in (0..corners.len()).filter(|which| corners[*which] < 0.0) {
                 let at = root(inside, tau, |tau| self.before_corners(step, tau)[which]);
-                if first.is_none_or(|(earliest, _)| at < earliest) {
+                if is_earlier(at, first) {
                     first = Some((at, Turn::Corner(which)));
+                }
+            }
+            let kinks = self.before_kinks(step, tau);
+            for which in (0..kinks.len()).filter(|which| kinks[*which] < 0.0) {
+                let at = root(inside, tau, |tau| self.before_kinks(step, tau)[which]);
+                if is_earlier(at, first) {
+                    first = Some((at, Turn::Kink(which)));
                 }
             }
             if first.is_some() {
@@ -347,6 +360,21 @@ impl<'a> Run<'a> {
         }
         let corners = self.balance.corners(&step.rate(tau));
         corners.iter().zip(&self.sides).map(|(corner, side)| corner * side).collect()
+    }
+
+    /// Of every kink a quantity that is positive up to there.
+    fn before_kinks(&mut self, step: &Step, tau: f64) -> Vec<f64> {
+        if self.kinks.is_empty() {
+            return Vec::new();
+        }
+        let kinks = self.balance.kinks(step.from_s + tau * step.length_s, &step.theta_rad(tau), &step.rate(tau));
+        kinks.iter().zip(&self.kinks).map(|(kink, side)| kink * side).collect()
+    }
+
+    /// The sides of the kinks at the outset.
+    fn kinks_at_start(&mut self) -> Vec<f64> {
+        let now = self.balance.kinks(self.place.t_s, &self.place.theta, &self.place.rate);
+        if now.len() > MOST_CORNERS { Vec::new() } else { now.into_iter().map(f64::signum).collect() }
     }
 
     /// The sides of the corners at the outset; at a corner itself the one to which the motion goes: in pairs of a rate and of what has followed it.
@@ -401,6 +429,7 @@ impl<'a> Run<'a> {
     fn change(&mut self, turn: Turn) -> Result<()> {
         match turn {
             Turn::Corner(which) => self.sides[which] = -self.sides[which],
+            Turn::Kink(which) => self.kinks[which] = -self.kinks[which],
             Turn::Lets => {
                 self.hinge = Hinge::sliding(self.sticking_torque_n_m()?);
                 self.first = self.accelerations(self.hinge)?;

@@ -356,6 +356,34 @@ fn a_formula_with_the_sign_of_the_rate_at_the_hinge_is_dry_friction() {
 }
 
 #[test]
+fn a_spring_with_play_is_integrated_as_exactly_as_one_without() {
+    let with = |formula: &str| {
+        let text = format!(
+            "[[specimen.links]]\nlength_m = 0.3\nmass_kg = 2e-3\ncom_m = 0.15\ninertia_kg_m2 = 1.5e-5\n\
+             [[model.law]]\nname = \"stop\"\nplace = \"hinge\"\ntorque_n_m = \"{formula}\"\n\
+             parameters.a = {{ start = 2e-4 }}\nparameters.b = {{ start = 0.13 }}\n"
+        );
+        ForwardModel::of(&Experiment::parse_with_specimen(&text, std::path::Path::new("e.toml")).unwrap()).unwrap()
+    };
+    let error_rad = |formula: &str| {
+        let model = with(formula);
+        let start = State::released(&model, &[0.35]).unwrap();
+        let end = |step_error_rad: f64| {
+            let accuracy = Accuracy { step_error_rad, ..Accuracy::default() };
+            Trajectory::with(&model, &start, (0.0, 30.0), None, &accuracy).unwrap()
+        };
+        let (coarse, fine) = (end(3e-6), end(1e-11));
+        let instants = (0..900).map(|row| f64::from(row) / 30.0);
+        instants.map(|t_s| (coarse.at(t_s).theta_rad[0] - fine.at(t_s).theta_rad[0]).abs()).fold(0.0, f64::max)
+    };
+    let smooth = error_rad("-a * angle * (1 + b)");
+    for bent in ["-a * sign(angle) * max(abs(angle) - b, 0)", "-a * max(angle - b, 0)", "-a * min(angle + b, 0)"] {
+        let error_rad = error_rad(bent);
+        assert!(error_rad < 3.0 * smooth, "{bent}: {error_rad:e}, {smooth:e} without");
+    }
+}
+
+#[test]
 fn friction_in_proportion_to_the_load_goes_with_the_force_that_its_own_acceleration_makes() {
     // one link of mass m, its centre c below the hinge: N² = m² [(g cos θ + c θ̇²)² + (g sin θ + c θ̈)²]
     let (mass_kg, com_m, inertia_kg_m2, radius_m) = (0.2, 0.15, 1.5e-3, 2e-3);

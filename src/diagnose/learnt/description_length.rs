@@ -65,8 +65,9 @@ pub fn descriptions<'a>(
     let prior = Prior::of(context, best, effects, &terms)?;
     candidates.extend(substitute_terms(context, best, &prior.along, &every_start));
     candidates.sort_by_key(|candidate| candidate.rank);
-    let with_laws =
-        fitted(context, posterior, (candidates, &budget), |base| along_the_recording(context, base, effects, &terms));
+    let with_laws = fitted(context, posterior, (candidates, &budget), |base, until| {
+        along_the_recording(context, (base, until), effects, &terms)
+    });
     // what the table has been fitted with is a description, too
     let possible = posterior.candidates.iter().filter(|candidate| candidate.ln_posterior.is_finite());
     let of_table = possible.map(|candidate| (Vec::new(), candidate.fit.clone()));

@@ -1,11 +1,14 @@
 //! What is fitted in full simulation: laws of the grammar beside names, first a few steps of all, then the best to the end, within a budget of work.
 
+use std::collections::VecDeque;
+
 use rayon::prelude::*;
 
 use super::super::context::FitContext;
 use super::super::effect::Effect;
 use super::super::grammar::Term;
 use super::super::hypothesis::Hypothesis;
+use super::super::misfit::chi2_noise_limit;
 use super::super::posterior::Posterior;
 use super::super::refit::Refit;
 use super::super::stretches::{Asked, best_term_sets};
@@ -36,10 +39,11 @@ impl Budget {
     /// After one motion with its derivatives, before which so much had been done.
     pub fn of(context: &FitContext<'_>, before: u64) -> Self {
         let (shares, all) = (&context.settings.search.shares, context.settings.search.budget as f64);
-        let allowed = shares.law * all;
+        let allowed = (shares.law * all).min(shares.all * all - before as f64).max(0.0);
         let each = (context.work.done() - before).max(1) as f64;
-        let until_simpler = before + (shares.simpler * all) as u64;
-        Self { until: before + allowed as u64, until_simpler, motions: allowed / each }
+        let until = before + allowed as u64;
+        let until_simpler = until + (shares.simpler * all) as u64;
+        Self { until, until_simpler, motions: allowed / each }
     }
 }
 
@@ -48,10 +52,9 @@ pub fn fitted<'a>(
     context: &FitContext<'a>,
     posterior: &Posterior<'a>,
     (candidates, budget): (Vec<Candidate>, &Budget),
-    asked_for: impl FnOnce(&Refit<'a>) -> Vec<Begun<'a>>,
+    asked_for: impl FnOnce(&Refit<'a>, u64) -> Vec<Begun<'a>>,
 ) -> Vec<Begun<'a>> {
     let (best, law) = (posterior.best(), &context.settings.law);
-    let until = budget.until;
     // what leaves more than the base model leads nowhere
     let base = context.with_noise(&best.problem.noise, posterior.base(), 0);
     let bound = base.map_or(f64::INFINITY, |base| base.chi2);
@@ -59,26 +62,39 @@ pub fn fitted<'a>(
         let fit = begun_fit(context, best, &candidate, (bound, budget.motions > law.along))?;
         Some((candidate.terms, fit))
     };
-    // their fits begin far away, and each costs as much as many others
+    let (in_a_part, in_all): (Vec<Candidate>, Vec<Candidate>) =
+        candidates.into_iter().partition(Candidate::acts_in_a_part);
+    let (mut candidates, mut in_a_part) = (VecDeque::from(in_all), Some(in_a_part));
+    // those that short stretches ask for begin far away, and each costs as much as many others
     let mut asked_for = Some(asked_for);
-    let mut begun = match asked_for.take_if(|_| budget.motions > law.asked) {
-        Some(asked_for) => asked_for(posterior.base()),
-        None => Vec::new(),
-    };
-    let mut candidates = candidates.into_iter().peekable();
-    let mut made = Vec::new();
-    loop {
+    let part_of_rest = |part: f64, until: u64| {
         let done = context.work.done();
-        let to_begin = done + (law.begun * until.saturating_sub(done) as f64) as u64;
-        begun.extend(within(context, to_begin, (BEGUN_AT_ONCE, &mut candidates), along_best));
+        done + (part * until.saturating_sub(done) as f64) as u64
+    };
+    let until_first = part_of_rest(law.first, budget.until);
+    let (mut begun, mut made): (Vec<Begun<'a>>, Vec<Begun<'a>>) = (Vec::new(), Vec::new());
+    loop {
+        let until = if in_a_part.is_some() { until_first } else { budget.until };
+        begun.extend(within(context, part_of_rest(law.begun, until), (BEGUN_AT_ONCE, &mut candidates), along_best));
         made.extend(halved(context, std::mem::take(&mut begun), until));
+        let is_exact = |fit: &Refit<'a>| fit.chi2 < chi2_noise_limit(fit.values(), &context.settings.misfit);
+        let leaves_more = !is_exact(best) && !made.iter().any(|own| is_exact(&own.1));
+        if let Some(in_a_part) = in_a_part.take_if(|_| leaves_more) {
+            // what acts in a part of the swing follows many motions nearly: it is sought where nothing that acts in all of it leaves only noise
+            candidates.extend(in_a_part);
+            candidates.make_contiguous().sort_by_key(|own| own.rank);
+            if let Some(asked_for) = asked_for.take() {
+                begun = asked_for(posterior.base(), part_of_rest(law.first, budget.until));
+            }
+            continue;
+        }
         // what the budget leaves when the best have come to their end is for more of them
         if context.work.done() >= until {
             return made;
         }
-        if candidates.peek().is_none() {
+        if candidates.is_empty() {
             let Some(asked_for) = asked_for.take() else { return made };
-            begun = asked_for(posterior.base());
+            begun = asked_for(posterior.base(), part_of_rest(law.first, until));
         }
     }
 }
@@ -111,21 +127,29 @@ fn begun_fit<'a>(
 }
 
 /// Terms, and names beside them, that short stretches ask for, fitted along the recorded motion: where the names of the table lead nowhere, no motion of theirs shows
-/// what is missing.
+/// what is missing. So many of them as the work allows.
 pub fn along_the_recording<'a>(
     context: &FitContext<'a>,
-    base: &Refit<'a>,
+    (base, until): (&Refit<'a>, u64),
     effects: &[Effect],
     terms: &[Term],
 ) -> Vec<Begun<'a>> {
-    let asked = best_term_sets(context, base, effects, terms, context.settings.search.asked);
-    let fitted = |(asked, of_terms): (Asked, Vec<(usize, f64)>)| {
-        let own = of_terms.into_iter().enumerate();
-        let terms: Vec<Term> = own.map(|(place, (k, amplitude))| started(&terms[k], amplitude, place)).collect();
+    // a stretch is a part of the swing: beside those that act in all of it, those that act in a part are asked for by themselves
+    let (in_a_part, in_all): (Vec<&Term>, Vec<&Term>) = terms.iter().partition(|term| term.acts_in_a_part());
+    let asked = |terms: Vec<&Term>| {
+        let terms: Vec<Term> = terms.into_iter().cloned().collect();
+        let sets = best_term_sets(context, base, effects, &terms, context.settings.search.asked);
+        let with_amplitudes = |(asked, of_terms): (Asked, Vec<(usize, f64)>)| {
+            let own = of_terms.into_iter().enumerate();
+            (asked, own.map(|(place, (k, amplitude))| started(&terms[k], amplitude, place)).collect())
+        };
+        sets.into_iter().map(with_amplitudes).collect::<Vec<(Asked, Vec<Term>)>>()
+    };
+    let mut asked: VecDeque<(Asked, Vec<Term>)> = asked(in_all).into_iter().chain(asked(in_a_part)).collect();
+    within(context, until, (GONE_ON_AT_ONCE, &mut asked), |(asked, terms)| {
         let fit = with_laws(context, &terms).refit_along_recording(&asked.hypothesis, base, &asked.start)?;
         Some((terms, fit))
-    };
-    asked.into_par_iter().with_max_len(1).filter_map(fitted).collect()
+    })
 }
 
 /// What was begun, without what has no hope: the best term and the best pair beside each set of names, then the rest, the better ones first.
@@ -153,7 +177,7 @@ fn halved<'a>(context: &FitContext<'a>, mut going_on: Vec<Begun<'a>>, until: u64
         better.truncate(better.len().div_ceil(2));
         let done = context.work.done();
         let half = done + until.saturating_sub(done) / 2;
-        let further = within(context, half, (GONE_ON_AT_ONCE, better.into_iter()), |(terms, fit)| {
+        let further = within(context, half, (GONE_ON_AT_ONCE, &mut better.into()), |(terms, fit)| {
             continue_fit(context, terms, fit, steps)
         });
         let is_last = steps >= context.settings.descent.most_steps || context.work.done() > until;
@@ -170,12 +194,12 @@ fn halved<'a>(context: &FitContext<'a>, mut going_on: Vec<Begun<'a>>, until: u64
 fn within<T: Send, R: Send>(
     context: &FitContext<'_>,
     until: u64,
-    (at_once, mut items): (usize, impl Iterator<Item = T>),
+    (at_once, items): (usize, &mut VecDeque<T>),
     of: impl Fn(T) -> Option<R> + Sync,
 ) -> Vec<R> {
     let mut made = Vec::new();
     loop {
-        let batch: Vec<T> = items.by_ref().take(at_once).collect();
+        let batch: Vec<T> = items.drain(..at_once.min(items.len())).collect();
         let is_last = batch.len() < at_once;
         made.extend(batch.into_par_iter().with_max_len(1).filter_map(&of).collect::<Vec<R>>());
         if is_last || context.work.done() > until {

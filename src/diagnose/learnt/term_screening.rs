@@ -2,7 +2,7 @@
 
 use std::iter;
 
-use nalgebra::{DMatrix, DVector};
+use nalgebra::{DMatrix, DVector, DVectorView};
 use rayon::prelude::*;
 
 use super::super::basis_law::{Swing, swings};
@@ -19,11 +19,10 @@ use crate::fit::descent::damped_step;
 use crate::fit::recordings;
 use crate::model::effects::Effect as _;
 use crate::model::effects::formula::Formula;
-use crate::model::{Motion, Parameter};
+use crate::model::{Motion, Parameter, Partials};
 
-/// For so many terms, or pairs, that are begun beside each set of names one more is begun that acts in a part of the swing (cost), the first after so many others (cost).
+/// For so many terms, or pairs, that are begun beside each set of names one more is begun that acts in a part of the swing (cost).
 const FEW: usize = 4;
-const AFTER: usize = 6;
 /// Of what the derivatives do not tell apart nothing moves: part of a variable's own curvature.
 const DAMPING: f64 = 1e-8;
 
@@ -42,6 +41,13 @@ pub struct Candidate {
     pub rank: usize,
 }
 
+impl Candidate {
+    /// Whether one of its terms is dry friction in a part of the swing.
+    pub fn acts_in_a_part(&self) -> bool {
+        self.terms.iter().any(Term::acts_in_a_part)
+    }
+}
+
 /// What promises most, beside the names of a fit, without each of them, in the place of those that are no camera's, and of them all, from the fit's residuals and
 /// their derivatives; the terms
 /// out of which it was chosen; and every term with every start.
@@ -50,11 +56,14 @@ pub fn candidates(
     (residual, slopes): &(DVector<f64>, DMatrix<f64>),
     settings: &LawSettings,
 ) -> Option<(Vec<Candidate>, Vec<Term>, Vec<Term>)> {
-    let (all, columns, torques) = effects_of_terms(best, residual.len())?;
+    let around = Linearisation::of_all(best)?;
+    let swings = swings(best, &around)?;
+    let (all, columns, torques) = effects_of_terms(best, &swings, residual.len())?;
     let names = &best.hypothesis.effects;
     let left_out = left_out(names);
     let lower = best.problem.lower();
-    let (apart, alone) = (told_apart(&torques, settings.the_same), recordings(best.problem.records).len() == 1);
+    let apart = told_apart(&torques, &torques_of_the_base(best, &swings)?, settings.the_same);
+    let alone = recordings(best.problem.records).len() == 1;
     // in a single release the amplitude falls with time, and a loss that drifts stands for any loss; one that sets in bends the decay at an instant
     let of_loss = alone && names.iter().any(|effect| effect.entry().acts == Acts::Loss);
     let drifts = |term: &Term| of_loss && term.drifts && !term.sets_in() && term.state != "angle";
@@ -90,9 +99,8 @@ pub fn candidates(
         let beside = of_all_the_swing.iter().take(settings.paired).cloned();
         let with_a_part = of_a_part.into_iter().take(few).chain(beside).collect();
         let mut promising = pairs(of_all_the_swing, (settings.most, settings.paired));
-        let later = |own: Promising| Promising { rank: own.rank + AFTER, ..own };
         let is_of_a_part = |own: &Promising| own.terms.iter().any(|(k, _)| all[*k].acts_in_a_part());
-        promising.extend(pairs(with_a_part, (few, foremost)).into_iter().filter(is_of_a_part).map(later));
+        promising.extend(pairs(with_a_part, (few, foremost)).into_iter().filter(is_of_a_part));
         promising.retain(|own| own.is_possible(&all));
         let steps = steps(&left, &own, &columns, &promising);
         let candidate = |(i, Promising { gain, terms, rank }): (usize, Promising)| {
@@ -106,9 +114,8 @@ pub fn candidates(
     // what promises most beside each set of names comes first
     let mut candidates: Vec<Candidate> = left_out.iter().flat_map(promise).collect();
     candidates.sort_by_key(|candidate| candidate.rank);
-    // short stretches do not ask for what touches in a part of the swing: each of them is one
-    let of_stretches = apart.iter().map(|k| &all[*k]).filter(|term| !term.acts_in_a_part()).cloned().collect();
-    Some((candidates, of_stretches, all))
+    let apart = apart.iter().map(|k| all[*k].clone()).collect();
+    Some((candidates, apart, all))
 }
 
 /// Of some names those that are left out at a time: none, each, all that are no camera's, and all.
@@ -124,24 +131,54 @@ fn left_out(names: &[Effect]) -> Vec<Vec<Effect>> {
     all
 }
 
-/// The terms that exert another torque than any before them: on a single link hinge, strip and tip are one place.
-fn told_apart(torques: &DMatrix<f64>, the_same: f64) -> Vec<usize> {
+/// The terms that exert another torque than any before them, and than what is free in the base model: on a single link hinge, strip and tip are one place.
+fn told_apart(torques: &DMatrix<f64>, of_base: &DMatrix<f64>, the_same: f64) -> Vec<usize> {
     let mut kept: Vec<usize> = Vec::new();
     for k in 0..torques.ncols() {
-        let is_the_same = |other: &usize| cosine(&torques.column(k), &torques.column(*other)).abs() > the_same;
-        if !kept.iter().any(is_the_same) {
+        let is_the_same = |other: DVectorView<'_, f64>| cosine(&torques.column(k), &other).abs() > the_same;
+        let is_of_base = of_base.column_iter().any(is_the_same);
+        if !is_of_base && !kept.iter().any(|other| is_the_same(torques.column(*other))) {
             kept.push(k);
         }
     }
     kept
 }
 
+/// The torques on the links of a unit of what is free in the base model and held by no bound, a column each. What a term adds to the angles is known too coarsely to tell
+/// it from these.
+fn torques_of_the_base(fit: &Refit<'_>, swings: &[Swing<'_>]) -> Option<DMatrix<f64>> {
+    let lower = fit.problem.lower();
+    let of_names: Vec<Parameter> =
+        fit.hypothesis.effects.iter().flat_map(|effect| effect.parameters()).copied().collect();
+    let free = fit.problem.free.iter().enumerate();
+    let is_free =
+        |(place, parameter): &(usize, &Parameter)| fit.x[*place] > lower[*place] && !of_names.contains(parameter);
+    let free: Vec<Parameter> = free.filter(is_free).map(|(_, parameter)| *parameter).collect();
+    let of_record = |(record, swing): (usize, &Swing<'_>)| {
+        let (model, _) = fit.problem.model(record, &fit.x[..fit.problem.free.len()]).ok()?;
+        let unit = |parameter: &Parameter| {
+            swing.torques(|motion, q| {
+                let mut partials = Partials::zero(model.chain().count(), model.rates());
+                model.partials(motion, &mut partials);
+                model.sensitivity(*parameter, motion, &partials, q);
+            })
+        };
+        Some(free.iter().map(unit).collect::<Vec<_>>())
+    };
+    let of_records: Vec<Vec<Vec<f64>>> = swings.iter().enumerate().map(of_record).collect::<Option<_>>()?;
+    let columns = (0..free.len()).map(|k| of_records.iter().flat_map(|of| &of[k]).copied().collect::<Vec<f64>>());
+    let columns: Vec<DVector<f64>> = columns.map(DVector::from_vec).collect();
+    Some(if columns.is_empty() { DMatrix::zeros(0, 0) } else { DMatrix::from_columns(&columns) })
+}
+
 /// Every term of the grammar, what a unit of its amplitude adds to the residuals, of which there are so many, a column each, and the torques on the links.
-fn effects_of_terms(fit: &Refit<'_>, rows: usize) -> Option<(Vec<Term>, DMatrix<f64>, DMatrix<f64>)> {
-    let around = Linearisation::of_all(fit)?;
-    let swings = swings(fit, &around)?;
+fn effects_of_terms(
+    fit: &Refit<'_>,
+    swings: &[Swing<'_>],
+    rows: usize,
+) -> Option<(Vec<Term>, DMatrix<f64>, DMatrix<f64>)> {
     let at = |place: LawPlace, joint: Option<usize>| {
-        let terms = terms(place, largest(&swings, (place, joint), fit.problem.longest_s()));
+        let terms = terms(place, largest(swings, (place, joint), fit.problem.longest_s()));
         terms.into_iter().map(move |term| match joint {
             Some(joint) => term.at_joint(joint),
             None => term,
@@ -298,7 +335,10 @@ mod tests {
         let rate = |i: usize| (-(i as f64) / 600.0).exp() * (0.2 * i as f64).sin();
         let square = |i: usize| rate(i) * rate(i).abs();
         let torques = DMatrix::from_fn(900, 3, |i, k| [square(i), 2.0 * square(i), rate(i).powi(3)][k]);
-        assert_eq!(told_apart(&torques, LawSettings::default().the_same), [0, 2]);
+        let the_same = LawSettings::default().the_same;
+        assert_eq!(told_apart(&torques, &DMatrix::zeros(0, 0), the_same), [0, 2]);
+        // nor is what is free in the base model a term of its own
+        assert_eq!(told_apart(&torques, &torques.columns(2, 1).into_owned(), the_same), [0]);
     }
 
     #[test]

@@ -44,8 +44,8 @@ const PASSES: usize = 2;
 const START_STEPS: usize = 4;
 /// Most laws of a set.
 const MOST_LAWS: usize = 3;
-/// The same of sets with terms of the grammar, which are many.
-const MOST_WITH_TERMS: usize = 2;
+/// The same of sets with terms of the grammar, which are many: of those of one law, and of those of two.
+const MOST_WITH_TERMS: [usize; 2] = [1, 2];
 
 /// A set of laws that the stretches ask for.
 #[derive(Debug, Clone)]
@@ -63,7 +63,7 @@ pub fn asked_for(context: &FitContext<'_>, base: &Refit<'_>, effects: &[Effect],
     let laws: Vec<Effect> = effects.iter().copied().filter(|effect| is_told(*effect, effects)).collect();
     let amplitudes: Vec<Parameter> = laws.iter().map(|law| law.parameters()[0]).collect();
     let known = &context.base;
-    let sets = sets(context, base, known, (effects, &laws), &amplitudes, ((MOST_LAWS, each), false));
+    let found = sets(context, base, known, (effects, &laws), &amplitudes, (&[MOST_LAWS], each, false));
     // corners are dear, and nothing is lost with the second best of those that have them
     let has_switching = |set: &Set| set.laws.iter().any(|law| laws[*law].has_switching());
     let mut with_corners: Vec<usize> = Vec::new();
@@ -73,8 +73,8 @@ pub fn asked_for(context: &FitContext<'_>, base: &Refit<'_>, effects: &[Effect],
         with_corners.extend(has_switching(set).then_some(count));
         !is_second
     };
-    let (sets, beside) = sets.unwrap_or_default();
-    sets.into_iter().filter(is_kept).map(|set| asked(&set, known, &laws, beside)).collect()
+    let (sets, beside) = found.unwrap_or_default();
+    sets.into_iter().flatten().filter(is_kept).map(|set| asked(&set, known, &laws, beside)).collect()
 }
 
 /// Terms of the grammar, alone, in pairs and beside one of the table's laws, that leave least: the set's laws of the table, and which terms with what amplitudes.
@@ -97,9 +97,8 @@ pub fn best_term_sets(
     let known = &context.base;
     let with_terms = FitContext { laws: of_terms, base: [known.as_slice(), &amplitudes].concat(), ..context.clone() };
     let all: Vec<Parameter> = laws.iter().map(|law| law.parameters()[0]).chain(amplitudes).collect();
-    let found =
-        |most: usize| sets(&with_terms, base, known, (effects, &laws), &all, ((most, each), true)).unwrap_or_default();
-    let (pairs, beside) = found(MOST_WITH_TERMS);
+    let found = sets(&with_terms, base, known, (effects, &laws), &all, (&MOST_WITH_TERMS, each, true));
+    let (found, beside) = found.unwrap_or_default();
     let mut kinds = Vec::new();
     let of_set = |set: Set| {
         let of_terms = |(law, value): (&usize, &f64)| Some((law.checked_sub(laws.len())?, *value));
@@ -112,7 +111,7 @@ pub fn best_term_sets(
         kinds.push(kind);
         is_new.then_some((asked, own))
     };
-    found(1).0.into_iter().chain(pairs).filter_map(of_set).collect()
+    found.into_iter().flatten().filter_map(of_set).collect()
 }
 
 /// What a set asks for of the table's laws, the first of its laws being those.
@@ -129,16 +128,16 @@ fn asked(set: &Set, known: &[Parameter], laws: &[Effect], beside: usize) -> Aske
     Asked { hypothesis: Hypothesis { effects, dropped: None }, start }
 }
 
-/// The sets of at most so many laws that leave least, each law in proportion to one of the `amplitudes`, and how many values of a set stand before those of its laws:
-/// those of `known`, the base model's, and of the camera; `follows`: from starts that are fitted to their stretches.
+/// For each of some numbers the sets of at most so many laws that leave least, each law in proportion to one of the `amplitudes`, and how many values of a set stand before
+/// those of its laws: those of `known`, the base model's, and of the camera; `follows`: from starts that are fitted to their stretches.
 fn sets(
     context: &FitContext<'_>,
     base: &Refit<'_>,
     known: &[Parameter],
     (effects, laws): (&[Effect], &[Effect]),
     amplitudes: &[Parameter],
-    (most_each, follows): ((usize, usize), bool),
-) -> Option<(Vec<Set>, usize)> {
+    (most, each, follows): (&[usize], usize, bool),
+) -> Option<(Vec<Vec<Set>>, usize)> {
     let (model, _) = base.problem.model(0, &base.x[..base.problem.free.len()]).ok()?;
     let stretches = cut(context.records, SWINGS * std::f64::consts::TAU / model.characteristic_rad_s())?;
     let short = context.on(&stretches);
@@ -149,13 +148,20 @@ fn sets(
     let allowed = known.iter().copied().chain(of_camera.map(|own| own.1));
     let columns: Vec<Parameter> = allowed.chain(amplitudes.iter().copied()).collect();
     let reach_s = STATE_WINDOW_RAD / model.characteristic_rad_s();
+    // laws of no size move nothing: the starts are those of the base model
+    let plain = FitContext { laws: Vec::new(), base: known.to_vec(), ..short };
+    let plain = plain.problem_near(&Hypothesis::default(), base).ok()?;
     let mut values: Vec<(Parameter, f64)> = known.iter().map(|p| (*p, base.value(*p).unwrap_or(0.0))).collect();
     let beside = columns.len() - amplitudes.len();
     let mut found = Vec::new();
     for _ in 0..PASSES {
-        let squares = linearised(&problem, &values, &columns, (reach_s, follows))?;
-        found = squares.best_sets(beside, most_each);
-        let Some(best) = found.first() else { break };
+        let mut starts: Vec<f64> = problem.records.iter().flat_map(|stretch| stretch.start_near(0, reach_s)).collect();
+        if follows {
+            follow(&plain, &values, &mut starts)?;
+        }
+        let squares = linearised(&problem, &values, &columns, &starts)?;
+        found = most.iter().map(|most| squares.best_sets(beside, (*most, each))).collect();
+        let Some(best) = found.iter().rev().find_map(|sets: &Vec<Set>| sets.first()) else { break };
         values.iter_mut().zip(&best.values).for_each(|(own, value)| own.1 = *value);
     }
     Some((found, beside))
@@ -176,23 +182,21 @@ fn cut(records: &[Record], length_s: f64) -> Option<Vec<Record>> {
     stretches.iter().all(|stretch| stretch.len() >= FEWEST_ROWS).then_some(stretches)
 }
 
-/// What the base model leaves of all stretches with some values, and its derivatives, the starts projected out.
+/// What the base model leaves of all stretches with some values, from some starts, and its derivatives, the starts projected out.
 fn linearised(
     problem: &Problem<'_>,
     values: &[(Parameter, f64)],
     columns: &[Parameter],
-    (reach_s, follows): (f64, bool),
+    starts: &[f64],
 ) -> Option<LeastSquares> {
-    let mut x = problem.start_values().ok()?;
+    let mut x = with_values(problem, values)?;
     for (value, parameter) in x.iter_mut().zip(&problem.free) {
-        let given = values.iter().find(|(known, _)| known == parameter).map(|(_, value)| *value);
-        let is_law = parameter.is_proportional() && columns.contains(parameter);
-        *value = given.unwrap_or(if is_law { 0.0 } else { *value });
+        let is_given = values.iter().any(|(known, _)| known == parameter);
+        if !is_given && parameter.is_proportional() && columns.contains(parameter) {
+            *value = 0.0;
+        }
     }
-    x.extend(problem.records.iter().flat_map(|stretch| stretch.start_near(0, reach_s)));
-    if follows {
-        follow(problem, &mut x)?;
-    }
+    x.extend_from_slice(starts);
     let places: Vec<usize> = columns.iter().map(|own| problem.place(*own)).collect::<Option<_>>()?;
     let free = problem.free.len();
     let mut rows = Vec::new();
@@ -219,27 +223,37 @@ fn linearised(
     Some(LeastSquares::of(&rows, columns.iter().zip(&places).map(column).collect(), independent))
 }
 
+/// The start values of a problem, some of them given.
+fn with_values(problem: &Problem<'_>, values: &[(Parameter, f64)]) -> Option<Vec<f64>> {
+    let mut x = problem.start_values().ok()?;
+    for (value, parameter) in x.iter_mut().zip(&problem.free) {
+        *value = values.iter().find(|(known, _)| known == parameter).map_or(*value, |(_, given)| *given);
+    }
+    Some(x)
+}
+
 /// Moves the starts to where the motion with these values follows its stretches best: what neighbouring rows show of a fast mode's rate is too rough to be linear in.
-fn follow(problem: &Problem<'_>, x: &mut [f64]) -> Option<()> {
-    let free = problem.free.len();
-    let starts = 2 * problem.shapes();
+fn follow(problem: &Problem<'_>, values: &[(Parameter, f64)], starts: &mut [f64]) -> Option<()> {
+    let of_values = with_values(problem, values)?;
+    let (free, each) = (problem.free.len(), 2 * problem.shapes());
     let mut least = f64::INFINITY;
-    let mut best = x.to_vec();
+    let mut best = starts.to_vec();
     for _ in 0..START_STEPS {
-        let blocks: Vec<_> = problem.blocks(x)?.into_iter().filter(|block| block.robust).collect();
+        let x = [&of_values, &*starts].concat();
+        let blocks: Vec<_> = problem.blocks(&x)?.into_iter().filter(|block| block.robust).collect();
         let left: f64 = blocks.iter().map(|block| block.residual.norm_squared()).sum();
         if blocks.len() != problem.records.len() || left.is_nan() || left > least {
             break;
         }
         least = left;
-        best.copy_from_slice(x);
-        for (block, own) in blocks.iter().zip(x[free..].chunks_mut(starts)) {
-            let slopes = block.slopes.columns(free, starts).into_owned();
+        best.copy_from_slice(starts);
+        for (block, own) in blocks.iter().zip(starts.chunks_mut(each)) {
+            let slopes = block.slopes.columns(free, each).into_owned();
             let step = slopes.svd(true, true).solve(&block.residual, 1e-12).ok()?;
             own.iter_mut().zip(step.iter()).for_each(|(start, step)| *start -= step);
         }
     }
-    x.copy_from_slice(&best);
+    starts.copy_from_slice(&best);
     Some(())
 }
 

@@ -196,6 +196,19 @@ impl Effect for Formula {
         });
     }
 
+    /// Of a law of angles and rates at a point.
+    fn add_kinks(&self, chain: &Chain, motion: &Motion, kinks: &mut Vec<f64>) {
+        if self.is_along_the_strip() || self.is_by_load {
+            return;
+        }
+        let of_formula = |formula: &Expression, values: &[f64]| {
+            let mut own = Vec::new();
+            formula.add_kinks(values, &mut own);
+            own
+        };
+        self.visit(of_formula, chain, motion, |_, own, _| kinks.extend(own));
+    }
+
     fn is_linear_in_accelerations(&self) -> bool {
         !self.is_by_load
     }

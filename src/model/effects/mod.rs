@@ -90,6 +90,9 @@ pub trait Effect: std::fmt::Debug + Send + Sync {
     /// Quantities at whose zeros it has corners, of the rates alone: adds them in an order that does not change, in pairs of a rate and what follows it.
     fn add_switching_functions(&self, _chain: &Chain, _motion: &Motion, _corners: &mut Vec<f64>) {}
 
+    /// Quantities at whose zeros its force bends, of the angles and rates: adds them in an order that does not change.
+    fn add_kinks(&self, _chain: &Chain, _motion: &Motion, _kinks: &mut Vec<f64>) {}
+
     /// The pivot's motion, from the law that prescribes it.
     fn pivot(&self) -> Option<&outside::SupportMotion> {
         None
