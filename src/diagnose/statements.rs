@@ -235,6 +235,8 @@ impl Findings<'_> {
             let effects = (!effects.is_empty()).then(|| words_of_any(effects))?;
             Some(if term.is_by_load() {
                 format!(" Here {which} is {effects}, in proportion to the load of the bearing.")
+            } else if term.acts_in_a_part() {
+                format!(" Here {which} is {effects}, in a part of the swing only.")
             } else {
                 format!(" In this motion {which} is nearly the same as {effects}.")
             })

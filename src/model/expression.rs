@@ -452,6 +452,18 @@ mod tests {
     }
 
     #[test]
+    fn a_formula_bends_where_the_two_sides_of_a_max_or_a_min_are_equal() {
+        let kinks = |text: &str| {
+            let mut kinks = Vec::new();
+            Expression::parse(text, &["angle", "b"]).unwrap().add_kinks(&[-0.3, 0.1], &mut kinks);
+            kinks
+        };
+        assert_eq!(kinks("sign(angle) * max(abs(angle) - b, 0)"), [0.3 - 0.1]);
+        assert_eq!(kinks("max(angle, b) + 2 * min(angle + b, 0)"), [-0.4, -0.3 + 0.1]);
+        assert!(kinks("angle * abs(angle) / b").is_empty());
+    }
+
+    #[test]
     fn operators_bind_as_on_paper() {
         assert_eq!(value("1 + 2 * 3 ^ 2", &[]), 19.0);
         assert_eq!(value("-2 ^ 2", &[]), -4.0);

@@ -6,7 +6,8 @@
 //!    A term that exerts nearly the torque of a name begins in its place, whatever it promises: friction that fades with speed follows the motion of dry friction,
 //!    and is far from it in no step that is linear.
 //! 3. The terms, and pairs of them, that promise most are fitted, as laws of the file would be: first a few steps of all, then a few more of the better half, and so
-//!    on. So are those that [short stretches](super::stretches) of the recordings ask for: where the likeliest fit is wrong, its motion shows nothing.
+//!    on. Where none of them leaves only noise, so are those that act in a part of the swing, and those that [short stretches](super::stretches) of the recordings ask for:
+//!    where the likeliest fit is wrong, its motion shows nothing.
 //! 4. The description length chooses among them, and among all that the table has been fitted with; with v the variance that the best one leaves, over the noise's,
 //!    of n values of which τ go together,
 //!
