@@ -326,8 +326,10 @@ impl<'a> Posterior<'a> {
         let squares = || base.over_noise().powi(2) * values as f64;
         let is_more = base.hypothesis.effects.is_empty() && squares() > chi2_noise_limit(values, &settings.misfit);
         let p_value = is_more.then(|| p_value(base)).flatten();
-        if let Some(p_value) = p_value.filter(|p| *p < settings.verdict.chance) {
-            let named = (1.0 - self.unknown).max(f64::MIN_POSITIVE);
+        // what is surer that something is missing stays
+        let is_surer = |p_value: &f64| *p_value < settings.verdict.chance && 1.0 - *p_value > self.unknown;
+        if let Some(p_value) = p_value.filter(is_surer) {
+            let named: f64 = self.candidates.iter().map(|candidate| candidate.probability).sum();
             self.candidates.iter_mut().for_each(|candidate| candidate.probability *= p_value / named);
             (self.unknown, self.remains) = (1.0 - p_value, 1.0 - p_value);
         }
@@ -414,6 +416,52 @@ mod tests {
     use crate::diagnose::search::Search;
     use crate::diagnose::testing::{arm, swing};
     use crate::progress::Silent;
+
+    /// The posterior of an arm's base model alone, which leaves more than the noise, beside something of this probability, held against chance.
+    fn beside_something(unknown: f64, check: impl Fn(Posterior<'_>)) {
+        let experiment = arm("hinge_viscous = 2e-5\n");
+        let (t_s, theta_rad) = swing(&experiment, 10.0, 30.0);
+        let wave = |t: &f64| 1e-2 * (2.0 * t).sin();
+        let angles = t_s.iter().zip(theta_rad).map(|(t, theta_rad)| Some(theta_rad + wave(t))).collect();
+        let record = Record::uniform("made", t_s, vec![angles]);
+        let settings = Settings::default();
+        let prepared = preparation::prepare(&[record], &experiment, &settings).unwrap();
+        let taken = DampingAssumption::AsStated;
+        let search = Search::of_base_model(&prepared, &prepared.experiment, taken, &settings, &Silent).unwrap();
+        let probability = (1.0 - unknown).max(1e-300);
+        let candidate = Candidate {
+            fit: search.base().clone(),
+            ln_posterior: 0.0,
+            probability,
+            if_named: 1.0,
+            mixture_probability: probability,
+        };
+        let posterior = Posterior {
+            candidates: vec![candidate],
+            unknown,
+            remains: unknown,
+            lowest: probability,
+            uncertified: Vec::new(),
+            unknowns: Vec::new(),
+            compared: Compared::default(),
+            needed: Vec::new(),
+            explained: 1.0,
+        };
+        check(posterior.beside_chance(|_| Some(0.002), &settings));
+    }
+
+    #[test]
+    fn what_chance_seldom_leaves_makes_the_unknown_surer_and_never_less_sure() {
+        beside_something(0.3, |posterior| {
+            assert!((posterior.unknown - 0.998).abs() < 1e-12);
+            assert!((posterior.candidates[0].probability - 0.002).abs() < 1e-12);
+        });
+        // so sure that no number near 1 says it: nothing is divided by nothing
+        beside_something(1.0, |posterior| {
+            assert_eq!(posterior.unknown, 1.0);
+            assert!(posterior.candidates[0].probability < 1e-12);
+        });
+    }
 
     #[test]
     fn a_clock_and_a_scale_that_were_held_against_no_law_are_less_probable_where_something_remains() {

@@ -187,6 +187,9 @@ pub fn preferred_rod_count(context: &FitContext<'_>, fits: &[Refit<'_>], among: 
         .filter(|fit| within(fit) || among == ComparedFits::Simple && unexplained && simple(fit))
         .filter(may_win)
         .collect();
+    if !is_affordable(context, best, compared.len())? {
+        return None;
+    }
     let better = weights.weight(best) - weights.settings.search.worth_a_count;
     let wanted = |fit: &Refit<'_>| better.min(weights.with_chi2(fit, most));
     let experiments: Vec<Experiment> = (0..=MOST).map(|pieces| with(context.experiment, pieces)).collect();
@@ -212,6 +215,15 @@ pub fn preferred_rod_count(context: &FitContext<'_>, fits: &[Refit<'_>], among: 
         counted.best(&weights).filter(|(_, weight)| *weight < wanted(fit))
     });
     promised.min_by(|a, b| a.1.total_cmp(&b.1)).map(|(pieces, _)| pieces)
+}
+
+/// Whether so many scans come to an end before all together has come to what a diagnosis may take: a motion of a stiff strip may cost as much as a hundred others.
+fn is_affordable(context: &FitContext<'_>, fit: &Refit<'_>, scans: usize) -> Option<bool> {
+    let (search, before) = (&context.settings.search, context.work.done());
+    fit.problem.blocks(&fit.x)?;
+    let each = context.work.done() - before;
+    let motions = scans * (TRIED.len() + GUIDED) * context.settings.descent.few_steps;
+    Some(before as f64 + each as f64 * motions as f64 <= search.shares.all * search.budget as f64)
 }
 
 /// Whether the best fit leaves so much that a wrong count may have led to it.
