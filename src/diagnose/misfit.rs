@@ -72,6 +72,11 @@ pub fn chi2_noise_limit(values: usize, settings: &MisfitSettings) -> f64 {
     values + settings.deviations * (2.0 * values).sqrt()
 }
 
+/// Whether a fit leaves no more than noise.
+pub fn leaves_only_noise(fit: &Refit<'_>, settings: &MisfitSettings) -> bool {
+    fit.chi2 < chi2_noise_limit(fit.values(), settings)
+}
+
 /// χ² over the variance that the best fit leaves, plus a penalty for each effect.
 pub fn needs(fit: &Refit<'_>, best: &Refit<'_>, settings: &MisfitSettings) -> f64 {
     fit.chi2 / best.variance_ratio() + settings.counts * fit.hypothesis.effects.len() as f64

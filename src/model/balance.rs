@@ -74,18 +74,9 @@ impl<'a> Balance<'a> {
         sides: &[f64],
     ) {
         let motion = &mut self.motion;
-        match self.shapes {
-            None => {
-                motion.theta_rad.copy_from_slice(theta);
-                motion.rate.copy_from_slice(rate);
-                motion.acceleration.copy_from_slice(acceleration);
-            }
-            Some(shapes) => {
-                shapes.expand(theta, &mut motion.theta_rad);
-                shapes.expand(rate, &mut motion.rate);
-                shapes.expand(acceleration, &mut motion.acceleration);
-            }
-        }
+        let given =
+            [(theta, &mut motion.theta_rad), (rate, &mut motion.rate), (acceleration, &mut motion.acceleration)];
+        given.into_iter().for_each(|(of, links)| spread(self.shapes, of, links));
         for ((sin, cos), theta) in motion.sin.iter_mut().zip(&mut motion.cos).zip(&motion.theta_rad) {
             (*sin, *cos) = theta.sin_cos();
         }
@@ -135,10 +126,7 @@ impl<'a> Balance<'a> {
         let (mut partials, mut q) = (Partials::zero(n, m), DVector::zeros(m));
         let mut accelerations = vec![0.0; m];
         for _ in 0..self.model.newton_steps() {
-            match self.shapes {
-                None => self.motion.acceleration.copy_from_slice(&accelerations),
-                Some(shapes) => shapes.expand(&accelerations, &mut self.motion.acceleration),
-            }
+            spread(self.shapes, &accelerations, &mut self.motion.acceleration);
             self.partials(&mut partials);
             self.torque(q.as_mut_slice());
             let change = balanced(&partials, &q, self.motion.t_s)?;
@@ -163,26 +151,23 @@ impl<'a> Balance<'a> {
 
     /// Quantities at whose zeros a law has a corner; of the rates alone.
     pub fn corners(&mut self, rate: &[f64]) -> Vec<f64> {
-        match self.shapes {
-            None => self.motion.rate.copy_from_slice(rate),
-            Some(shapes) => shapes.expand(rate, &mut self.motion.rate),
-        }
+        spread(self.shapes, rate, &mut self.motion.rate);
         self.model.corners(&self.motion)
     }
 
     /// Quantities at whose zeros a force bends.
     pub fn kinks(&mut self, t_s: f64, theta: &[f64], rate: &[f64]) -> Vec<f64> {
-        match self.shapes {
-            None => {
-                self.motion.theta_rad.copy_from_slice(theta);
-                self.motion.rate.copy_from_slice(rate);
-            }
-            Some(shapes) => {
-                shapes.expand(theta, &mut self.motion.theta_rad);
-                shapes.expand(rate, &mut self.motion.rate);
-            }
-        }
+        spread(self.shapes, theta, &mut self.motion.theta_rad);
+        spread(self.shapes, rate, &mut self.motion.rate);
         self.motion.t_s = t_s;
         self.model.kinks(&self.motion)
+    }
+}
+
+/// What coordinates are on the links: themselves, where no shapes are sought.
+fn spread(shapes: Option<&Shapes>, of_coordinates: &[f64], of_links: &mut [f64]) {
+    match shapes {
+        None => of_links.copy_from_slice(of_coordinates),
+        Some(shapes) => shapes.expand(of_coordinates, of_links),
     }
 }

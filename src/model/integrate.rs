@@ -319,19 +319,11 @@ impl<'a> Run<'a> {
             if self.is_dry && self.hinge_goes_on(step, tau, turn) < 0.0 {
                 first = Some((root(inside, tau, |tau| self.hinge_goes_on(step, tau, turn)), turn));
             }
-            let is_earlier = |at: f64, first: Option<(f64, Turn)>| first.is_none_or(|(earliest, _)| at < earliest);
-            let corners = self.before_corners(step, tau);
-            for which in (0..corners.len()).filter(|which| corners[*which] < 0.0) {
-                let at = root(inside, tau, |tau| self.before_corners(step, tau)[which]);
-                if is_earlier(at, first) {
-                    first = Some((at, Turn::Corner(which)));
-                }
-            }
-            let kinks = self.before_kinks(step, tau);
-            for which in (0..kinks.len()).filter(|which| kinks[*which] < 0.0) {
-                let at = root(inside, tau, |tau| self.before_kinks(step, tau)[which]);
-                if is_earlier(at, first) {
-                    first = Some((at, Turn::Kink(which)));
+            let ahead = self.ahead(step, tau);
+            for which in (0..ahead.len()).filter(|which| ahead[*which].0 < 0.0) {
+                let at = root(inside, tau, |tau| self.ahead(step, tau)[which].0);
+                if first.is_none_or(|(earliest, _)| at < earliest) {
+                    first = Some((at, ahead[which].1));
                 }
             }
             if first.is_some() {
@@ -353,22 +345,23 @@ impl<'a> Run<'a> {
         self.balance.friction_n_m().unwrap_or(0.0) - self.balance.sticking_torque_n_m().abs()
     }
 
-    /// Of every corner a quantity that is positive up to there.
-    fn before_corners(&mut self, step: &Step, tau: f64) -> Vec<f64> {
-        if self.sides.is_empty() {
-            return Vec::new();
+    /// Of every corner, then of every kink, a quantity that is positive up to there.
+    fn ahead(&mut self, step: &Step, tau: f64) -> Vec<(f64, Turn)> {
+        let mut ahead = Vec::new();
+        if self.sides.is_empty() && self.kinks.is_empty() {
+            return ahead;
         }
-        let corners = self.balance.corners(&step.rate(tau));
-        corners.iter().zip(&self.sides).map(|(corner, side)| corner * side).collect()
-    }
-
-    /// Of every kink a quantity that is positive up to there.
-    fn before_kinks(&mut self, step: &Step, tau: f64) -> Vec<f64> {
-        if self.kinks.is_empty() {
-            return Vec::new();
+        let rate = step.rate(tau);
+        if !self.sides.is_empty() {
+            let corners = self.balance.corners(&rate).into_iter().zip(&self.sides).enumerate();
+            ahead.extend(corners.map(|(which, (corner, side))| (corner * side, Turn::Corner(which))));
         }
-        let kinks = self.balance.kinks(step.from_s + tau * step.length_s, &step.theta_rad(tau), &step.rate(tau));
-        kinks.iter().zip(&self.kinks).map(|(kink, side)| kink * side).collect()
+        if !self.kinks.is_empty() {
+            let kinks = self.balance.kinks(step.from_s + tau * step.length_s, &step.theta_rad(tau), &rate);
+            let kinks = kinks.into_iter().zip(&self.kinks).enumerate();
+            ahead.extend(kinks.map(|(which, (kink, side))| (kink * side, Turn::Kink(which))));
+        }
+        ahead
     }
 
     /// The sides of the kinks at the outset.

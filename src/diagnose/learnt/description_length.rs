@@ -7,7 +7,7 @@ use super::super::effect::Effect;
 use super::super::evidence::{Scatter, normalised};
 use super::super::grammar::{Form, Term};
 use super::super::hypothesis::Hypothesis;
-use super::super::misfit::chi2_noise_limit;
+use super::super::misfit::leaves_only_noise;
 use super::super::posterior::{Needed, Posterior};
 use super::super::refit::Refit;
 use super::super::settings::LawSettings;
@@ -41,7 +41,7 @@ impl Description<'_> {
     /// The effects that each of its terms stands for along a motion, with the share of each. Friction that goes with its load, or acts in a part of the swing, is friction.
     pub fn stand_for(&self, context: &FitContext<'_>, along: &Along) -> Vec<Vec<(Effect, f64)>> {
         let (law, misfit) = (&context.settings.law, &context.settings.misfit);
-        let is_exact = self.fit.chi2 < chi2_noise_limit(self.fit.values(), misfit);
+        let is_exact = leaves_only_noise(&self.fit, misfit);
         let of_term = |term: &Term| {
             let plain = if term.is_by_load() || term.acts_in_a_part() { term.plainer() } else { None };
             along.stands_for((plain.as_ref().unwrap_or(term), is_exact), law)

@@ -8,7 +8,7 @@ use super::super::context::FitContext;
 use super::super::effect::Effect;
 use super::super::grammar::Term;
 use super::super::hypothesis::Hypothesis;
-use super::super::misfit::chi2_noise_limit;
+use super::super::misfit::leaves_only_noise;
 use super::super::posterior::Posterior;
 use super::super::refit::Refit;
 use super::super::stretches::{Asked, best_term_sets};
@@ -67,24 +67,25 @@ pub fn fitted<'a>(
     let (mut candidates, mut in_a_part) = (VecDeque::from(in_all), Some(in_a_part));
     // those that short stretches ask for begin far away, and each costs as much as many others
     let mut asked_for = Some(asked_for);
-    let part_of_rest = |part: f64, until: u64| {
-        let done = context.work.done();
-        done + (part * until.saturating_sub(done) as f64) as u64
-    };
-    let until_first = part_of_rest(law.first, budget.until);
+    let until_first = part_of_rest(context, law.first, budget.until);
     let (mut begun, mut made): (Vec<Begun<'a>>, Vec<Begun<'a>>) = (Vec::new(), Vec::new());
     loop {
         let until = if in_a_part.is_some() { until_first } else { budget.until };
-        begun.extend(within(context, part_of_rest(law.begun, until), (BEGUN_AT_ONCE, &mut candidates), along_best));
+        begun.extend(within(
+            context,
+            part_of_rest(context, law.begun, until),
+            (BEGUN_AT_ONCE, &mut candidates),
+            along_best,
+        ));
         made.extend(halved(context, std::mem::take(&mut begun), until));
-        let is_exact = |fit: &Refit<'a>| fit.chi2 < chi2_noise_limit(fit.values(), &context.settings.misfit);
+        let is_exact = |fit: &Refit<'a>| leaves_only_noise(fit, &context.settings.misfit);
         let leaves_more = !is_exact(best) && !made.iter().any(|own| is_exact(&own.1));
         if let Some(in_a_part) = in_a_part.take_if(|_| leaves_more) {
             // what acts in a part of the swing follows many motions nearly: it is sought where nothing that acts in all of it leaves only noise
             candidates.extend(in_a_part);
             candidates.make_contiguous().sort_by_key(|own| own.rank);
             if let Some(asked_for) = asked_for.take() {
-                begun = asked_for(posterior.base(), part_of_rest(law.first, budget.until));
+                begun = asked_for(posterior.base(), part_of_rest(context, law.first, budget.until));
             }
             continue;
         }
@@ -94,7 +95,7 @@ pub fn fitted<'a>(
         }
         if candidates.is_empty() {
             let Some(asked_for) = asked_for.take() else { return made };
-            begun = asked_for(posterior.base(), part_of_rest(law.first, until));
+            begun = asked_for(posterior.base(), part_of_rest(context, law.first, until));
         }
     }
 }
@@ -175,8 +176,7 @@ fn halved<'a>(context: &FitContext<'a>, mut going_on: Vec<Begun<'a>>, until: u64
     while !going_on.is_empty() {
         let mut better = foremost(going_on, context.settings.search.hopeless);
         better.truncate(better.len().div_ceil(2));
-        let done = context.work.done();
-        let half = done + until.saturating_sub(done) / 2;
+        let half = part_of_rest(context, 0.5, until);
         let further = within(context, half, (GONE_ON_AT_ONCE, &mut better.into()), |(terms, fit)| {
             continue_fit(context, terms, fit, steps)
         });
@@ -188,6 +188,12 @@ fn halved<'a>(context: &FitContext<'a>, mut going_on: Vec<Begun<'a>>, until: u64
         steps *= 2;
     }
     made
+}
+
+/// What will have been done with a part of what is left until then.
+fn part_of_rest(context: &FitContext<'_>, part: f64, until: u64) -> u64 {
+    let done = context.work.done();
+    done + (part * until.saturating_sub(done) as f64) as u64
 }
 
 /// What becomes of some items, so many at once: the first of them in any case, the others for as long as the work done allows it.
