@@ -149,7 +149,7 @@ const OF_ANGLE: [Shape; 7] = [
     plain("constant", "1", 0),
     Shape {
         words: "with play",
-        formula: "sign(u) * max(abs(u) - b, 0)",
+        formula: "(max(u - b, 0) + min(u + b, 0))",
         power: 1,
         starts: &[&[0.15], &[0.4], &[0.7]],
         plainer: Some("in proportion"),

@@ -46,10 +46,16 @@ pub(super) struct Place {
     pub rate: Vec<f64>,
 }
 
-/// Where the laws have more corners than this, or kinks, steps do not end at each of them.
+/// Where the laws have more corners than this, steps do not end at each of them.
 const MOST_CORNERS: usize = 4;
+/// Nor where a force bends in more places (cost: each is the end of a step).
+const MOST_KINKS: usize = 12;
 /// Points of a step where a reversal is looked for.
 const LOOKS: usize = 12;
+/// How well the instant is known at which something turns, of a step.
+const ROOT_WIDTH: f64 = 1e-13;
+/// A law's corner, or a kink, at every so many of these: what it depends on is as smooth as the step.
+const LOOK_AHEAD: usize = 3;
 
 /// Runs the model from `place` to `until_s`, handing every accepted step to `visit`.
 pub(super) fn integrate(
@@ -194,7 +200,11 @@ impl<'a> Run<'a> {
         let mut step = self.step(h, &k);
         let turn = self.turn_in(&step);
         if let Some((tau, turn)) = turn {
-            step = self.end_at(step, tau, turn)?;
+            let Some(ended) = self.end_at(step, tau, turn) else {
+                self.last = None;
+                return self.shorten(0.3 * h).map(|()| None);
+            };
+            step = ended;
         }
         if let Some((theta, rate)) = &self.slopes {
             let k = DVector::from_column_slice(&step.stages);
@@ -312,19 +322,24 @@ impl<'a> Run<'a> {
         if !self.is_dry && self.sides.is_empty() && self.kinks.is_empty() {
             return None;
         }
-        let mut inside = 0.0;
+        let (mut inside, mut ahead_inside) = (0.0, 0.0);
         for look in 1..=LOOKS {
             let tau = look as f64 / LOOKS as f64;
             let mut first: Option<(f64, Turn)> = None;
             if self.is_dry && self.hinge_goes_on(step, tau, turn) < 0.0 {
                 first = Some((root(inside, tau, |tau| self.hinge_goes_on(step, tau, turn)), turn));
             }
-            let ahead = self.ahead(step, tau);
-            for which in (0..ahead.len()).filter(|which| ahead[*which].0 < 0.0) {
-                let at = root(inside, tau, |tau| self.ahead(step, tau)[which].0);
-                if first.is_none_or(|(earliest, _)| at < earliest) {
-                    first = Some((at, ahead[which].1));
+            // up to the hinge's own turn, where it has one
+            if first.is_some() || look % LOOK_AHEAD == 0 {
+                let until = first.map_or(tau, |(at, _)| at);
+                let ahead = self.ahead(step, until);
+                for which in (0..ahead.len()).filter(|which| ahead[*which].0 < 0.0) {
+                    let at = root(ahead_inside, until, |tau| self.ahead(step, tau)[which].0);
+                    if first.is_none_or(|(earliest, _)| at < earliest) {
+                        first = Some((at, ahead[which].1));
+                    }
                 }
+                ahead_inside = tau;
             }
             if first.is_some() {
                 return first;
@@ -367,7 +382,7 @@ impl<'a> Run<'a> {
     /// The sides of the kinks at the outset.
     fn kinks_at_start(&mut self) -> Vec<f64> {
         let now = self.balance.kinks(self.place.t_s, &self.place.theta, &self.place.rate);
-        if now.len() > MOST_CORNERS { Vec::new() } else { now.into_iter().map(f64::signum).collect() }
+        if now.len() > MOST_KINKS { Vec::new() } else { now.into_iter().map(f64::signum).collect() }
     }
 
     /// The sides of the corners at the outset; at a corner itself the one to which the motion goes: in pairs of a rate and of what has followed it.
@@ -387,15 +402,15 @@ impl<'a> Run<'a> {
         sides
     }
 
-    /// The same step, ended where something turns.
-    fn end_at(&mut self, step: Step, tau: f64, turn: Turn) -> Result<Step> {
+    /// The same step, ended where something turns; `None` where no such step is found.
+    fn end_at(&mut self, step: Step, tau: f64, turn: Turn) -> Option<Step> {
         let mut step = step;
         let mut end = tau;
         // the polynomial's root first; a second pass lands on the reversal of the shorter step itself
         for _ in 0..2 {
             let length_s = step.length_s * end;
             if !(length_s > 1e-13) {
-                return Ok(step_of_no_length(step));
+                return Some(step_of_no_length(step));
             }
             let mut k = DVector::zeros(step.stages.len());
             let m = self.first.len();
@@ -404,7 +419,7 @@ impl<'a> Run<'a> {
             }
             let start = start_of(&self.place, self.hinge, &self.sides);
             let tolerance_rad = self.accuracy.step_error_rad;
-            self.stages.solve(&start, length_s, &mut k, tolerance_rad).ok_or_else(|| self.stuck("no reversal"))?;
+            self.stages.solve(&start, length_s, &mut k, tolerance_rad)?;
             step = self.step(length_s, &k);
             // a corner only bends the force: to have ended close by is enough
             if turn != Turn::Reverses {
@@ -416,7 +431,7 @@ impl<'a> Run<'a> {
                 break;
             }
         }
-        Ok(step)
+        Some(step)
     }
 
     fn change(&mut self, turn: Turn) -> Result<()> {
@@ -470,15 +485,64 @@ fn step_of_no_length(step: Step) -> Step {
     Step { length_s: 0.0, ..step }
 }
 
-/// The root of a function that is not negative at `inside` and negative at `outside`, by halving.
+/// The root of a function that is not negative at `inside` and negative at `outside`, from outside: by false position, where the weight of a bound that stays
+/// twice is halved (the Illinois rule), and every third time by halving the bracket, so that it always closes.
 fn root(mut inside: f64, mut outside: f64, mut value: impl FnMut(f64) -> f64) -> f64 {
-    for _ in 0..50 {
-        let middle = 0.5 * (inside + outside);
-        if value(middle) < 0.0 {
-            outside = middle;
-        } else {
-            inside = middle;
+    let mut at_bounds = [value(inside), value(outside)];
+    let mut moved_last = None;
+    for round in 0..150 {
+        let length = outside - inside;
+        if length < ROOT_WIDTH {
+            break;
         }
+        let share = at_bounds[0] / (at_bounds[0] - at_bounds[1]);
+        let share = if round % 3 == 2 || !share.is_finite() { 0.5 } else { share };
+        // a root at a bound is enclosed from both sides
+        let least = 0.25 * ROOT_WIDTH / length;
+        let middle = inside + length * share.clamp(least, 1.0 - least);
+        let here = value(middle);
+        let moves = usize::from(here < 0.0);
+        if moves == 1 {
+            outside = middle
+        } else {
+            inside = middle
+        }
+        at_bounds[moves] = here;
+        if moved_last == Some(moves) {
+            at_bounds[1 - moves] *= 0.5;
+        }
+        moved_last = Some(moves);
     }
     outside
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_root_is_found_from_outside_with_few_looks() {
+        let cases: [(f64, &dyn Fn(f64) -> f64); 5] = [
+            (0.3, &|x| 0.3 - x),
+            (0.7, &|x| (0.7 - x) * (1.0 + x).powi(3)),
+            (0.5, &|x| (0.5 - x).powi(3)),
+            (0.0, &|x| -x),
+            (0.25, &|x| if x <= 0.25 { 1e-9 } else { -1e9 }),
+        ];
+        for (expected, function) in cases {
+            let mut looks = 0;
+            let found = root(0.0, 1.0, |x| {
+                looks += 1;
+                function(x)
+            });
+            assert!(found >= expected && found - expected <= ROOT_WIDTH, "{found} for {expected}");
+            assert!(looks < 140, "{looks}");
+        }
+        let mut looks = 0;
+        root(0.0, 1.0, |x| {
+            looks += 1;
+            (0.7 - x) * (1.0 + x).powi(3)
+        });
+        assert!(looks < 20, "{looks}");
+    }
 }
