@@ -187,10 +187,7 @@ impl<'a> Run<'a> {
         let mut k = self.guess(h);
         let tolerance_rad = self.accuracy.step_error_rad;
         let start = start_of(&self.place, self.hinge, &self.sides);
-        let Some(()) = self.stages.solve(&start, h, &mut k, tolerance_rad) else {
-            self.last = None;
-            return self.shorten(0.3 * h).map(|()| None);
-        };
+        let Some(()) = self.stages.solve(&start, h, &mut k, tolerance_rad) else { return self.retry(h) };
         let error = self.stages.error_rad(&start, h, &k, &self.first) / tolerance_rad;
         let factor = 0.9 * error.max(1e-12).powf(-1.0 / (STAGES + 1) as f64);
         if !(error <= 1.0) {
@@ -200,10 +197,7 @@ impl<'a> Run<'a> {
         let mut step = self.step(h, &k);
         let turn = self.turn_in(&step);
         if let Some((tau, turn)) = turn {
-            let Some(ended) = self.end_at(step, tau, turn) else {
-                self.last = None;
-                return self.shorten(0.3 * h).map(|()| None);
-            };
+            let Some(ended) = self.end_at(step, tau, turn) else { return self.retry(h) };
             step = ended;
         }
         if let Some((theta, rate)) = &self.slopes {
@@ -238,6 +232,12 @@ impl<'a> Run<'a> {
         }
         self.last = if jump { None } else { Some(Step { slopes: None, ..step.clone() }) };
         Ok(Some(step))
+    }
+
+    /// No step yet, and a far shorter one next, after one of this length whose equations were not solved: its guess may have been to blame.
+    fn retry(&mut self, length_s: f64) -> Result<Option<Step>> {
+        self.last = None;
+        self.shorten(0.3 * length_s).map(|()| None)
     }
 
     fn shorten(&mut self, length_s: f64) -> Result<()> {
@@ -316,7 +316,7 @@ impl<'a> Run<'a> {
         Ok(if self.holds(sticking_torque_n_m) { Hinge::Sticks } else { Hinge::sliding(sticking_torque_n_m) })
     }
 
-    /// Where in the step the hinge first reverses or is let go, or a law comes to a corner.
+    /// Where in the step the hinge first reverses or is let go, or a law comes to a corner or a kink.
     fn turn_in(&mut self, step: &Step) -> Option<(f64, Turn)> {
         let turn = if self.hinge == Hinge::Sticks { Turn::Lets } else { Turn::Reverses };
         if !self.is_dry && self.sides.is_empty() && self.kinks.is_empty() {
@@ -522,27 +522,22 @@ mod tests {
 
     #[test]
     fn a_root_is_found_from_outside_with_few_looks() {
-        let cases: [(f64, &dyn Fn(f64) -> f64); 5] = [
-            (0.3, &|x| 0.3 - x),
-            (0.7, &|x| (0.7 - x) * (1.0 + x).powi(3)),
-            (0.5, &|x| (0.5 - x).powi(3)),
-            (0.0, &|x| -x),
-            (0.25, &|x| if x <= 0.25 { 1e-9 } else { -1e9 }),
+        type Case<'f> = (f64, usize, &'f dyn Fn(f64) -> f64);
+        let cases: [Case<'_>; 5] = [
+            (0.3, 10, &|x| 0.3 - x),
+            (0.7, 20, &|x| (0.7 - x) * (1.0 + x).powi(3)),
+            (0.5, 140, &|x| (0.5 - x).powi(3)),
+            (0.0, 140, &|x| -x),
+            (0.25, 140, &|x| if x <= 0.25 { 1e-9 } else { -1e9 }),
         ];
-        for (expected, function) in cases {
+        for (expected, most, function) in cases {
             let mut looks = 0;
             let found = root(0.0, 1.0, |x| {
                 looks += 1;
                 function(x)
             });
             assert!(found >= expected && found - expected <= ROOT_WIDTH, "{found} for {expected}");
-            assert!(looks < 140, "{looks}");
+            assert!(looks < most, "{looks} for {expected}");
         }
-        let mut looks = 0;
-        root(0.0, 1.0, |x| {
-            looks += 1;
-            (0.7 - x) * (1.0 + x).powi(3)
-        });
-        assert!(looks < 20, "{looks}");
     }
 }
