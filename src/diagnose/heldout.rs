@@ -10,6 +10,7 @@ use super::posterior::{Candidate, Posterior, weigh};
 use super::refit::Refit;
 use super::search::horizon::continue_one;
 use crate::experiment::Law;
+use crate::fit::whitening::RecordNoise;
 use crate::fit::{Belief, Problem, Record, Residuals, recordings, residuals_of};
 use crate::model::Parameter;
 
@@ -278,7 +279,8 @@ fn along(context: &FitContext<'_>, fit: &Refit<'_>, rows: usize, is_continued: b
     Some(Prediction { rmse_rad, left, ..Prediction::from(&refitted, &context.laws) })
 }
 
-/// The pieces up to the border are fitted; from the last of them on all is predicted as one motion.
+/// The pieces up to the border are fitted; from the last of them on all is predicted as one motion. Where the model errs, and yet follows the fitted pieces as one
+/// motion, the coefficients are those of that motion: it is as long as what is predicted, and a piece leaves open what tells over many swings.
 fn beyond(context: &FitContext<'_>, fit: &Refit<'_>, pieces: usize) -> Option<Prediction> {
     let early = context.on(&context.records[..pieces]);
     let (mut near, free, starts) = (fit.clone(), fit.problem.free.len(), 2 * fit.problem.shapes());
@@ -287,39 +289,80 @@ fn beyond(context: &FitContext<'_>, fit: &Refit<'_>, pieces: usize) -> Option<Pr
     near.hypothesis = Hypothesis { dropped: within(pieces), ..fit.hypothesis.clone() };
     let fitted = refit_to_its_end(&early, &near.hypothesis, &near)?;
     let last = pieces - 1;
+    let of_last = [context.records[last].clone()];
     let rest = [Record::joined(&context.records[last..])?];
-    let onwards = context.on(&rest);
     let in_last = within(pieces).filter(|dropped| dropped.0 == last).map(|(_, at_s)| (0, at_s));
     let hypothesis = Hypothesis { dropped: in_last, ..fit.hypothesis.clone() };
-    let problem = onwards.problem_near(&hypothesis, &fitted).ok()?;
-    let x = [&fitted.x[..free], &fitted.x[free + last * starts..]].concat();
+    let problem = context.on(&rest).problem_near(&hypothesis, &fitted).ok()?;
+    let of_pieces = [&fitted.x[..free], &fitted.x[free + last * starts..]].concat();
+    let from_its_start = |coefficients: Vec<f64>| {
+        let last = context.on(&of_last);
+        start_of(&last, &hypothesis, last.noise_of(&fitted), &fitted, &coefficients, &of_pieces[free..])
+    };
+    let x = coefficients_of_one_motion(context, &fitted).and_then(from_its_start).unwrap_or(of_pieces);
     let rmse_rad = errors(&problem.predict(0, &x, false).ok()?.values, &rest[0], context.records[last].len())?;
     let before = (0..last).map(|piece| fitted.residuals(piece));
     let left = before.chain([residuals_of(&problem, &x, 0).ok()]).collect::<Option<_>>().and_then(Residuals::joined);
     Some(Prediction { rmse_rad, left, ..Prediction::from(&fitted, &context.laws) })
 }
 
+/// The coefficients of a fit that leaves more than noise of pieces, fitted to these as one motion; `None` where that leaves more than √n times what n pieces do, to
+/// which errors add up that are independent from piece to piece.
+fn coefficients_of_one_motion(context: &FitContext<'_>, fitted: &Refit<'_>) -> Option<Vec<f64>> {
+    let (pieces, free) = (fitted.problem.records.len(), fitted.problem.free.len());
+    if !leaves_more_than_noise(fitted, &context.settings.noise) {
+        return None;
+    }
+    let of_pieces =
+        (0..pieces).map(|piece| fitted.residuals(piece)).collect::<Option<_>>().and_then(Residuals::joined)?;
+    let joined = [Record::joined(fitted.problem.records)?];
+    let context = context.on(&joined);
+    let x = fitted.x[..free + 2 * fitted.problem.shapes()].to_vec();
+    let dropped = fitted.hypothesis.dropped.map(|(_, at_s)| (0, at_s));
+    let hypothesis = Hypothesis { dropped, ..fitted.hypothesis.clone() };
+    let problem = context.problem_near(&hypothesis, fitted).ok()?;
+    let begun = context.descend(&hypothesis, problem, x, context.settings.descent.few_steps)?;
+    if begun.has_lost_step(&context.settings.misfit) {
+        return None;
+    }
+    let one = refit_to_its_end(&context, &hypothesis, &begun)?;
+    let is_followed = squares(&one.residuals(0)?.rmse_rad) <= pieces as f64 * squares(&of_pieces.rmse_rad);
+    is_followed.then(|| one.x[..free].to_vec())
+}
+
+/// The start of a recording with these coefficients, from a start near it.
+fn start_of(
+    alone: &FitContext<'_>,
+    hypothesis: &Hypothesis,
+    noise: Vec<RecordNoise>,
+    near: &Refit<'_>,
+    coefficients: &[f64],
+    start: &[f64],
+) -> Option<Vec<f64>> {
+    let frozen: Vec<Belief> = (near.problem.free.iter().zip(coefficients))
+        .map(|(p, value)| Belief { parameter: *p, value: *value, sd: FROZEN * value.abs().max(1e-12) })
+        .collect();
+    let alone = FitContext { beliefs: frozen, ..alone.clone() };
+    let problem = Problem { records: alone.records, noise, ..near.problem.clone() };
+    let x = [coefficients, start].concat();
+    Some(alone.refit(hypothesis, &Refit { problem, x, ..near.clone() }, &[])?.x)
+}
+
 fn across(context: &FitContext<'_>, fit: &Refit<'_>, last: usize) -> Option<Prediction> {
     let others = context.on(&context.records[..last]);
     let whole = [Record::joined(&context.records[last..])?];
-    let alone = context.on(&whole);
     let hypothesis = Hypothesis { dropped: fit.hypothesis.dropped.filter(|d| d.0 < last), ..fit.hypothesis.clone() };
     let mut near = fit.clone();
     near.x.truncate(fit.problem.start_of(last));
     let fitted = refit_to_its_end(&others, &hypothesis, &near)?;
     // on the last one only the start is free
-    let frozen: Vec<Belief> = (fitted.problem.free.iter().zip(&fitted.x))
-        .map(|(p, value)| Belief { parameter: *p, value: *value, sd: FROZEN * value.abs().max(1e-12) })
-        .collect();
-    let alone = FitContext { beliefs: frozen, ..alone };
     let noise = vec![fit.problem.noise[last].clone()];
-    let problem = Problem { records: alone.records, noise, ..fitted.problem.clone() };
-    let mut begun = Refit { problem, ..fitted.clone() };
-    begun.x.truncate(fitted.problem.free.len());
-    begun.x.extend_from_slice(fit.problem.start(&fit.x, last));
     let hypothesis = Hypothesis { dropped: None, ..hypothesis };
-    let seen = alone.refit(&hypothesis, &begun, &[])?;
-    let rmse_rad = errors(&seen.problem.predict(0, &seen.x, false).ok()?.values, &whole[0], 0)?;
+    let (coefficients, start) = (&fitted.x[..fitted.problem.free.len()], fit.problem.start(&fit.x, last));
+    let alone = context.on(&whole);
+    let x = start_of(&alone, &hypothesis, noise, &fitted, coefficients, start)?;
+    let problem = alone.problem_near(&hypothesis, &fitted).ok()?;
+    let rmse_rad = errors(&problem.predict(0, &x, false).ok()?.values, &whole[0], 0)?;
     Some(Prediction { rmse_rad, ..Prediction::from(&fitted, &context.laws) })
 }
 

@@ -47,11 +47,17 @@ impl Hypothesis {
         Self { effects, dropped: if effect == Effect::DroppedFrames { dropped } else { self.dropped } }
     }
 
+    /// With frames missing from there on, if it says that frames are missing.
+    #[must_use]
+    pub fn dropping(self, dropped: Option<(usize, f64)>) -> Self {
+        Self { dropped: dropped.filter(|_| self.has(Effect::DroppedFrames)), ..self }
+    }
+
     /// Without one of its effects.
     #[must_use]
     pub fn without(&self, effect: Effect) -> Self {
         let effects = self.effects.iter().copied().filter(|other| *other != effect).collect();
-        Self { effects, dropped: self.dropped }
+        Self { effects, dropped: None }.dropping(self.dropped)
     }
 }
 
@@ -82,6 +88,17 @@ mod tests {
         assert_eq!([compared.of(&three), compared.of(&three[..2])], [3, 2]);
         let other = [Effect::HingeCoulomb, Effect::AirQuadratic, Effect::CameraOblique];
         assert_eq!(compared.of(&other), 2);
+    }
+
+    #[test]
+    fn an_instant_goes_with_the_frames_that_are_missing() {
+        let at = Some((0, 10.7));
+        let dropped = Hypothesis::default().and(Effect::DroppedFrames, at).and(Effect::HingeViscous, None);
+        assert_eq!(dropped.dropped, at);
+        assert_eq!(dropped.without(Effect::HingeViscous).dropped, at);
+        let friction = Hypothesis::default().and(Effect::HingeViscous, None);
+        assert_eq!(dropped.without(Effect::DroppedFrames), friction);
+        assert_eq!(friction.clone().dropping(at), friction);
     }
 
     #[test]

@@ -66,6 +66,8 @@ pub struct Needed {
     pub probability: f64,
     /// That a law outside the table acts in its place.
     pub replaced: f64,
+    /// Whether it has been held against every other effect beside the likeliest law.
+    pub compared: bool,
 }
 
 /// Weighs the hypotheses of some fits, out of so many candidate effects, beside the unknown around the likeliest of them. So many effects of each have been held
@@ -373,17 +375,18 @@ impl<'a> Posterior<'a> {
     /// sought, all descriptions. `is_untried` says that the names may stand for a law.
     fn inclusion(&self, effect: Effect, is_untried: bool, settings: &Settings) -> f64 {
         let others = self.fits();
+        let needed = self.needed.iter().find(|own| own.effect == effect);
         let not_imitated = |fit: &Refit<'_>| {
             let explaining = self.by_contribution(fit);
             let compared = self.compared.of(&fit.hypothesis.effects);
             let is_further = is_untried || explaining.iter().skip(compared).any(|further| *further == effect);
-            genuine_alone(effect, is_further, fit, &others, settings)
+            let is_compared = needed.is_some_and(|needed| needed.compared);
+            genuine_alone(effect, is_further && !is_compared, fit, &others, settings)
         };
         let with = || self.candidates.iter().filter(|c| c.fit.hypothesis.has(effect));
         let counts = with().filter(|c| c.mixture_probability > NEGLIGIBLE);
         let of_table =
             counts.map(|c| c.mixture_probability * not_imitated(&c.fit)).fold(0.0, |sum, p| sum + p).min(1.0);
-        let needed = self.needed.iter().find(|own| own.effect == effect);
         let likeliest = with().next().map_or(1.0 - settings.prior.imitated, |c| not_imitated(&c.fit));
         // the descriptions hold those of the table, too
         needed.map_or(of_table, |needed| (needed.probability * likeliest).min(self.explained))
@@ -395,12 +398,14 @@ impl<'a> Posterior<'a> {
         Effect::ALL.into_iter().map(|effect| (effect, self.inclusion(effect, is_untried, settings))).collect()
     }
 
-    /// A fit's effects, the one that explains most first: without which it would be worst.
+    /// A fit's effects, the one that explains most first: without which it would be worst. What has not been weighed leaves at least what one with more effects does.
     pub fn by_contribution(&self, fit: &Refit<'_>) -> Vec<Effect> {
         let mut effects = fit.hypothesis.effects.clone();
         let left_without = |effect: &Effect| {
-            let others = fit.hypothesis.without(*effect).effects;
-            self.of(&others).map_or(f64::INFINITY, |fit| fit.chi2)
+            let others = fit.hypothesis.without(*effect);
+            let fits = || self.candidates.iter().map(|candidate| &candidate.fit);
+            let richer = fits().filter(|own| !own.hypothesis.has(*effect) && others.is_within(&own.hypothesis));
+            self.of(&others.effects).map_or(richer.map(|own| own.chi2).fold(fit.chi2, f64::max), |fit| fit.chi2)
         };
         effects.sort_by(|a, b| left_without(b).total_cmp(&left_without(a)));
         effects

@@ -7,7 +7,7 @@
 //! value   = number | variable | function ( sum { , sum } ) | ( sum )
 //! ```
 //!
-//! Functions: `abs sign step max min exp sin cos sqrt tanh`. `sign` and `step` rise within ±10⁻³ of the unit of what they are of, as tanh does: an integrator
+//! Functions: `abs sign step max min exp sin cos sqrt tanh`. `sign` and `step` rise in a straight line within ±10⁻³ of the unit of what they are of: an integrator
 //! cannot step over a jump, unless it is told on which side it is ([`Expression::with_sign_given`]). Derivatives are taken forward, with some variables at once.
 
 use smallvec::SmallVec;
@@ -188,7 +188,8 @@ impl Expression {
         self.evaluate(variables, 0, |_| ())
     }
 
-    /// Adds the quantities at whose zeros it bends: the difference of what a `max` or a `min` is of, in the order of evaluation.
+    /// Adds the quantities at whose zeros it bends, in the order of evaluation: the difference of what a `max` or a `min` is of, what an `abs` is of, and how far
+    /// what a `sign` or a `step` is of lies from either edge of its rise.
     pub fn add_kinks(&self, variables: &[f64], kinks: &mut Vec<f64>) {
         _ = self.evaluate::<f64>(variables, 0, |difference| kinks.push(difference));
     }
@@ -198,8 +199,8 @@ impl Expression {
         self.evaluate(variables, from, |_| ())
     }
 
-    /// With derivatives from a variable on; the difference of what each `max` or `min` is of is handed to `compared`.
-    fn evaluate<N: Number>(&self, variables: &[f64], from: usize, mut compared: impl FnMut(f64)) -> N {
+    /// With derivatives from a variable on; the quantities at whose zeros it bends are handed to `bent`.
+    fn evaluate<N: Number>(&self, variables: &[f64], from: usize, mut bent: impl FnMut(f64)) -> N {
         let mut stack: Stack<N> = Stack::new();
         for node in &self.nodes {
             let result = match *node {
@@ -209,11 +210,15 @@ impl Expression {
                 Node::Raise(power) => {
                     of_one(pop(&mut stack), |v| (v.powi(power), f64::from(power) * v.powi(power - 1)))
                 }
-                Node::Call(function) if function.takes_one() => of_one(pop(&mut stack), |v| function.of(v)),
+                Node::Call(function) if function.takes_one() => {
+                    let operand: N = pop(&mut stack);
+                    function.bends_at().iter().for_each(|at| bent(operand.value() - at));
+                    of_one(operand, |v| function.of(v))
+                }
                 two => {
                     let (b, a) = (pop(&mut stack), pop(&mut stack));
                     if matches!(two, Node::Call(_)) {
-                        compared(a.value() - b.value());
+                        bent(a.value() - b.value());
                     }
                     of_two(two, a, b)
                 }
@@ -270,17 +275,23 @@ impl Function {
         !matches!(self, Self::Max | Self::Min)
     }
 
+    /// Where a function of one value bends.
+    fn bends_at(self) -> &'static [f64] {
+        match self {
+            Self::Abs => &[0.0],
+            Self::Sign | Self::Step => &[-SIGN_WIDTH, SIGN_WIDTH],
+            _ => &[],
+        }
+    }
+
     /// The value and the slope of a function of one value.
     fn of(self, v: f64) -> (f64, f64) {
         match self {
             Self::Abs => (v.abs(), if v < 0.0 { -1.0 } else { 1.0 }),
-            Self::Sign => {
-                let sign = (v / SIGN_WIDTH).tanh();
-                (sign, (1.0 - sign * sign) / SIGN_WIDTH)
-            }
+            Self::Sign => sign(v),
             Self::Step => {
-                let sign = (v / SIGN_WIDTH).tanh();
-                (0.5 * (1.0 + sign), 0.5 * (1.0 - sign * sign) / SIGN_WIDTH)
+                let (sign, slope) = sign(v);
+                (0.5 * (1.0 + sign), 0.5 * slope)
             }
             Self::Exp => (v.exp(), v.exp()),
             Self::Sin => (v.sin(), v.cos()),
@@ -290,6 +301,11 @@ impl Function {
             Self::Max | Self::Min => (f64::NAN, f64::NAN),
         }
     }
+}
+
+/// A sign that rises in a straight line, and its slope.
+fn sign(v: f64) -> (f64, f64) {
+    if v.abs() < SIGN_WIDTH { (v / SIGN_WIDTH, 1.0 / SIGN_WIDTH) } else { (v.signum(), 0.0) }
 }
 
 /// Brackets within brackets, at most.
@@ -452,15 +468,16 @@ mod tests {
     }
 
     #[test]
-    fn a_formula_bends_where_the_two_sides_of_a_max_or_a_min_are_equal() {
+    fn a_formula_bends_where_two_sides_are_equal_and_at_the_edges_of_a_sign() {
         let kinks = |text: &str| {
             let mut kinks = Vec::new();
             Expression::parse(text, &["angle", "b"]).unwrap().add_kinks(&[-0.3, 0.1], &mut kinks);
             kinks
         };
-        assert_eq!(kinks("sign(angle) * max(abs(angle) - b, 0)"), [0.3 - 0.1]);
+        assert_eq!(kinks("b * max(abs(angle) - b, 0)"), [-0.3, 0.3 - 0.1]);
+        assert_eq!(kinks("sign(angle) + step(b)"), [-0.3 + 1e-3, -0.3 - 1e-3, 0.1 + 1e-3, 0.1 - 1e-3]);
         assert_eq!(kinks("max(angle, b) + 2 * min(angle + b, 0)"), [-0.4, -0.3 + 0.1]);
-        assert!(kinks("angle * abs(angle) / b").is_empty());
+        assert!(kinks("angle * tanh(angle) / b").is_empty());
     }
 
     #[test]

@@ -356,7 +356,7 @@ fn a_formula_with_the_sign_of_the_rate_at_the_hinge_is_dry_friction() {
 }
 
 #[test]
-fn a_spring_with_play_is_integrated_as_exactly_as_one_without() {
+fn a_torque_that_bends_is_integrated_as_exactly_as_one_that_does_not() {
     let with = |formula: &str| {
         let text = format!(
             "[[specimen.links]]\nlength_m = 0.3\nmass_kg = 2e-3\ncom_m = 0.15\ninertia_kg_m2 = 1.5e-5\n\
@@ -377,7 +377,16 @@ fn a_spring_with_play_is_integrated_as_exactly_as_one_without() {
         instants.map(|t_s| (coarse.at(t_s).theta_rad[0] - fine.at(t_s).theta_rad[0]).abs()).fold(0.0, f64::max)
     };
     let smooth = error_rad("-a * angle * (1 + b)");
-    for bent in ["-a * sign(angle) * max(abs(angle) - b, 0)", "-a * max(angle - b, 0)", "-a * min(angle + b, 0)"] {
+    for bent in [
+        "-a * sign(angle) * max(abs(angle) - b, 0)",
+        "-a * max(angle - b, 0)",
+        "-a * min(angle + b, 0)",
+        "-a * angle - a * b * abs(angle)",
+        "-a * b * sign(angle)",
+        "-a * b * step(angle - 0.02)",
+        "-0.01 * a * b * rate * abs(rate)",
+        "-0.01 * a * b * rate * step(0.02 - abs(angle))",
+    ] {
         let error_rad = error_rad(bent);
         assert!(error_rad < 3.0 * smooth, "{bent}: {error_rad:e}, {smooth:e} without");
     }

@@ -175,6 +175,16 @@ pub fn scores(screen: &Screen<'_, '_>, effects: &[Effect]) -> Vec<Score> {
     scores
 }
 
+/// The scores of those effects that would leave so little more in the place of one of a fit's that they count.
+pub fn twin_scores(context: &FitContext<'_>, fit: &Refit<'_>, effect: Effect, others: &[Effect]) -> Option<Vec<Score>> {
+    let screen = Screen::in_place_of(context, fit, effect)?;
+    let left = screen.projection.residual.norm_squared();
+    let most = fit.chi2 + context.settings.certificate.within;
+    let mut scores = scores(&screen, &cheap_to_score(context, others));
+    scores.retain(|score| left - score.gain < most);
+    Some(scores)
+}
+
 /// The effects that are screened: a hysteresis in each joint of a strip of many links costs more than all others, and is only fitted alone.
 pub fn cheap_to_score(context: &FitContext<'_>, effects: &[Effect]) -> Vec<Effect> {
     effects.iter().copied().filter(|effect| !has_corners_in_every_joint(context, *effect)).collect()

@@ -7,6 +7,7 @@ use super::super::effect::Effect;
 use super::super::evidence::{Scatter, normalised};
 use super::super::grammar::{Form, Term};
 use super::super::hypothesis::Hypothesis;
+use super::super::laws;
 use super::super::misfit::leaves_only_noise;
 use super::super::posterior::{Needed, Posterior};
 use super::super::refit::Refit;
@@ -266,9 +267,11 @@ pub fn needed(
     let is_described =
         |names: &[Effect]| order.iter().any(|own| own.terms.is_empty() && own.fit.hypothesis.effects == names);
     let apart = twins.but(&posterior.best().hypothesis, is_described);
+    let irreplaceable = order.first().map(|own| irreplaceable(context, own, effects)).unwrap_or_default();
     let terms: Vec<Vec<Vec<(Effect, f64)>>> = order.iter().map(|own| own.stand_for(context, along)).collect();
     let of_effect = |effect: &Effect| {
-        let mut needed = Needed { effect: *effect, probability: 0.0, replaced: 0.0 };
+        let compared = irreplaceable.contains(effect);
+        let mut needed = Needed { effect: *effect, probability: 0.0, replaced: 0.0, compared };
         for ((own, terms), weight) in order.iter().zip(&terms).zip(&weights) {
             let of_terms = terms.iter().flatten().filter(|own| own.0 == *effect).map(|own| own.1).fold(0.0, f64::max);
             let twins = if terms.is_empty() { &apart } else { &twins };
@@ -281,6 +284,17 @@ pub fn needed(
         needed
     };
     effects.iter().map(of_effect).collect()
+}
+
+/// The names beside a law that leaves only noise in the place of which no other effect would do as well, as the tangents of its motion say.
+fn irreplaceable(context: &FitContext<'_>, own: &Description<'_>, effects: &[Effect]) -> Vec<Effect> {
+    if own.terms.is_empty() || !leaves_only_noise(&own.fit, &context.settings.misfit) {
+        return Vec::new();
+    }
+    let with = with_laws(context, &own.terms);
+    let has_no_twin =
+        |name: &&Effect| laws::twin_scores(&with, &own.fit, **name, effects).is_some_and(|own| own.is_empty());
+    own.fit.hypothesis.effects.iter().filter(has_no_twin).copied().collect()
 }
 
 #[cfg(test)]

@@ -68,7 +68,7 @@ pub fn fitted<'a>(
     // those that short stretches ask for begin far away, and each costs as much as many others
     let mut asked_for = Some(asked_for);
     let until_first = part_of_rest(context, law.first, budget.until);
-    let (mut begun, mut made): (Vec<Begun<'a>>, Vec<Begun<'a>>) = (Vec::new(), Vec::new());
+    let (mut begun, mut made, mut set_aside): (Vec<Begun<'a>>, Vec<Begun<'a>>, Vec<Begun<'a>>) = Default::default();
     loop {
         let until = if in_a_part.is_some() { until_first } else { budget.until };
         begun.extend(within(
@@ -77,7 +77,9 @@ pub fn fitted<'a>(
             (BEGUN_AT_ONCE, &mut candidates),
             along_best,
         ));
-        made.extend(halved(context, std::mem::take(&mut begun), until));
+        let (ended, left_behind) = halved(context, std::mem::take(&mut begun), until);
+        made.extend(ended);
+        set_aside.extend(left_behind);
         let is_exact = |fit: &Refit<'a>| leaves_only_noise(fit, &context.settings.misfit);
         let leaves_more = !is_exact(best) && !made.iter().any(|own| is_exact(&own.1));
         if let Some(in_a_part) = in_a_part.take_if(|_| leaves_more) {
@@ -94,8 +96,12 @@ pub fn fitted<'a>(
             return made;
         }
         if candidates.is_empty() {
-            let Some(asked_for) = asked_for.take() else { return made };
-            begun = asked_for(posterior.base(), part_of_rest(context, law.first, until));
+            match asked_for.take() {
+                Some(asked_for) => begun = asked_for(posterior.base(), part_of_rest(context, law.first, until)),
+                // and what was set aside for better ones may yet overtake them
+                None if set_aside.is_empty() => return made,
+                None => begun = std::mem::take(&mut set_aside),
+            }
         }
     }
 }
@@ -169,13 +175,13 @@ fn foremost<'a>(mut begun: Vec<Begun<'a>>, hopeless: f64) -> Vec<Begun<'a>> {
 }
 
 /// Fits to the end within a budget of work, by successive halving (Jamieson and Talwalkar, Proceedings of Machine Learning Research 51 (2016) 240): the better half goes
-/// some steps on, of these the better half twice as many, and so on, each time for half of what is left of the budget.
-fn halved<'a>(context: &FitContext<'a>, mut going_on: Vec<Begun<'a>>, until: u64) -> Vec<Begun<'a>> {
-    let mut made = Vec::new();
+/// some steps on, of these the better half twice as many, and so on, each time for half of what is left of the budget; and what was set aside.
+fn halved<'a>(context: &FitContext<'a>, mut going_on: Vec<Begun<'a>>, until: u64) -> (Vec<Begun<'a>>, Vec<Begun<'a>>) {
+    let (mut made, mut set_aside) = (Vec::new(), Vec::new());
     let mut steps = context.settings.descent.first_steps;
     while !going_on.is_empty() {
         let mut better = foremost(going_on, context.settings.search.hopeless);
-        better.truncate(better.len().div_ceil(2));
+        set_aside.extend(better.split_off(better.len().div_ceil(2)));
         let half = part_of_rest(context, 0.5, until);
         let further = within(context, half, (GONE_ON_AT_ONCE, &mut better.into()), |(terms, fit)| {
             continue_fit(context, terms, fit, steps)
@@ -187,7 +193,7 @@ fn halved<'a>(context: &FitContext<'a>, mut going_on: Vec<Begun<'a>>, until: u64
         going_on = others;
         steps *= 2;
     }
-    made
+    (made, set_aside)
 }
 
 /// What will have been done with a part of what is left until then.

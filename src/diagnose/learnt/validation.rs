@@ -6,7 +6,7 @@ use super::super::context::FitContext;
 use super::super::effect::{Effect, Phase, Place};
 use super::super::grammar::Term;
 use super::super::heldout::{self, HeldOut, Prediction};
-use super::super::misfit::is_beyond_noise;
+use super::super::misfit::{is_beyond_noise, leaves_only_noise};
 use super::super::refit::Refit;
 use super::description_length::Description;
 use super::term_fitting::with_laws;
@@ -73,7 +73,8 @@ fn formula_of(terms: &[Term]) -> String {
 ///
 /// An error that grows along a motion is one of its amplitude and one of its phase: two numbers, of unknown size, however many values show them. (Describing what
 /// comes later by what was learnt before is Dawid's prequential description, Journal of the Royal Statistical Society A 147 (1984) 278.) Where the model's own error is
-/// far above the noise, what predicts clearly worse than the names that have been `proven` is left out, however short it is.
+/// far above the noise, what predicts clearly worse than the names that have been `proven` is left out, however short it is, and what does so than another description,
+/// unless it leaves only noise.
 pub fn foretold<'a>(
     context: &FitContext<'a>,
     mut order: Vec<Description<'a>>,
@@ -91,6 +92,7 @@ pub fn foretold<'a>(
         let is_told = prediction.told.iter().all(|deviations| *deviations > told);
         (is_told && !fails(&prediction)).then_some((own, prediction))
     };
+    let is_exact = |own: &Description<'_>| leaves_only_noise(&own.fit, &settings.misfit);
     let mut foretold: Vec<(Description<'a>, Prediction)> = Vec::new();
     let mut asked = 0;
     // where none of the foremost predicts anything, the next ones are asked
@@ -101,6 +103,9 @@ pub fn foretold<'a>(
         asked += count;
         foretold = foremost.into_par_iter().with_max_len(1).filter_map(predict).collect();
     }
+    let left = |of: &Prediction| of.over(&proof.augmented);
+    let least = foretold.iter().map(|(_, prediction)| left(prediction)).fold(f64::INFINITY, f64::min);
+    foretold.retain(|(own, of)| !is_proof || is_exact(own) || settings.verdict.borne_out * left(of) <= least);
     foretold.sort_by(|a, b| a.0.length.total_cmp(&b.0.length));
     foretold
 }

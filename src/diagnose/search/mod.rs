@@ -311,8 +311,9 @@ impl<'a, 'p> Search<'a, 'p> {
         }
     }
 
-    /// Further starts for the fits that may count; of each it is then known whether it leaves no more than those within it.
+    /// What does as well as the likeliest fit, and further starts for the fits that may count; of each it is then known whether it leaves no more than those within it.
     fn certify(&mut self) {
+        self.round(Round::Twins, &mut Tried::default());
         self.round(Round::Certify, &mut Tried::default());
         self.round(Round::Nested, &mut Tried::default());
         let nested_ok: Vec<bool> = self.fits.iter().map(|fit| self.best_within(fit).is_none()).collect();

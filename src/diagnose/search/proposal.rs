@@ -52,6 +52,8 @@ pub enum Proposal<'f, 'a> {
     FromTheBeginning(Hypothesis, &'f Refit<'a>),
     /// A fit without one of its effects, and with another one of these in its place.
     Exchange(&'f Refit<'a>, Effect, &'f [Effect]),
+    /// Those of these effects that do nearly as well in the place of one of a fit, by the tangents of its motion.
+    Twins(&'f Refit<'a>, Effect, Vec<Effect>),
     /// A hypothesis anew from short stretches, beside what is left without.
     ByShooting(Hypothesis, &'f Refit<'a>),
     /// The hypotheses of these fits from the beginning of the recordings on, and beside the best of each part other effects.
@@ -63,6 +65,7 @@ impl<'a> Proposal<'_, 'a> {
     fn exchanges(&self) -> Option<&[Effect]> {
         match self {
             Self::Exchange(fit, _, others) if !others.is_empty() => Some(&fit.hypothesis.effects),
+            Self::Twins(fit, ..) => Some(&fit.hypothesis.effects),
             _ => None,
         }
     }
@@ -93,6 +96,7 @@ impl<'a> Proposal<'_, 'a> {
                 horizon::continue_one(context, &begun).into_iter().collect()
             }
             Self::Exchange(fit, effect, others) => instead(context, fit, *effect, others),
+            Self::Twins(fit, effect, others) => twins(context, fit, *effect, others),
             Self::ByShooting(hypothesis, without) => {
                 let anew = context.refit_by_shooting(hypothesis, &[], without);
                 let ended = |fit: Refit<'a>| match fit.converged || hypothesis.is_expensive() {
@@ -188,6 +192,20 @@ fn instead<'a>(context: &FitContext<'a>, fit: &Refit<'a>, effect: Effect, others
     found
 }
 
+/// A fit with another effect in the place of one, of each that would leave so little more that it counts: from its own motion, for from that without the effect a
+/// promise is worth little. And the same without each of the names that stay: what these add is known then.
+fn twins<'a>(context: &FitContext<'a>, fit: &Refit<'a>, effect: Effect, others: &[Effect]) -> Vec<Refit<'a>> {
+    let fewer = fit.hypothesis.without(effect);
+    let fitted = |score: Score| {
+        let twin = context.refit(&score.hypothesis(&fewer), fit, &score.start)?;
+        let without = |name: &Effect| context.refit(&twin.hypothesis.without(*name), &twin, &[]);
+        let simpler: Vec<Refit<'a>> = fewer.effects.iter().filter_map(without).collect();
+        Some(simpler.into_iter().chain([twin]))
+    };
+    let scores = laws::twin_scores(context, fit, effect, others).unwrap_or_default();
+    scores.into_iter().filter_map(fitted).flatten().collect()
+}
+
 /// A fit without one of its effects, from where it is or from the beginning.
 fn without<'a>(context: &FitContext<'a>, fit: &Refit<'a>, effect: Effect) -> Option<Refit<'a>> {
     let fewer = Refit { hypothesis: fit.hypothesis.without(effect), ..fit.clone() };
@@ -215,4 +233,41 @@ fn in_its_place<'a>(
     let other = |score: Score| context.refit(&score.hypothesis(&fewer.hypothesis), fewer, &score.start);
     let most_of = context.settings.search.most_of;
     others.into_iter().filter(|score| score.gain > most_of * promised).filter_map(other).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::diagnose::base_priors::DampingAssumption;
+    use crate::diagnose::search::Search;
+    use crate::diagnose::testing::{arm, swing};
+    use crate::diagnose::{Settings, preparation};
+    use crate::progress::Silent;
+
+    #[test]
+    fn what_does_as_well_in_the_place_of_an_effect_is_fitted_and_nothing_else() {
+        let (t_s, theta_rad) =
+            swing(&arm("hinge_viscous = 2e-5\nhinge_coulomb = 2e-4\nside_force = 3e-3\n"), 15.0, 30.0);
+        let angles = theta_rad.iter().enumerate().map(|(k, theta)| Some(theta + 1e-3 * (1.7 * (k * k) as f64).sin()));
+        let record = Record::uniform("made", t_s, vec![angles.collect()]);
+        let settings = Settings::default();
+        let stated = arm("hinge_viscous = 2e-5\n");
+        let prepared = preparation::prepare(&[record], &stated, &settings).unwrap();
+        let taken = DampingAssumption::AsStated;
+        let search = Search::of_base_model(&prepared, &stated, taken, &settings, &Silent).unwrap();
+        let pair = Hypothesis::default().and(Effect::HingeCoulomb, None).and(Effect::SideForce, None);
+        let start = [(Parameter::HingeCoulomb, 2e-4), (Parameter::SideForce, 3e-3)];
+        let fit = search.context.refit(&pair, search.base(), &start).unwrap();
+        assert!(fit.chi2 < 550.0, "{}", fit.chi2);
+        let others = vec![Effect::CameraTilt, Effect::AirQuadratic, Effect::AngleGain, Effect::TimeBase];
+        let in_place_of = |effect| Proposal::Twins(&fit, effect, others.clone()).fitted(&search.context);
+        // a constant side force leans the arm as a tilted camera does
+        let of_force = in_place_of(Effect::SideForce);
+        let sets: Vec<&[Effect]> = of_force.iter().map(|twin| &twin.hypothesis.effects[..]).collect();
+        assert_eq!(sets, [&[Effect::CameraTilt][..], &[Effect::CameraTilt, Effect::HingeCoulomb]]);
+        assert!((of_force[1].chi2 - fit.chi2).abs() < 5.0, "{} beside {}", of_force[1].chi2, fit.chi2);
+        assert!(of_force[0].chi2 > fit.chi2 + 30.0, "{} without friction", of_force[0].chi2);
+        // friction of the hinge brakes as nothing else does
+        assert!(in_place_of(Effect::HingeCoulomb).is_empty());
+    }
 }

@@ -40,6 +40,8 @@ pub enum Round {
     FromRicherFits,
     /// Single effects, and none, along the motion of the best fit, where they leave more.
     AlongBest,
+    /// Other effects in the place of one of the likeliest fit, where the tangents say that they would do as well.
+    Twins,
     /// Hypotheses that leave more than one with fewer of their effects, which proves a failed fit: from that one.
     Nested,
     /// The likeliest hypotheses from further starts, until enough of them agree.
@@ -96,6 +98,7 @@ impl Round {
             Self::Pairs => "pairs of effects",
             Self::FromRicherFits => "restarts from better fits",
             Self::AlongBest => "restarts along the best fit",
+            Self::Twins => "effects that do as well",
             Self::Nested => "restarts from smaller sets",
             Self::Certify => "further starts",
             Self::RestartedSingles => "restarts of the best single effects",
@@ -128,6 +131,7 @@ impl Round {
             Self::Pairs => search.pairs(),
             Self::FromRicherFits => search.started_from_richer_fits(),
             Self::AlongBest => search.along_the_leader(),
+            Self::Twins => search.twins(),
             Self::Nested => search.nested(),
             Self::Certify => search.further_starts(),
             Self::RestartedSingles => search.leaders().into_iter().map(Proposal::Restart).collect(),
@@ -180,24 +184,37 @@ impl<'a> Search<'a, '_> {
         self.context.is_strip() && is_dear && self.promised(effect) > ordinary.fold(0.0, f64::max)
     }
 
-    /// Along the motion of the best fit of the whole; where that has no effect, beside it, those first that the whole promises.
+    /// Along the motion of the best fit of the whole; where that has no effect, beside it, those first that the whole promises. And those that are scanned, of which the
+    /// part has only told roughly at which frequency, or at which instant, they act.
     fn indistinguishable(&self) -> Vec<Proposal<'_, 'a>> {
         let settings = self.context.settings;
         let Some(best) = least(&self.fits) else { return Vec::new() };
         let needs = |fit: &Refit<'a>| needs(fit, best, &settings.misfit);
         let leader = self.fits.iter().min_by(|a, b| needs(a).total_cmp(&needs(b))).unwrap_or(best);
-        let is_new = |effect: &Effect| !self.fits.iter().any(|fit| fit.hypothesis.effects == [*effect]);
-        let mut indistinguishable: Vec<Effect> = self.indistinguishable.iter().copied().filter(is_new).collect();
+        let is_fitted = |effect: &Effect| self.fits.iter().any(|fit| fit.hypothesis.effects == [*effect]);
+        let scanned: Vec<Effect> =
+            self.effects.iter().copied().filter(|effect| effect.is_scanned() && is_fitted(effect)).collect();
+        let again = self.scanned_again(&scanned);
+        let mut indistinguishable: Vec<Effect> =
+            self.indistinguishable.iter().copied().filter(|effect| !is_fitted(effect)).collect();
         if !leader.hypothesis.effects.is_empty() {
             indistinguishable.truncate(settings.search.tried);
             let along =
                 |effect| Proposal::Along(Hypothesis { effects: vec![effect], dropped: None }, leader, f64::INFINITY);
-            return indistinguishable.into_iter().map(along).collect();
+            return indistinguishable.into_iter().map(along).chain(again).collect();
         }
         indistinguishable.retain(|effect| self.promised(*effect) > settings.misfit.counts);
         indistinguishable.sort_by(|a, b| self.promised(*b).total_cmp(&self.promised(*a)));
         indistinguishable.truncate(settings.search.tried);
-        self.beside_base(self.lacking(), |effect| indistinguishable.contains(&effect))
+        let beside = self.beside_base(self.lacking(), |effect| indistinguishable.contains(&effect));
+        beside.into_iter().chain(again).collect()
+    }
+
+    /// Some effects beside the base model from where a scan of the whole points.
+    fn scanned_again(&self, effects: &[Effect]) -> Vec<Proposal<'_, 'a>> {
+        let screen = (!effects.is_empty()).then(|| Screen::at(&self.context, self.base())).flatten();
+        let scores = screen.map(|screen| laws::scores(&screen, effects)).unwrap_or_default();
+        scores.into_iter().map(|score| Proposal::Scored(self.base(), score)).collect()
     }
 
     /// Effects of some kind beside the base model, those first that promise most: the budget may end before the others.
@@ -252,7 +269,7 @@ impl<'a> Search<'a, '_> {
         let of = |fit: &Refit<'a>| {
             let within = self.best_within(fit)?;
             let dropped = within.hypothesis.dropped.or(fit.hypothesis.dropped);
-            Some(Proposal::Nested(Hypothesis { dropped, ..fit.hypothesis.clone() }, within))
+            Some(Proposal::Nested(fit.hypothesis.clone().dropping(dropped), within))
         };
         self.fits.iter().filter_map(of).collect()
     }
@@ -342,7 +359,7 @@ impl<'a> Search<'a, '_> {
                 many.effects.len() > few.effects.len() && few.is_within(many) && other.chi2 < fit.chi2 - counts
             };
             let leader = self.fits.iter().filter(richer).min_by(|a, b| a.chi2.total_cmp(&b.chi2))?;
-            Some(Hypothesis { dropped: leader.hypothesis.dropped, ..fit.hypothesis.clone() }).map(|h| (h, leader))
+            Some((fit.hypothesis.clone().dropping(leader.hypothesis.dropped), leader))
         };
         let proposed = self.fits.iter().filter_map(|fit| of(fit).map(|(hypothesis, leader)| (fit, hypothesis, leader)));
         proposed.map(|(fit, hypothesis, leader)| Proposal::FromLeader { fit, hypothesis, leader }).collect()
@@ -391,6 +408,29 @@ impl<'a> Search<'a, '_> {
         let seeds = not_yet(leading, &mut tried.more);
         let more = seeds.into_iter().flat_map(|seed| Beside::most_promising(&self.context, seed, &self.effects));
         more.map(Proposal::Beside).collect()
+    }
+
+    /// Of the likeliest fit, every effect that would do as well in the place of one of it: it was sought from where fewer effects stand. Where far more than noise is
+    /// left a promise says little.
+    fn twins(&self) -> Vec<Proposal<'_, 'a>> {
+        let settings = self.context.settings;
+        let Some(least) = least(&self.fits) else { return Vec::new() };
+        let likeliest = best(&self.fits, 1, |_| true, |fit| needs(fit, least, &settings.misfit));
+        let Some(fit) = likeliest.first().map(|place| &self.fits[*place]) else { return Vec::new() };
+        if leaves_more_than_noise(fit, &settings.noise) {
+            return Vec::new();
+        }
+        let effects = fit.hypothesis.effects.iter();
+        effects.map(|effect| Proposal::Twins(fit, *effect, self.never_instead(fit, *effect))).collect()
+    }
+
+    /// Effects that have never been fitted in the place of one of a fit.
+    fn never_instead(&self, fit: &Refit<'a>, effect: Effect) -> Vec<Effect> {
+        let is_fitted =
+            |hypothesis: Hypothesis| self.fits.iter().any(|own| own.hypothesis.effects == hypothesis.effects);
+        let fewer = fit.hypothesis.without(effect);
+        let others = self.effects.iter().copied().filter(|other| !fit.hypothesis.has(*other));
+        others.filter(|other| !is_fitted(fewer.and(*other, None))).collect()
     }
 
     /// Pairs have been sought from every side, and where far more than noise is left nothing does as well: only of three, and of what pieces of the recordings led
