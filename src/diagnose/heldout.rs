@@ -322,12 +322,14 @@ fn coefficients_of_one_motion(context: &FitContext<'_>, fitted: &Refit<'_>) -> O
     let hypothesis = Hypothesis { dropped, ..fitted.hypothesis.clone() };
     let problem = context.problem_near(&hypothesis, fitted).ok()?;
     let begun = context.descend(&hypothesis, problem, x, context.settings.descent.few_steps)?;
-    if begun.has_lost_step(&context.settings.misfit) {
-        return None;
-    }
+    let independent = pieces as f64 * squares(&of_pieces.rmse_rad);
+    let follows = |fit: &Refit<'_>, times: f64| {
+        fit.residuals(0).is_some_and(|left| squares(&left.rmse_rad) <= times * independent)
+    };
+    // further steps of one that is far off are dear and lead nowhere
+    follows(&begun, context.settings.search.keeps_up).then_some(())?;
     let one = refit_to_its_end(&context, &hypothesis, &begun)?;
-    let is_followed = squares(&one.residuals(0)?.rmse_rad) <= pieces as f64 * squares(&of_pieces.rmse_rad);
-    is_followed.then(|| one.x[..free].to_vec())
+    follows(&one, 1.0).then(|| one.x[..free].to_vec())
 }
 
 /// The start of a recording with these coefficients, from a start near it.
