@@ -293,13 +293,16 @@ fn beyond(context: &FitContext<'_>, fit: &Refit<'_>, pieces: usize) -> Option<Pr
     let rest = [Record::joined(&context.records[last..])?];
     let in_last = within(pieces).filter(|dropped| dropped.0 == last).map(|(_, at_s)| (0, at_s));
     let hypothesis = Hypothesis { dropped: in_last, ..fit.hypothesis.clone() };
-    let problem = context.on(&rest).problem_near(&hypothesis, &fitted).ok()?;
-    let of_pieces = [&fitted.x[..free], &fitted.x[free + last * starts..]].concat();
+    let start = &fitted.x[free + last * starts..];
     let from_its_start = |coefficients: Vec<f64>| {
         let last = context.on(&of_last);
-        start_of(&last, &hypothesis, last.noise_of(&fitted), &fitted, &coefficients, &of_pieces[free..])
+        let noise = last.noise_of(&fitted);
+        refit_start(&last, &hypothesis, &Refit { x: coefficients, ..fitted.clone() }, (start, noise))
     };
-    let x = coefficients_of_one_motion(context, &fitted).and_then(from_its_start).unwrap_or(of_pieces);
+    let of_one = coefficients_of_one_motion(context, &fitted).and_then(from_its_start);
+    let of_pieces = || Refit { x: [&fitted.x[..free], start].concat(), ..fitted.clone() };
+    let from_last = of_one.unwrap_or_else(of_pieces);
+    let (problem, x) = (context.on(&rest).problem_near(&hypothesis, &from_last).ok()?, from_last.x);
     let rmse_rad = errors(&problem.predict(0, &x, false).ok()?.values, &rest[0], context.records[last].len())?;
     let before = (0..last).map(|piece| fitted.residuals(piece));
     let left = before.chain([residuals_of(&problem, &x, 0).ok()]).collect::<Option<_>>().and_then(Residuals::joined);
@@ -321,33 +324,32 @@ fn coefficients_of_one_motion(context: &FitContext<'_>, fitted: &Refit<'_>) -> O
     let dropped = fitted.hypothesis.dropped.map(|(_, at_s)| (0, at_s));
     let hypothesis = Hypothesis { dropped, ..fitted.hypothesis.clone() };
     let problem = context.problem_near(&hypothesis, fitted).ok()?;
-    let begun = context.descend(&hypothesis, problem, x, context.settings.descent.few_steps)?;
+    let begun = context.descend(&hypothesis, problem, x, 0)?;
     let independent = pieces as f64 * squares(&of_pieces.rmse_rad);
     let follows = |fit: &Refit<'_>, times: f64| {
         fit.residuals(0).is_some_and(|left| squares(&left.rmse_rad) <= times * independent)
     };
-    // further steps of one that is far off are dear and lead nowhere
-    follows(&begun, context.settings.search.keeps_up).then_some(())?;
+    // steps of a motion that has lost step are dear and lead nowhere
+    follows(&begun, context.settings.search.hopeless).then_some(())?;
     let one = refit_to_its_end(&context, &hypothesis, &begun)?;
     follows(&one, 1.0).then(|| one.x[..free].to_vec())
 }
 
-/// The start of a recording with these coefficients, from a start near it.
-fn start_of(
-    alone: &FitContext<'_>,
+/// The fit of a recording's start alone, by this noise, near another start, with the coefficients of a fit.
+fn refit_start<'b>(
+    alone: &FitContext<'b>,
     hypothesis: &Hypothesis,
-    noise: Vec<RecordNoise>,
-    near: &Refit<'_>,
-    coefficients: &[f64],
-    start: &[f64],
-) -> Option<Vec<f64>> {
-    let frozen: Vec<Belief> = (near.problem.free.iter().zip(coefficients))
+    of: &Refit<'b>,
+    (start, noise): (&[f64], Vec<RecordNoise>),
+) -> Option<Refit<'b>> {
+    let coefficients = &of.x[..of.problem.free.len()];
+    let frozen: Vec<Belief> = (of.problem.free.iter().zip(coefficients))
         .map(|(p, value)| Belief { parameter: *p, value: *value, sd: FROZEN * value.abs().max(1e-12) })
         .collect();
     let alone = FitContext { beliefs: frozen, ..alone.clone() };
-    let problem = Problem { records: alone.records, noise, ..near.problem.clone() };
+    let problem = Problem { records: alone.records, noise, ..of.problem.clone() };
     let x = [coefficients, start].concat();
-    Some(alone.refit(hypothesis, &Refit { problem, x, ..near.clone() }, &[])?.x)
+    alone.refit(hypothesis, &Refit { problem, x, ..of.clone() }, &[])
 }
 
 fn across(context: &FitContext<'_>, fit: &Refit<'_>, last: usize) -> Option<Prediction> {
@@ -360,11 +362,9 @@ fn across(context: &FitContext<'_>, fit: &Refit<'_>, last: usize) -> Option<Pred
     // on the last one only the start is free
     let noise = vec![fit.problem.noise[last].clone()];
     let hypothesis = Hypothesis { dropped: None, ..hypothesis };
-    let (coefficients, start) = (&fitted.x[..fitted.problem.free.len()], fit.problem.start(&fit.x, last));
-    let alone = context.on(&whole);
-    let x = start_of(&alone, &hypothesis, noise, &fitted, coefficients, start)?;
-    let problem = alone.problem_near(&hypothesis, &fitted).ok()?;
-    let rmse_rad = errors(&problem.predict(0, &x, false).ok()?.values, &whole[0], 0)?;
+    let start = fit.problem.start(&fit.x, last);
+    let seen = refit_start(&context.on(&whole), &hypothesis, &fitted, (start, noise))?;
+    let rmse_rad = errors(&seen.problem.predict(0, &seen.x, false).ok()?.values, &whole[0], 0)?;
     Some(Prediction { rmse_rad, ..Prediction::from(&fitted, &context.laws) })
 }
 
