@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 use crate::angles::AngleSource;
 use crate::caution::{cautions, longest_gap};
@@ -10,6 +10,9 @@ use crate::digest;
 use crate::error::Result;
 use crate::measure::{Measurement, Options};
 use crate::video::Timing;
+
+/// Its form.
+const SCHEMA: &str = "freeswing.angles/1";
 
 /// The file, ready to be written.
 #[derive(Debug, Serialize)]
@@ -28,6 +31,19 @@ pub struct Sidecar {
     camera: CameraMotion,
     /// Everything that a person should know.
     pub warnings: Vec<String>,
+}
+
+/// What was said of a table when it was tracked, where its file still stands beside it.
+pub fn tracking_warnings(table: &Path) -> Vec<String> {
+    #[derive(Deserialize)]
+    struct Said {
+        schema: String,
+        warnings: Vec<String>,
+    }
+    let text = std::fs::read_to_string(table.with_extension("json")).unwrap_or_default();
+    let said = serde_json::from_str::<Said>(&text).ok().filter(|said| said.schema == SCHEMA);
+    let of_table = |warning: String| format!("{}, when it was tracked: {warning}", table.display());
+    said.map_or_else(Vec::new, |said| said.warnings.into_iter().map(of_table).collect())
 }
 
 #[derive(Debug, Serialize)]
@@ -145,7 +161,7 @@ impl Sidecar {
     pub fn new(path: &Path, options: &Options, m: &Measurement) -> Result<Self> {
         let (width_px, height_px) = m.stream.orientation.size(m.stream.stored_size_px);
         let mut sidecar = Self {
-            schema: "freeswing.angles/1",
+            schema: SCHEMA,
             program: env!("CARGO_PKG_NAME"),
             version: env!("CARGO_PKG_VERSION"),
             source: Source::read(path)?,

@@ -246,6 +246,9 @@ fn a_pivot_known_to_some_pixels_makes_all_angles_wrong_alike_and_that_is_said() 
         words.contains("the pivot is known to ± 0.4 px (x) and ± 8.0 px (y)") && words.contains("by 10."),
         "{words}"
     );
+    // what was said goes with the table
+    let identified = done(&bench.freeswing(&["identify", "angles.csv"]));
+    assert!(identified.contains("when it was tracked: the pivot is known to ± 0.4 px"), "{identified}");
     assert!(!said_of("[0.01, 0.02]").contains("the pivot is known"));
     std::fs::write(bench.path("rig.toml"), "[rig]\npivot_sd_px = [1.0, 1.0]\n").unwrap();
     assert!(refused(&bench.track(&["--config", "rig.toml"])).contains("rig.pivot_px, which is not given"));
@@ -301,4 +304,38 @@ fn marks_before_a_shelf_of_books_of_their_colour_are_found() {
         assert_eq!(with.len(), without.len());
         assert!(with.iter().zip(&without).all(|(a, b)| (a - b).abs() < 1.5), "{mark}");
     }
+}
+
+/// A dark ball on a thread of 300 px that hangs from the lower edge of a dark block, as a clamp looks.
+fn ball_under_a_clamp(folder: &Path) {
+    let theta = "0.4*cos(5*t)*exp(-0.02*t)";
+    let scene = format!(
+        "[0]drawbox=x=308:y=10:w=24:h=80:color=black:t=fill[wall];\
+         [1]format=rgba,geq=r=20:g=20:b=20:a='if(lte(hypot(X-20,Y-20),18),255,0)'[ball];\
+         [wall][ball]overlay=x='300+300*sin({theta})':y='70+300*cos({theta})':format=yuv444"
+    );
+    let made = Command::new("ffmpeg")
+        .args(["-loglevel", "error", "-y", "-f", "lavfi", "-i", "color=c=0xc8c8d0:s=640x440:r=30:d=6"])
+        .args(["-f", "lavfi", "-i", "color=c=black:s=40x40:r=30:d=6", "-filter_complex", &scene])
+        .args(["-c:v", "libx264", "-crf", "18", "-pix_fmt", "yuv420p", "ball.mp4"])
+        .current_dir(folder)
+        .status();
+    assert!(made.unwrap().success());
+}
+
+#[test]
+fn a_clamp_above_a_ball_is_not_the_hinge_where_the_arc_has_its_centre_elsewhere() {
+    let bench = Bench { folder: tempfile::tempdir().unwrap() };
+    ball_under_a_clamp(bench.folder.path());
+    let words = done(&bench.freeswing(&["init", "ball.mp4"]));
+    assert!(words.contains("no mark shows the hinge") && !words.contains("taken for the hinge"), "{words}");
+    let file = std::fs::read_to_string(bench.path("experiment.toml")).unwrap();
+    let stated = |key: &str| -> [f64; 2] {
+        let line = file.lines().find_map(|line| line.strip_prefix(key)?.strip_prefix(" = [")).unwrap();
+        let mut values = line.split(']').next().unwrap().split(", ").map(|value| value.parse().unwrap());
+        [values.next().unwrap(), values.next().unwrap()]
+    };
+    let ([x, y], [sx, sy]) = (stated("pivot_px"), stated("pivot_sd_px"));
+    // the ball's middle is half a disc from its picture's corner
+    assert!((x - 319.5).abs() < 3.0 * sx && (y - 89.5).abs() < 3.0 * sy && sy < 8.0, "{x} {y} {sx} {sy}");
 }

@@ -10,6 +10,7 @@ use crate::track::{Point, UnusedObject};
 
 mod gap;
 mod link;
+mod path;
 mod pivot;
 
 pub use gap::longest_gap;
@@ -57,13 +58,14 @@ const SLOW_MOTION: [(f64, f64); 12] = [
 /// Every caution about a measurement.
 pub fn cautions(m: &Measurement, options: &Options) -> Vec<String> {
     let mut cautions = Vec::new();
-    cautions.extend(spares(m));
+    cautions.extend(spares(m, options));
     let first = usize::from(options.rig.pivot_px.is_none());
     for link in 0..m.angles.links.len() {
         cautions.extend(link::link_length(m, options, link, first));
         cautions.extend(turns(m, options, link));
     }
     cautions.extend(link::hangs(m, options));
+    cautions.extend(path::open(m));
     let held = held(m);
     for mark in 0..m.tracks.marks.len() {
         // a hand's trembling is no noise of a mark's
@@ -136,7 +138,7 @@ fn time(m: &Measurement, options: &Options) -> Vec<String> {
 }
 
 /// Things of the marks' colour that were not used.
-fn spares(m: &Measurement) -> Vec<String> {
+fn spares(m: &Measurement, options: &Options) -> Vec<String> {
     let range = |points: &[Point]| {
         let x = points.iter().filter_map(|p| p.measured).map(|m| m.position_px[0]);
         0.5 * (x.clone().fold(f64::MIN, f64::max) - x.fold(f64::MAX, f64::min))
@@ -186,7 +188,7 @@ fn spares(m: &Measurement) -> Vec<String> {
             if still.len() == 1 { "s" } else { "" },
             if still.len() == 1 { "was" } else { "were" },
             places(&still),
-            hinge_among(m).map_or(String::new(), |[x, y]| format!(
+            hinge_among(m).filter(|_| options.rig.pivot_px.is_none()).map_or(String::new(), |[x, y]| format!(
                 "; the first mark swings about the one at ({x:.0}, {y:.0}): if it is the hinge, say --markers {}",
                 marks + 1
             )),
@@ -270,7 +272,7 @@ fn held(m: &Measurement) -> Option<String> {
 fn caught(m: &Measurement) -> Option<String> {
     caught_of(paths(m)).map(|caught_s| {
         format!(
-            "the specimen is held still from t = {caught_s:.2} s on, probably by a hand: leave that out with --until {caught_s:.2}"
+            "the specimen is caught after t = {caught_s:.2} s and held still to the end, probably by a hand: leave that out with --until {caught_s:.2}"
         )
     })
 }

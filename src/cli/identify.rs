@@ -9,6 +9,7 @@ use crate::experiment::Experiment;
 use crate::identify::{identify, identify_displacement};
 use crate::output::OutputFile;
 use crate::series::{AngleSeries, Measured};
+use crate::sidecar::tracking_warnings;
 
 /// Find frequencies, damping and mode shapes in a table of angles, every estimator side by side.
 #[derive(Debug, clap::Args)]
@@ -55,6 +56,7 @@ impl IdentifyArgs {
         let json = self.json.as_deref().map(OutputFile::create).transpose()?;
         let (series, measured) = AngleSeries::read_motion(&self.angles)?;
         console.warnings(&series.warnings);
+        console.warnings(&tracking_warnings(&self.angles));
         let series = self.stretch(series)?;
         let found = match measured {
             Measured::Angles => identify(&series, experiment.as_ref())?,

@@ -112,6 +112,9 @@ impl InitArgs {
         if let Some(held_s) = finding.held_until_s {
             console.remark(format!("held still until t = {held_s:.2} s, as by a hand: left out (from_s in {out})"));
         }
+        if let Some(caught_s) = finding.caught_after_s {
+            console.remark(format!("caught after t = {caught_s:.2} s, as by a hand: left out (until_s in {out})"));
+        }
         console.remark(hinge_in_words(finding));
         if let Some(turned_rad) = finding.hangs_at_rad().filter(|angle_rad| angle_rad.abs() > SIDEWAYS_RAD) {
             let filter = match turned_rad {
@@ -155,8 +158,12 @@ fn hinge_in_words(finding: &Finding) -> String {
     match finding.arc.filter(|_| finding.states_pivot()) {
         Some(arc) => {
             let ([x, y], [sx, sy]) = (arc.centre_px, arc.sd_px);
+            let still = finding.still.first().map_or(String::new(), |thing| {
+                let [x, y] = thing.place_px();
+                format!("; what stands still at {x:.0}, {y:.0} px looks like a mark, but is not there")
+            });
             format!(
-                "no mark shows the hinge; the first mark swings about {x:.1}, {y:.1} px (standard deviation {sx:.1}, {sy:.1})"
+                "no mark shows the hinge; the first mark swings about {x:.1}, {y:.1} px (standard deviation {sx:.1}, {sy:.1}){still}"
             )
         }
         None if finding.marks.len() == 1 => {

@@ -184,7 +184,7 @@ fn recordings(
         // an end that was asked for stays
         if let Some((caught_s, swing)) = kept.caught().filter(|_| until_s.is_infinite()) {
             console.warning(format!(
-                "{}: the specimen is held still from t = {caught_s:.2} s on, probably by a hand; that is no free motion: left out, as with --until {caught_s:.2}",
+                "{}: the specimen is caught after t = {caught_s:.2} s and held still to the end, probably by a hand; that is no free motion: left out, as with --until {caught_s:.2}",
                 series.path.display()
             ));
             kept = swing;

@@ -204,7 +204,15 @@ impl Mode {
             };
             Some(format!("f = f₀(1 − κA²) has {measured}, gravity alone makes {expected:.4}: {cause}{scale}"))
         } else if !k.holds(0.0) && k.half() < 0.5 * expected.abs() {
-            Some(format!("the frequency falls with amplitude as gravity makes it ({measured}, expected {expected:.4})"))
+            let how = if k.holds(expected) {
+                format!("as gravity makes it ({measured}, expected {expected:.4})")
+            } else {
+                let times = (k.value / expected).max(0.0).sqrt();
+                format!(
+                    "about as gravity makes it ({measured}, expected {expected:.4}; both agree if the true angles are {times:.3} × the stated ones: are they measured from the hinge?)"
+                )
+            };
+            Some(format!("the frequency falls with amplitude {how}"))
         } else {
             None
         }

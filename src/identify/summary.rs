@@ -32,7 +32,7 @@ pub(super) fn summary(found: &Identification) -> String {
         format!(" — held still until t = {held_s:.2} s; only what follows is used, as with `--from {held_s:.2}`")
     });
     let rest = found.rests_from_s.map(|rest_s| {
-        format!(" — at rest from t = {rest_s:.2} s on; only what precedes is used, as with `--until {rest_s:.2}`")
+        format!(" — caught, or at rest, from t = {rest_s:.2} s on; only what precedes is used, as with `--until {rest_s:.2}`")
     });
     let changed = (!found.abrupt_changes.is_empty()).then(|| format!(" — {}", changes(found)));
     let part = found.tumbling.iter().map(|t| format!(" — {}", t.statement));

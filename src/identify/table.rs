@@ -76,8 +76,12 @@ impl Display for Record {
             1.0 / self.step_s,
             self.measured.columns(self.values.len())
         )?;
-        let noise: Vec<String> = self.noise_rad.iter().map(|n| self.measured.show(*n, 4)).collect();
-        if noise.is_empty() { Ok(()) } else { writeln!(f, "  noise {}", noise.join(", ")) }
+        let left: Vec<String> = self.noise_rad.iter().map(|n| self.measured.show(*n, 4)).collect();
+        if left.is_empty() {
+            Ok(())
+        } else {
+            writeln!(f, "  left beside the modes, noise included: {} (rms)", left.join(", "))
+        }
     }
 }
 

@@ -58,7 +58,11 @@ pub fn to_toml(finding: &Finding, video: &str, part: &Rig) -> String {
     );
     specimen(&mut text, finding);
     rig(&mut text, finding);
-    let held = Rig { from_s: finding.held_until_s.or(part.from_s), ..part.clone() };
+    let held = Rig {
+        from_s: finding.held_until_s.or(part.from_s),
+        until_s: finding.caught_after_s.or(part.until_s),
+        ..part.clone()
+    };
     looked_at(&mut text, &held);
     text
 }

@@ -16,7 +16,7 @@ use std::path::Path;
 use crate::detect::{Album, COUNTS, Hue, Trial};
 use crate::error::{Error, Result};
 use crate::experiment::MarkColour;
-use crate::hand_hold::released_of;
+use crate::hand_hold::{caught_of, released_of};
 use crate::measure::{Camera, Options, Session};
 use crate::progress::Progress;
 use crate::track::chain_detection::{self, MOST_MARKS};
@@ -63,6 +63,8 @@ pub struct Finding {
     pub apart: Vec<TrackedObject>,
     /// Until when it is held still at first, as by a hand: that is left out.
     pub held_until_s: Option<f64>,
+    /// After when it is caught and held to the end: that, too.
+    pub caught_after_s: Option<f64>,
     /// Turns a second of the first mark that swings.
     pub frequency_hz: Option<f64>,
     /// Time stamps.
@@ -71,8 +73,10 @@ pub struct Finding {
     pub stream: StreamInfo,
     /// The camera's motion.
     pub camera: Camera,
-    /// One picture, stored as red, green, blue at chroma resolution.
+    /// One picture of the free swing, stored as red, green, blue at chroma resolution.
     pub background: Background,
+    /// Its place in the marks' paths.
+    pub pictured: usize,
 }
 
 /// A small picture for the preview.
@@ -202,9 +206,10 @@ fn measured(
     };
     let Some(mut chain) = found(&frames, &all) else { return Ok(None) };
     // a hand that holds a mark covers part of it, at one end of its arc
-    let held_until_s = held_until_s(&frames, &chain.marks.iter().map(|i| &all[*i]).collect::<Vec<_>>());
-    if let Some(held_s) = held_until_s {
-        frames.retain(|frame| frame.t_s >= held_s);
+    let [held_until_s, caught_after_s] = held_s(&frames, &chain.marks.iter().map(|i| &all[*i]).collect::<Vec<_>>());
+    if held_until_s.or(caught_after_s).is_some() {
+        let free_s = held_until_s.unwrap_or(f64::NEG_INFINITY)..=caught_after_s.unwrap_or(f64::INFINITY);
+        frames.retain(|frame| free_s.contains(&frame.t_s));
         all = things(&frames);
         chain = match found(&frames, &all) {
             Some(chain) => chain,
@@ -212,13 +217,27 @@ fn measured(
         };
     }
     let t_s: Vec<f64> = frames.iter().map(|f| f.t_s).collect();
-    let marks: Vec<Mark> = chain
+    let place_of = |stamp_s: &f64| t_s.iter().position(|t| t == stamp_s);
+    let free = session.sampled_s().iter().enumerate().find_map(|(k, stamp_s)| Some((k, place_of(stamp_s)?)));
+    let (picture, pictured) = free.unwrap_or_default();
+    let mut marks: Vec<Mark> = chain
         .marks
         .iter()
         .map(|i| Mark { colour: names[usize::from(all[*i].hue)].clone(), thing: all[*i].clone() })
         .collect();
+    let first = &marks[usize::from(chain.hinge_marked).min(marks.len() - 1)].thing;
+    let stream = session.stream();
+    let (width, height) = stream.orientation.size(stream.stored_size_px);
+    let size_px = [aspect * width as f64, height as f64];
+    let arc = chain.arc.map(|arc| arc.through_a_camera(&first.places_px(), first.radius_px(), size_px));
+    // a clamp above a ball looks like it, and is not where the ball swings about; a chain of several marks is known by itself
+    let is_elsewhere = |arc: Arc| marks.len() == 2 && arc.excludes(marks[0].thing.place_px());
+    let hinge_marked = chain.hinge_marked && !arc.is_some_and(is_elsewhere);
+    if chain.hinge_marked && !hinge_marked {
+        marks.remove(0);
+    }
     let links_px = marks.windows(2).filter_map(|w| w[0].thing.distance_px(&w[1].thing)).collect();
-    let swinging = usize::from(chain.hinge_marked);
+    let swinging = usize::from(hinge_marked);
     let beside = |t: &TrackedObject, m: &Mark| {
         m.thing.distance_px(t).is_some_and(|d| d > m.thing.area_px2.sqrt().max(t.area_px2.sqrt()))
     };
@@ -228,25 +247,22 @@ fn measured(
         t.moves && chain_detection::hangs_alone(t) && marks.iter().all(|m| m.thing.is_seen_beside(t))
     };
     let apart = all.iter().filter(swings_apart).filter(alike);
-    let first = &marks[swinging.min(marks.len() - 1)].thing;
-    let stream = session.stream();
-    let (width, height) = stream.orientation.size(stream.stored_size_px);
-    let size_px = [aspect * width as f64, height as f64];
-    let arc = chain.arc.map(|arc| arc.through_a_camera(&first.places_px(), first.radius_px(), size_px));
     let in_file = |thing: &TrackedObject| thing.clone().widened(aspect.recip());
     Ok(Some(Finding {
         held_until_s,
+        caught_after_s,
         frequency_hz: marks.get(swinging).and_then(|m| turns_per_second(&m.thing, &t_s)),
         still: still.map(in_file).collect(),
         apart: apart.map(in_file).collect(),
         links_px,
         arc: arc.map(|arc| arc.widened(aspect.recip())),
         marks: marks.iter().map(|m| Mark { thing: in_file(&m.thing), ..m.clone() }).collect(),
-        hinge_marked: chain.hinge_marked,
+        hinge_marked,
         timing: Timing::audit(&t_s, session.stream().nominal_rate_hz, session.stream().tick_s),
         stream: session.stream().clone(),
         camera: session.camera(),
-        background: background(session.album()),
+        background: background(session.album(), picture),
+        pictured,
     }))
 }
 
@@ -255,15 +271,18 @@ fn square(frames: Vec<FrameBlobs>, aspect: f64) -> Vec<FrameBlobs> {
     frames.into_iter().map(|frame| frame.widened(aspect)).collect()
 }
 
-/// When what moves farthest is let go, if it is held at first.
-fn held_until_s(frames: &[FrameBlobs], marks: &[&TrackedObject]) -> Option<f64> {
-    let farthest = marks.iter().max_by(|a, b| a.travel_px.total_cmp(&b.travel_px))?;
-    let along = |axis: usize| -> (Vec<f64>, Vec<f64>) {
-        let seen = frames.iter().zip(&farthest.path);
+/// When what moves farthest is let go, if it is held at first, and until when it swings freely, if it is caught.
+fn held_s(frames: &[FrameBlobs], marks: &[&TrackedObject]) -> [Option<f64>; 2] {
+    let Some(farthest) = marks.iter().max_by(|a, b| a.travel_px.total_cmp(&b.travel_px)) else { return [None; 2] };
+    let along = |axis: usize, from_s: f64| -> (Vec<f64>, Vec<f64>) {
+        let seen = frames.iter().zip(&farthest.path).filter(|(frame, _)| frame.t_s >= from_s);
         seen.filter_map(|(frame, place)| Some((frame.t_s, (*place)?[axis]))).unzip()
     };
-    // two digits are written, and must lie behind it
-    released_of([0, 1].map(along).into_iter()).map(|held_s| (100.0 * held_s).ceil() / 100.0)
+    let paths = |from_s: f64| [0, 1].map(|axis| along(axis, from_s)).into_iter();
+    // two digits are written, and must lie in the free swing
+    let let_go_s = released_of(paths(f64::NEG_INFINITY)).map(|t_s| (100.0 * t_s).ceil() / 100.0);
+    let caught_s = caught_of(paths(let_go_s.unwrap_or(f64::NEG_INFINITY))).map(|t_s| (100.0 * t_s).floor() / 100.0);
+    [let_go_s, caught_s]
 }
 
 /// What is worth following: every hue that moves, dark spots, light spots; each with its name.
@@ -358,9 +377,10 @@ fn turns_per_second(thing: &TrackedObject, t_s: &[f64]) -> Option<f64> {
     (rises.len() >= 3 && last > first).then(|| (rises.len() - 1) as f64 / (last - first))
 }
 
-fn background(album: &Album) -> Background {
-    let width = album.pictures.first().map_or(0, |p| p.width);
-    let rgb = album.pictures.first().map_or_else(Vec::new, |p| {
+fn background(album: &Album, picture: usize) -> Background {
+    let picture = album.pictures.get(picture);
+    let width = picture.map_or(0, |p| p.width);
+    let rgb = picture.map_or_else(Vec::new, |p| {
         p.luma.iter().zip(&p.cb).zip(&p.cr).map(|((y, b), r)| album.rgb([*y, *b, *r])).collect()
     });
     Background { width, rgb, shifts: album.shifts }

@@ -1,4 +1,4 @@
-//! What was found, drawn into an early picture: marks with their paths, numbers, links, pivot.
+//! What was found, drawn into an early picture of the free swing: marks with their paths, numbers, links, pivot.
 
 use std::io::Cursor;
 
@@ -52,7 +52,7 @@ fn draw(image: &mut RgbImage, finding: &Finding) -> opencv::Result<()> {
                 }
             }
         }
-        let nodes: Vec<[f64; 2]> = finding.marks.iter().map(|m| early(&m.thing.path)).collect();
+        let nodes: Vec<[f64; 2]> = finding.marks.iter().map(|m| seen(&m.thing.path, finding.pictured)).collect();
         let pivot = finding.arc.filter(|_| !finding.hinge_marked).map(|arc| arc.centre_px);
         for pair in pivot.iter().chain(&nodes).collect::<Vec<_>>().windows(2) {
             pen.line(*pair[0], *pair[1], WHITE, 1)?;
@@ -78,9 +78,10 @@ fn draw(image: &mut RgbImage, finding: &Finding) -> opencv::Result<()> {
     Ok(())
 }
 
-/// Where a mark is first seen: the picture is an early one.
-fn early(path: &[Option<[f64; 2]>]) -> [f64; 2] {
-    path.get(1).copied().flatten().or_else(|| path.iter().flatten().next().copied()).unwrap_or_default()
+/// Where a mark is in a frame, or first seen after it.
+fn seen(path: &[Option<[f64; 2]>], frame: usize) -> [f64; 2] {
+    let from = path.get(frame..).unwrap_or_default();
+    from.iter().chain(path).flatten().next().copied().unwrap_or_default()
 }
 
 struct Pen<'a, 'm> {

@@ -240,6 +240,11 @@ impl<'a> Session<'a> {
         &self.album
     }
 
+    /// Their stamps.
+    pub fn sampled_s(&self) -> &[f64] {
+        &self.sampled_s
+    }
+
     /// Whether a thing, whose path goes through frames of these stamps, makes a difference where it is: in most of the pictures spread over the recording, against those
     /// that show it elsewhere. What is still there, and only covered now and then, does not. A mark as dark as the wall behind it makes one by what it is painted on:
     /// around it. `None` where no pictures tell.

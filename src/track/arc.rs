@@ -173,6 +173,14 @@ impl Arc {
         (x * dy - y * dx).abs() < limit_px && x * dx + y * dy > 0.0
     }
 
+    /// Whether a point is not the centre, whatever is wrong with the picture: what only stands near it is beyond its deviations.
+    pub fn excludes(&self, place_px: [f64; 2]) -> bool {
+        let is_beyond = |axis: usize| {
+            (place_px[axis] - self.centre_px[axis]).abs() > CENTRE_DEVIATIONS * self.sd_px[axis] + CENTRE_OFF_PX
+        };
+        (0..2).any(is_beyond)
+    }
+
     /// A mark there may show the hinge.
     pub fn is_near(&self, place_px: [f64; 2]) -> bool {
         self.off_centre(place_px) < 1.0
@@ -202,6 +210,8 @@ mod tests {
             let angle = |k: usize| 0.35 * (0.2 * k as f64).sin();
             (0..200).map(|k| [640.0 + turned * 420.0 * angle(k).sin(), 80.0 + 420.0 * angle(k).cos()]).collect()
         };
+        let straight = Arc::of(&swing(1.0), 18.0).unwrap();
+        assert!(!straight.excludes([640.0, 83.0]) && straight.excludes([640.0, 55.0]), "{straight:?}");
         let arc = Arc::of(&swing(0.8), 18.0).unwrap();
         let middle_px = [640.0, 490.0];
         assert!(!arc.is_near([640.0, 80.0]) && arc.is_on_line([640.0, 80.0], middle_px), "{arc:?}");
