@@ -6,6 +6,7 @@ use super::base_priors::{DampingAssumption, base_with_priors};
 use super::context::FitContext;
 use super::effect::Effect;
 use super::hypothesis::Hypothesis;
+use super::misfit::leaves_more_than_noise;
 use super::preparation::Prepared;
 use super::refit::Refit;
 use super::residual_noise::residual_noise;
@@ -77,17 +78,11 @@ pub fn fitted<'a>(context: &FitContext<'a>, prepared: &Prepared) -> Result<Refit
     let (nothing, steps) = (Hypothesis::default(), &context.settings.descent);
     // from where short stretches led, and from where `fit` ended from there
     let ended = beginning(prepared, &prepared.ended, context.experiment, &context.base)?;
-    let from = |x: Vec<f64>| {
-        let fit = context.descend_from(&nothing, &prepared.noise, x, steps.few_steps)?;
-        if fit.converged || is_astray(context, &fit) {
-            Some(fit)
-        } else {
-            context.go_on(&fit, steps.most_steps - steps.few_steps)
-        }
-    };
+    let from = |x: Vec<f64>| context.descend_from(&nothing, &prepared.noise, x, steps.few_steps);
     let (first, other) = rayon::join(|| from(context.begun.clone()), || from(ended));
-    let first = context.best_of([first, other]).ok_or_else(refused)?;
-    with_its_noise(context, from_weaker_dampers(context, first)).ok_or_else(refused)
+    let begun: Vec<Refit<'a>> = [first, other].into_iter().flatten().collect();
+    let first = context.best_gone_on(begun, steps.most_steps - steps.few_steps, |fit| !is_astray(context, fit));
+    with_its_noise(context, from_weaker_dampers(context, first.ok_or_else(refused)?)).ok_or_else(refused)
 }
 
 /// The same near another fit of it, with another number of rods.
@@ -99,10 +94,10 @@ pub fn fitted_near<'a>(context: &FitContext<'a>, near: &Refit<'_>, prepared: &Pr
     found.map_or_else(|| fitted(context, prepared), Ok)
 }
 
-/// Whether its motion has lost step; of a strip, whose steps are dear, whether it leaves much of the swing.
+/// Whether its motion has lost step; of a strip, whose steps are dear, whether it leaves far more than noise.
 fn is_astray(context: &FitContext<'_>, fit: &Refit<'_>) -> bool {
-    let misfit = &context.settings.misfit;
-    fit.has_lost_step(misfit) || context.is_strip() && fit.relative_residual() > misfit.much
+    let settings = context.settings;
+    fit.has_lost_step(&settings.misfit) || context.is_strip() && leaves_more_than_noise(fit, &settings.noise)
 }
 
 /// A fit judged by the noise that it leaves.
@@ -158,6 +153,7 @@ mod tests {
             begun: vec![0.1, 0.2, 0.3, 0.4, 0.5, 1.0, 2.0, 3.0, 4.0, 5.0],
             ended: Vec::new(),
             work: Work::default(),
+            budget: 0,
         };
         assert_eq!(usual, 5);
         assert_eq!(beginning(&prepared, &prepared.begun, &experiment, &[]).unwrap(), prepared.begun);

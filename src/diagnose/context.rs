@@ -71,7 +71,7 @@ impl<'a> FitContext<'a> {
         problem.beliefs = beliefs;
         if free.contains(&Parameter::BendingStiffness) && !self.is_strip() && self.identified_strip.is_none() {
             // no more is free at its start than in the rods it is compared with
-            problem.extra_modes = 0;
+            problem.further_modes.clear();
         }
         problem.accuracy = problem.accuracy_of(problem.longest_s(), self.step_error_rad);
         if let Some((record, at_s)) = hypothesis.dropped {

@@ -1,11 +1,12 @@
 //! The ways to fit a hypothesis: near another fit, anew from short stretches, or on from where it stands.
 
 use nalgebra::DVector;
+use rayon::prelude::*;
 
 use super::context::FitContext;
 use super::effect::bending_n_m2;
 use super::hypothesis::Hypothesis;
-use super::refit::Refit;
+use super::refit::{Refit, least_chi2};
 use crate::error::Result;
 use crate::experiment::Experiment;
 use crate::fit::descent::Descent;
@@ -46,6 +47,8 @@ impl<'a> FitContext<'a> {
         start: &Start,
     ) -> Option<Refit<'a>> {
         let (problem, x) = self.start(hypothesis, near, start)?;
+        // where steps had to be damped for the fit nearby, so they have to be from there
+        let descent = Descent { damping: near.damping.clamp(FIRST_DAMPING, Descent::default().damping), ..descent };
         // a score is linear: where it overshoots, start from nothing
         let mut careful = x.clone();
         let given = hypothesis.effects.iter().flat_map(|effect| effect.parameters());
@@ -173,6 +176,24 @@ impl<'a> FitContext<'a> {
             best.meet(other, self.settings.certificate.agrees);
             best
         })
+    }
+
+    /// The best of some begun fits of one hypothesis, which go on where that is worth it: one that leaves many times what another does leads nowhere.
+    pub fn best_gone_on(
+        &self,
+        begun: Vec<Refit<'a>>,
+        steps: usize,
+        is_worth: impl Fn(&Refit<'a>) -> bool + Sync,
+    ) -> Option<Refit<'a>> {
+        let leads = self.settings.search.leads * least_chi2(&begun);
+        let on = |fit: Refit<'a>| {
+            if fit.converged || fit.chi2 > leads || !is_worth(&fit) {
+                return Some(fit);
+            }
+            self.go_on(&fit, steps)
+        };
+        let ended: Vec<_> = begun.into_par_iter().with_max_len(1).map(on).collect();
+        self.best_of(ended)
     }
 
     /// Further steps of a fit.

@@ -43,6 +43,8 @@ pub struct Prepared {
     pub ended: Vec<f64>,
     /// What all fits to them have cost.
     pub work: Work,
+    /// What a search of them may cost, its beginnings included.
+    pub budget: u64,
 }
 
 impl Prepared {
@@ -75,6 +77,7 @@ impl Prepared {
             experiment: self.experiment.clone(),
             base: self.base.clone(),
             work: self.work.clone(),
+            budget: self.budget,
             step_error_rad: step_error_rad(beyond * least_rad),
             records,
             noise,
@@ -102,9 +105,12 @@ pub fn prepare(records: &[Record], experiment: &Experiment, settings: &Settings)
     let marks = records.first().map_or(0, Record::links);
     let base = stated(experiment, marks, DampingAssumption::AsStated);
     let noise_rad: Vec<Vec<f64>> = records.iter().map(noise_rad).collect();
-    let part = affordable_part(records, experiment, &base, &noise_rad, &settings.search)?;
+    let budget = settings.search.budget_of(experiment.model.effects.distributed_flexibility.is_some());
+    let part = affordable_part(records, experiment, &base, (&noise_rad, budget), &settings.search)?;
+    let most_work = (settings.search.shares.prepared * budget as f64) as u64;
     let early = if part < 1.0 { first_part(records, part) } else { records.to_vec() };
-    let End { mut problem, outcome, shot, begun } = best_robust_fit(&early, experiment, &base, &noise_rad, &Silent)?;
+    let End { mut problem, outcome, shot, begun, .. } =
+        best_robust_fit(&early, experiment, &base, (&noise_rad, most_work), &Silent)?;
     problem.noise.clone_from(&shot.noise);
     problem.integrate_below_the_noise();
     let step_error_rad = problem.accuracy.step_error_rad;
@@ -122,6 +128,7 @@ pub fn prepare(records: &[Record], experiment: &Experiment, settings: &Settings)
         ended: outcome.x,
         records: kept,
         work: problem.work,
+        budget,
     })
 }
 
@@ -130,7 +137,7 @@ fn affordable_part(
     records: &[Record],
     experiment: &Experiment,
     base: &[Parameter],
-    noise_rad: &[Vec<f64>],
+    (noise_rad, budget): (&[Vec<f64>], u64),
     settings: &SearchSettings,
 ) -> Result<f64> {
     let mut problem = Problem::new(records, experiment, base)?;
@@ -140,7 +147,7 @@ fn affordable_part(
     let swings = problem.longest_s() * problem.model(0, &[])?.0.characteristic_rad_s() / std::f64::consts::TAU;
     // a motion that runs away has cost what it has
     _ = problem.blocks(&x);
-    let affordable = settings.budget as f64 / (settings.evaluations * problem.work.done().max(1) as f64);
+    let affordable = budget as f64 / (settings.evaluations * problem.work.done().max(1) as f64);
     let part = affordable.max(settings.early_swings / swings.max(1.0));
     Ok(if part < settings.part_worth { part } else { 1.0 })
 }

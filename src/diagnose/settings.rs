@@ -96,6 +96,8 @@ pub struct MisfitSettings {
 /// Up to which share of the budget each phase of a search may go (cost).
 #[derive(Debug, Clone, Copy)]
 pub struct BudgetShares {
+    /// After this much of it the base model's descent is begun nowhere else (cost).
+    pub prepared: f64,
     /// Single effects and pairs (cost).
     pub usual: f64,
     /// Restarts (cost).
@@ -110,6 +112,8 @@ pub struct BudgetShares {
     pub all: f64,
     /// … and made simpler, turn by turn, with so much more (cost).
     pub simpler: f64,
+    /// Of a strip, beside which no law is learnt, the budget of a search is so many times as large (cost).
+    pub strip: f64,
 }
 
 /// What is fitted.
@@ -376,6 +380,7 @@ impl Default for SearchSettings {
         Self {
             budget: 160_000_000,
             shares: BudgetShares {
+                prepared: 0.25,
                 usual: 0.45,
                 restarts: 0.6,
                 certified: 0.7,
@@ -383,6 +388,7 @@ impl Default for SearchSettings {
                 law: 0.9,
                 all: 2.0,
                 simpler: 0.2,
+                strip: 1.2,
             },
             evaluations: 6400.0,
             early_swings: 12.0,
@@ -425,6 +431,13 @@ impl Default for SearchSettings {
             worth_a_count: 9.0,
             count_unexplained: 1.2,
         }
+    }
+}
+
+impl SearchSettings {
+    /// The budget of a search. Beside a strip no law is learnt: of what that may cost elsewhere a part is its search's.
+    pub fn budget_of(&self, is_strip: bool) -> u64 {
+        if is_strip { (self.shares.strip * self.budget as f64) as u64 } else { self.budget }
     }
 }
 

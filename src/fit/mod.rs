@@ -189,7 +189,7 @@ pub fn fit_watched(
 ) -> Result<Fit> {
     let noise_rad: Vec<Vec<f64>> = records.iter().map(noise::noise_rad).collect();
     let search::End { problem, outcome: first, .. } =
-        search::best_robust_fit(records, experiment, free, &noise_rad, progress)?;
+        search::best_robust_fit(records, experiment, free, (&noise_rad, u64::MAX), progress)?;
     let (kept, outliers) = without_outliers(&problem, &first.x)?;
     let problem = Problem { records: &kept, ..problem };
     let descent = Descent { most_steps: 30, enough: 1e-3, ..Descent::default() };

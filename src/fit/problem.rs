@@ -13,9 +13,10 @@ use crate::experiment::{Experiment, Hysteresis, Law, SupportMotion};
 use crate::model::{Accuracy, Camera, ForwardModel, Parameter, Work};
 use crate::statistics::median;
 
-/// Standard deviations of a strip's further shapes where a motion starts, as angles between marks: the sixth part of a large swing, at some hertz.
-const FURTHER_RAD: f64 = 0.05;
-const FURTHER_RAD_S: f64 = 2.0;
+/// Standard deviations of a strip's modes where a motion starts, as angles between marks and their rates, of the last one that the marks show: the third part of a large
+/// swing, at some hertz. Of further modes they are less: one that is held bent by fingers has a mode in proportion to 1/ω².
+const FURTHER_RAD: f64 = 0.1;
+const FURTHER_RAD_S: f64 = 4.0;
 /// Springs of the hinge that differ by less, as a part of them and of K, hold a strip alike.
 const HELD_ALIKE: f64 = 0.1;
 
@@ -44,8 +45,8 @@ pub struct Problem<'a> {
     pub dropped_at_s: Vec<f64>,
     /// What is known of free parameters beforehand.
     pub beliefs: Vec<Belief>,
-    /// Shapes free at each start beyond the angles between marks.
-    pub extra_modes: usize,
+    /// Shapes free at each start beyond the angles between marks, the further modes of a strip: the frequency of the last mode that the marks show, over that of each.
+    pub further_modes: Vec<f64>,
     /// What its integrations have cost.
     pub work: Work,
 }
@@ -88,7 +89,7 @@ impl<'a> Problem<'a> {
             accuracy: Accuracy::default(),
             dropped_at_s: vec![f64::INFINITY; records.len()],
             beliefs: Vec::new(),
-            extra_modes: model.start().ncols() - model.chain().groups().len(),
+            further_modes: model.shapes().map_or_else(Vec::new, |shapes| shapes.slower().to_vec()),
             work: Work::default(),
         })
     }
@@ -105,7 +106,7 @@ impl<'a> Problem<'a> {
 
     /// Number of angles, and as many rates, in which each motion starts: those between marks, and further shapes.
     pub fn shapes(&self) -> usize {
-        self.marks() + self.extra_modes
+        self.marks() + self.further_modes.len()
     }
 
     /// Where a recording's start stands among the variables.
@@ -242,10 +243,13 @@ impl<'a> Problem<'a> {
     /// All that is known beforehand: of the parameters, and of how much of further shapes there may be at each start.
     fn known_blocks(&self, x: &[f64]) -> impl Iterator<Item = Block> {
         let (marks, shapes) = (self.marks(), self.shapes());
-        let further = (0..self.records.len()).map(|record| self.start_of(record)).flat_map(|start| {
-            let of = |first: usize, sd: f64| (start + first + marks..start + first + shapes).map(move |i| (i, 0.0, sd));
-            of(0, FURTHER_RAD).chain(of(shapes, FURTHER_RAD_S))
-        });
+        let of_start = |start: usize| {
+            self.further_modes.iter().enumerate().flat_map(move |(k, slower)| {
+                let place = start + marks + k;
+                [(place, 0.0, FURTHER_RAD * slower.powi(2)), (place + shapes, 0.0, FURTHER_RAD_S * slower)]
+            })
+        };
+        let further = (0..self.records.len()).flat_map(|record| of_start(self.start_of(record)));
         self.belief_block(x).into_iter().chain(known_block(&further.collect::<Vec<_>>(), x))
     }
 

@@ -53,9 +53,12 @@ pub struct End<'a> {
     pub shot: ShootingResult,
     /// The experiment with the values from which those began.
     pub begun: Experiment,
+    /// Whether the descent from those values ended there, too.
+    agreed: bool,
 }
 
-/// The best of the descents from the file's values, from those of the recordings' modes where these leave more than noise, and from those of a hysteresis.
+/// The best of the descents from the file's values, from those of the recordings' modes where these leave more than noise, and from those of a hysteresis. After so much
+/// work no other beginning is tried.
 ///
 /// # Errors
 /// [`Error::Simulation`] where the specimen cannot swing, or no motion near any beginning follows the recordings.
@@ -63,17 +66,21 @@ pub fn best_robust_fit<'a>(
     records: &'a [Record],
     experiment: &Experiment,
     free: &[Parameter],
-    noise_rad: &[Vec<f64>],
+    (noise_rad, most_work): (&[Vec<f64>], u64),
     progress: &dyn Progress,
 ) -> Result<End<'a>> {
     refuse_empty(records)?;
     let search = Search { records, free, noise_rad };
+    let mut spent = 0;
     let order = start_values::start_experiments(records, experiment, free);
     let (mut best, mut failed): (Option<End<'a>>, Option<Error>) = (None, None);
     for begun in &order {
-        if search.may_find_more(best.as_ref()) {
+        if spent < most_work && search.may_find_more(best.as_ref()) {
             match search.from(begun) {
-                Ok(end) => best = better(best, end),
+                Ok(end) => {
+                    spent += end.as_ref().map_or(0, |end| end.problem.work.done());
+                    best = better(best, end);
+                }
                 Err(error) => failed = failed.or(Some(error)),
             }
         }
@@ -89,7 +96,7 @@ pub fn best_robust_fit<'a>(
             best = better(best, Some(end));
         }
     }
-    if search.may_find_more(best.as_ref()) {
+    if spent < most_work && search.may_find_more(best.as_ref()) {
         let continued = best.as_ref().and_then(|end| search.continued(end));
         best = better(best, continued);
     }
@@ -145,15 +152,16 @@ impl<'a> Search<'a, '_> {
         };
         let again = !self.free.is_empty() && from_stretches.as_ref().is_none_or(is_astray);
         let from_stated = if again { descend(&problem, &robust, stated) } else { None };
-        let ends = [from_stretches, from_stated].into_iter().flatten();
-        let best = ends.min_by(|a, b| a.cost.total_cmp(&b.cost));
+        let ends: Vec<Outcome> = [from_stretches, from_stated].into_iter().flatten().collect();
+        let agreed = matches!(&ends[..], [one, other] if (one.cost - other.cost).abs() < BETTER * one.cost);
+        let best = ends.into_iter().min_by(|a, b| a.cost.total_cmp(&b.cost));
         Ok(best.map(|outcome| {
             let (problem, outcome) = transformed::update_strip_modes(problem, &robust, outcome);
-            End { problem, outcome, shot, begun: experiment.clone() }
+            End { problem, outcome, shot, begun: experiment.clone(), agreed }
         }))
     }
 
-    /// Whether another beginning may lead further: more is left than noise.
+    /// Whether another beginning may lead further: more is left than noise, and not because the model has no lower minimum, where two descents have met.
     fn may_find_more(&self, end: Option<&End<'_>>) -> bool {
         let square = |r: &f64| r.abs().min(BOUND).powi(2);
         let mean = |values: &[f64]| values.iter().map(square).sum::<f64>() / values.len().max(1) as f64;
@@ -164,7 +172,7 @@ impl<'a> Search<'a, '_> {
                 mean(values) > LEFT || values.chunks_exact(IN_A_ROW).any(|few| mean(few) > LEFT_ANYWHERE)
             })
         };
-        end.is_none_or(|end| of_recordings(&end.outcome))
+        end.is_none_or(|end| !end.agreed && of_recordings(&end.outcome))
     }
 
     /// The experiment with a hysteresis in place of a part of its spring: of several the one that follows the beginning of the recordings best.
@@ -240,7 +248,7 @@ impl<'a> Search<'a, '_> {
             let robust = Descent { damping: 1e-8, ..Descent::robust(30, 0.03) };
             let outcome = descend(&problem, &robust, x.clone());
             let shot = ShootingResult { x, ..end.shot.clone() };
-            ends.extend(outcome.map(|outcome| End { problem, outcome, shot, begun: tried }));
+            ends.extend(outcome.map(|outcome| End { problem, outcome, shot, begun: tried, agreed: false }));
         }
         Ok(ends)
     }
@@ -278,7 +286,7 @@ fn strongest_hz(end: &End<'_>) -> Vec<f64> {
 /// [`Error::Simulation`] where the specimen cannot swing.
 pub fn observed_starts(problem: &Problem<'_>) -> Result<Vec<f64>> {
     let reach_s = STATE_WINDOW_RAD / problem.model(0, &[])?.0.characteristic_rad_s();
-    let further = vec![0.0; problem.extra_modes];
+    let further = vec![0.0; problem.further_modes.len()];
     let of = |record: &Record| {
         let near = record.state_near(0, reach_s);
         let column = |i: usize| near.iter().map(move |n| n[i]).collect::<Vec<_>>();

@@ -51,9 +51,13 @@ impl<'a> Balance<'a> {
         self.shapes.map_or_else(|| self.model.chain().inertia_kg_m2()[(i, i)], |shapes| shapes.inertia_kg_m2(i))
     }
 
-    /// How much of a coordinate is seen between marks.
-    pub fn seen(&self, i: usize) -> f64 {
-        self.shapes.map_or(1.0, |shapes| shapes.seen(i))
+    /// The angle (rad) that errors of the coordinates and of their rates are seen as.
+    pub fn seen_rad(&self, angle: &[f64], rate: &[f64], characteristic_rad_s: f64) -> f64 {
+        let of_link = |(angle, rate): (&f64, &f64)| angle.abs().max(rate.abs() / characteristic_rad_s);
+        match self.shapes {
+            None => angle.iter().zip(rate).map(of_link).fold(0.0, f64::max),
+            Some(shapes) => shapes.seen_rad(angle, rate, characteristic_rad_s),
+        }
     }
 
     /// Columns of the links' values as columns of coordinates.

@@ -1,5 +1,7 @@
 //! The equations of motion of the chain with its effects.
 
+use std::ops::Range;
+
 use nalgebra::{DMatrix, DVector};
 
 use super::effects::outside::{NodalForces, SupportMotion};
@@ -147,11 +149,14 @@ impl ForwardModel {
         self.chain.set(parameter, value);
     }
 
-    /// √(g Σhᵢ / Σaᵢᵢ): the pace of the swing, for tolerances on rates.
+    /// √(g Σhᵢ / Σaᵢᵢ) of the links between marks: the pace of the swing, for tolerances on rates. The rods of a strip that lie between two marks are one link, so
+    /// that it does not depend on how many they are.
     pub fn characteristic_rad_s(&self) -> f64 {
-        let n = self.chain.count();
-        let moment: f64 = (0..n).map(|i| self.chain.static_moment_kg_m(i)).sum();
-        (self.gravity_m_s2.abs() * moment / self.chain.inertia_kg_m2().trace()).sqrt().max(1.0)
+        let moment: f64 = (0..self.chain.count()).map(|i| self.chain.static_moment_kg_m(i)).sum();
+        let inertia = self.chain.inertia_kg_m2();
+        let of_link = |rods: &Range<usize>| inertia.view((rods.start, rods.start), (rods.len(), rods.len())).sum();
+        let inertia_kg_m2: f64 = self.chain.groups().iter().map(of_link).sum();
+        (self.gravity_m_s2.abs() * moment / inertia_kg_m2).sqrt().max(1.0)
     }
 
     /// The angle (rad) by which a unit of the laws' own variables moves the specimen: its torque against gravity, and at most what the law itself allows.

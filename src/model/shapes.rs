@@ -31,10 +31,14 @@ pub struct Shapes {
     count: usize,
     /// Diagonal of ΦᵀMΦ.
     inertia_kg_m2: Vec<f64>,
-    /// Largest angle between marks of each shape.
-    seen: Vec<f64>,
+    /// From coordinates to the modes and layers of which the shapes are made: modes × shapes.
+    modal: DMatrix<f64>,
+    /// Of each of these, the largest angle between marks, and its circular frequency (rad/s).
+    modes: Vec<[f64; 2]>,
     /// Links × (angles between marks, then how much of each of the next modes).
     start: DMatrix<f64>,
+    /// Of each of the next modes of the start: the frequency of the last one for which there is an angle between marks, over its own.
+    slower: Vec<f64>,
     /// From angles to coordinates, (ΦᵀMΦ)⁻¹ΦᵀM: shapes × links.
     projection: DMatrix<f64>,
 }
@@ -52,6 +56,7 @@ impl Shapes {
         let inertia = chain.inertia_kg_m2();
         let mut stiffness = hanging_stiffness(chain, gravity_m_s2, stiffness_n_m_per_rad);
         stiffness[(0, 0)] += of_hinge_n_m_per_rad;
+        let stiffness = stiffness;
         // M = LLᵀ, and L⁻¹KL⁻ᵀ has the modes' squares as eigenvalues
         let lower = inertia.clone().cholesky()?.l();
         let half = lower.solve_lower_triangular(&stiffness)?;
@@ -64,8 +69,10 @@ impl Shapes {
             whole.set_column(k, &lower.tr_solve_lower_triangular(&eigen.eigenvectors.column(*mode))?);
         }
         let start = Self::start_of(chain, &whole.columns(0, marks + FURTHER_AT_START).into_owned())?;
+        let pace = |mode: usize| eigen.eigenvalues[order[mode]].abs().sqrt();
+        let slower = (marks..marks + FURTHER_AT_START).map(|mode| pace(marks - 1) / pace(mode)).collect();
         // in step with the first mode, so that there is an answer without gravity, too
-        let still = (stiffness + inertia * eigen.eigenvalues[order[0]].abs()).cholesky()?;
+        let still = (&stiffness + inertia * eigen.eigenvalues[order[0]].abs()).cholesky()?;
         for (k, turned) in (modes..count).zip([0, n - 1]) {
             let mut shape = still.solve(&DVector::from_fn(n, |i, _| f64::from(u8::from(i == turned))));
             for known in 0..k {
@@ -74,33 +81,31 @@ impl Shapes {
             }
             whole.set_column(k, &(&shape / shape.dot(&(inertia * &shape)).sqrt()));
         }
-        Some(Self::with_the_first_link(&(&whole * at_the_hinge(&whole)), start, chain))
+        let chords = chord_slopes(chain, &vec![0.0; n]) * &whole;
+        let mode =
+            |k: usize| [chords.column(k).amax(), whole.column(k).dot(&(&stiffness * whole.column(k))).abs().sqrt()];
+        let modes = (0..count).map(mode).collect();
+        let turned = at_the_hinge(&whole);
+        let (shapes, scales) = with_the_first_link(&(&whole * &turned));
+        let modal = turned * DMatrix::from_diagonal(&scales);
+        Some(Self { slower, modal, modes, ..Self::of_angles(&shapes, start, chain) })
     }
 
-    /// Scales shapes, of which only the first moves the first link: that one to turn it by one, the others to one at most.
-    fn with_the_first_link(shapes: &DMatrix<f64>, start: DMatrix<f64>, chain: &Chain) -> Self {
-        let mut shapes = shapes.clone();
-        for (k, mut shape) in shapes.column_iter_mut().enumerate() {
-            if k == 0 {
-                shape /= shape[0];
-            } else {
-                shape[0] = 0.0;
-                let largest = shape.amax();
-                shape /= largest;
-            }
-        }
+    /// Of shapes that are ready, and the angles where a motion starts.
+    fn of_angles(shapes: &DMatrix<f64>, start: DMatrix<f64>, chain: &Chain) -> Self {
         let weighed = shapes.tr_mul(chain.inertia_kg_m2());
-        let chords = chord_slopes(chain, &vec![0.0; chain.count()]) * &shapes;
         let inertia_kg_m2: Vec<f64> =
             shapes.column_iter().enumerate().map(|(k, shape)| weighed.row(k).transpose().dot(&shape)).collect();
         let projection =
             DMatrix::from_fn(shapes.ncols(), shapes.nrows(), |k, link| weighed[(k, link)] / inertia_kg_m2[k]);
         Self {
-            basis: in_lanes(&shapes),
+            basis: in_lanes(shapes),
             count: shapes.ncols(),
             inertia_kg_m2,
-            seen: chords.column_iter().map(|chord| chord.amax()).collect(),
+            modal: DMatrix::zeros(0, 0),
+            modes: Vec::new(),
             start,
+            slower: Vec::new(),
             projection,
         }
     }
@@ -126,6 +131,11 @@ impl Shapes {
         &self.start
     }
 
+    /// Of each of the next modes of the start: the frequency of the last one for which there is an angle between marks, over its own.
+    pub fn slower(&self) -> &[f64] {
+        &self.slower
+    }
+
     fn links(&self) -> usize {
         self.projection.ncols()
     }
@@ -140,9 +150,14 @@ impl Shapes {
         self.inertia_kg_m2[k]
     }
 
-    /// Largest angle between marks where a coordinate is one.
-    pub fn seen(&self, k: usize) -> f64 {
-        self.seen[k]
+    /// The angle between marks (rad) that errors of the coordinates and of their rates are seen as: an error of a mode's rate moves it by that over the mode's own
+    /// frequency, or over the swing's if that is faster.
+    pub fn seen_rad(&self, angle: &[f64], rate: &[f64], characteristic_rad_s: f64) -> f64 {
+        let of = |(k, [seen, pace_rad_s]): (usize, &[f64; 2])| {
+            let along = |values: &[f64]| self.modal.row(k).iter().zip(values).map(|(a, b)| a * b).sum::<f64>();
+            seen * along(angle).abs().max(along(rate).abs() / pace_rad_s.max(characteristic_rad_s))
+        };
+        self.modes.iter().enumerate().map(of).fold(0.0, f64::max)
     }
 
     /// The links' values of coordinates. What follows the coordinates (the laws' own variables) is handed on.
@@ -221,6 +236,21 @@ impl Shapes {
     }
 }
 
+/// Scales shapes, of which only the first moves the first link: that one to turn it by one, the others to one at most; and by how much.
+fn with_the_first_link(shapes: &DMatrix<f64>) -> (DMatrix<f64>, DVector<f64>) {
+    let (mut shapes, mut scales) = (shapes.clone(), DVector::zeros(shapes.ncols()));
+    for (k, mut shape) in shapes.column_iter_mut().enumerate() {
+        if k == 0 {
+            scales[k] = 1.0 / shape[0];
+        } else {
+            shape[0] = 0.0;
+            scales[k] = 1.0 / shape.amax();
+        }
+        shape *= scales[k];
+    }
+    (shapes, scales)
+}
+
 fn in_lanes(shapes: &DMatrix<f64>) -> Vec<Vec<[f64; LANES]>> {
     let at = |link: usize, k: usize| if k < shapes.ncols() { shapes[(link, k)] } else { 0.0 };
     let rows =
@@ -284,6 +314,13 @@ mod tests {
         let basis = basis(&shapes(1e-5));
         assert!((basis[(0, 0)] - 1.0).abs() < 1e-14);
         assert!(basis.row(0).iter().skip(1).all(|v| *v == 0.0), "{basis}");
+    }
+
+    #[test]
+    fn further_modes_are_faster_one_after_the_other() {
+        let slower = shapes(1e-5).slower().to_vec();
+        assert_eq!(slower.len(), FURTHER_AT_START);
+        assert!(slower[0] < 1.0 && slower.windows(2).all(|pair| 0.0 < pair[1] && pair[1] < pair[0]), "{slower:?}");
     }
 
     #[test]

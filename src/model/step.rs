@@ -171,6 +171,8 @@ pub struct Stages<'a> {
     scale: Vec<f64>,
     /// What a unit of the laws' own variables is worth.
     hidden_rad: f64,
+    /// The pace of the swing.
+    characteristic_rad_s: f64,
 }
 
 /// Where a step begins.
@@ -200,6 +202,7 @@ impl<'a> Stages<'a> {
             elimination: Elimination::default(),
             scale: (0..m).map(|i| if i < n { 1.0 / balance.inertia_kg_m2(i) } else { 1.0 }).collect(),
             hidden_rad: model.hidden_rad(),
+            characteristic_rad_s: model.characteristic_rad_s(),
             balance,
         }
     }
@@ -250,12 +253,9 @@ impl<'a> Stages<'a> {
         corner += with_theta * (gamma * gamma);
         let right = inertia * &rate - with_theta * &angle * gamma;
         let Some(rate) = matrix.lu().solve(&right) else { return f64::INFINITY };
-        let characteristic_rad_s = self.balance.model().characteristic_rad_s();
         let hidden = self.hidden_rad * rate.rows(n, m - n).amax();
-        let of_coordinate = |i: usize| {
-            self.balance.seen(i) * (angle[i] + gamma * rate[i]).abs().max(rate[i].abs() / characteristic_rad_s)
-        };
-        (0..n).map(of_coordinate).fold(hidden, f64::max)
+        let (angle, rate) = (angle + rate.rows(0, n) * gamma, rate.rows(0, n).into_owned());
+        self.balance.seen_rad(angle.as_slice(), rate.as_slice(), self.characteristic_rad_s).max(hidden)
     }
 
     /// Derivatives of a solved step's stages: exact for the numerical solution itself, as the balance holds at every stage.

@@ -511,6 +511,21 @@ fn the_wrong_number_of_angles_is_refused() {
 }
 
 #[test]
+fn the_pace_of_a_strip_is_that_of_its_two_rods_however_many_it_is_made_of() {
+    let pace = |pieces: Option<usize>| {
+        let bends = Effects { distributed_flexibility: pieces.map(|_| 1e-5), ..Effects::default() };
+        let mut made = experiment(0.0, 0.0, bends);
+        made.specimen.inertia = Inertia::Rods;
+        made.model.pieces = pieces.unwrap_or(made.model.pieces);
+        ForwardModel::of(&made).unwrap().characteristic_rad_s()
+    };
+    let of_rods = pace(None);
+    for pieces in [4, 8, 20] {
+        assert!((pace(Some(pieces)) / of_rods - 1.0).abs() < 1e-9, "{pieces}: {} {of_rods}", pace(Some(pieces)));
+    }
+}
+
+#[test]
 fn a_bending_strip_hangs_together_like_its_two_rods() {
     let mut strip = experiment(0.0, 0.0, Effects { distributed_flexibility: Some(1e-2), ..Effects::default() });
     strip.model.release_rad = vec![0.4, 0.4];

@@ -57,7 +57,10 @@ pub fn carried<'a>(context: &FitContext<'a>, fits: Vec<Refit<'_>>, part: f64, no
     let few = |fits: Vec<Refit<'_>>| {
         let Some(least) = least(&fits) else { return Vec::new() };
         let is_near = |fit: &Refit<'_>| fit.chi2 < settings.far * least.chi2;
-        let chosen = refit::best(&fits, settings.carried, is_near, |fit| needs(fit, least, &context.settings.misfit));
+        // a support has three numbers to bend to a part, of which the whole leaves nothing
+        let counts = context.settings.misfit.counts;
+        let cost = |fit: &Refit<'_>| fit.chi2 / least.variance_ratio() + counts * fit.coefficients() as f64;
+        let chosen = refit::best(&fits, settings.carried, is_near, cost);
         chosen.into_iter().map(|place| (fits[place].hypothesis.clone(), fits[place].x.clone())).collect()
     };
     let keeps_step = |(hypothesis, x): &(Hypothesis, Vec<f64>)| {
@@ -156,6 +159,8 @@ fn descended<'b>(
 pub fn refit_on_first_part<'b>(context: &FitContext<'_>, early: &FitContext<'b>, fit: &Refit<'_>) -> Option<Refit<'b>> {
     let fit = context.with_observed_starts(fit);
     let stretches: Vec<(Parameter, f64)> = context.base.iter().copied().zip(context.begun.iter().copied()).collect();
-    let from = |start: &[(Parameter, f64)]| early.refit(&fit.hypothesis, &fit, start);
-    [from(&[]), from(&stretches)].into_iter().flatten().min_by(|a, b| a.chi2.total_cmp(&b.chi2))
+    let from = |start: &[(Parameter, f64)]| early.begin(&fit.hypothesis, &fit, start);
+    let begun = [from(&[]), from(&stretches)].into_iter().flatten().collect();
+    let steps = &context.settings.descent;
+    early.best_gone_on(begun, steps.few_steps - steps.first_steps, |_| true)
 }

@@ -56,6 +56,8 @@ use rounds::{NoiseUpdate, Round, Tried};
 
 /// Proposals fitted together, between two looks at the budget.
 const TOGETHER: usize = 4;
+/// The same of a strip, whose fits are dear.
+const TOGETHER_OF_STRIP: usize = 2;
 /// A fit of the same hypothesis is better where its χ² is lower by more than this (statistics: half of an ln-likelihood).
 const BETTER_BY: f64 = 1.0;
 
@@ -131,7 +133,7 @@ impl<'a, 'p> Search<'a, 'p> {
 
     /// Of the whole recordings, the file taken at its word: there is the base model's fit, and no work is allowed yet.
     fn begun(prepared: &'a Prepared, context: FitContext<'a>, base: Refit<'a>, progress: &'p dyn Progress) -> Self {
-        let budget = Budget::from(context.work.done(), context.settings.search.budget);
+        let budget = Budget::from(context.work.done(), prepared.budget);
         let effects = base::candidates(&context);
         let scored = laws::cheap_to_score(&context, &effects);
         let scores = Screen::at(&context, &base).map(|screen| laws::scores(&screen, &scored)).unwrap_or_default();
@@ -356,7 +358,7 @@ impl<'a, 'p> Search<'a, 'p> {
         let mut found = Vec::new();
         let mut proposed = 0;
         let count = proposals.len();
-        for some in proposals.chunks(TOGETHER) {
+        for some in proposals.chunks(if self.context.is_strip() { TOGETHER_OF_STRIP } else { TOGETHER }) {
             if self.is_spent() {
                 break;
             }

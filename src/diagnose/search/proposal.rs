@@ -26,6 +26,8 @@ pub enum Proposal<'f, 'a> {
     Beside(Beside<'f, 'a>),
     /// An effect beside a fit, from where its score points.
     Scored(&'f Refit<'a>, Score),
+    /// The first steps of that.
+    Begun(&'f Refit<'a>, Score),
     /// [`DAMPER_IMITATION`] in the place of the base model's dampers: beside them each of the two promises nothing.
     ReplaceDampers(&'f Refit<'a>),
     /// An effect beside a fit from wherever it may be.
@@ -77,6 +79,9 @@ impl<'a> Proposal<'_, 'a> {
             Self::Scored(base, score) => {
                 let fit = context.refit(&score.hypothesis(&base.hypothesis), base, &score.start);
                 fit.map(|fit| laws::settled(context, fit)).into_iter().collect()
+            }
+            Self::Begun(base, score) => {
+                context.begin(&score.hypothesis(&base.hypothesis), base, &score.start).into_iter().collect()
             }
             Self::ReplaceDampers(base) => replace_dampers(context, base).into_iter().collect(),
             Self::ManyStarts(base, effect) => law_of(*effect).fit_from_many_starts(context, base).into_iter().collect(),

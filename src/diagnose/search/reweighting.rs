@@ -3,6 +3,7 @@
 use rayon::prelude::*;
 
 use super::super::context::FitContext;
+use super::super::misfit::leaves_only_noise;
 use super::super::refit::{Refit, least, least_chi2};
 use super::super::residual_noise::residual_noise;
 use super::Search;
@@ -12,6 +13,11 @@ impl<'a> Search<'a, '_> {
     /// Judges all fits by the noise that the best of them leaves; those that have not yet converged, and are worth it, go on. Where that led far down, the noise is
     /// what is left there.
     pub(super) fn update_noise(&mut self) {
+        // a strip's steps are dear: what leaves more than noise tells nothing of it, and is not led to its end
+        let leaves_more = |best: &Refit<'a>| !leaves_only_noise(best, &self.context.settings.misfit);
+        if self.context.is_strip() && least(&self.fits).is_some_and(leaves_more) {
+            return;
+        }
         let before = least_chi2(&self.fits);
         self.learn_noise_once();
         if self.context.settings.search.far_down * least_chi2(&self.fits) < before {

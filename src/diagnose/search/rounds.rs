@@ -28,8 +28,8 @@ pub enum Round {
     Singles,
     /// Those that are dear to fit: sought the longer the less the others explain.
     ExpensiveSingles,
-    /// What has corners in every joint of a strip: a step of it is as dear as ten of another effect's.
-    StripCorners,
+    /// The same of a strip, whose fits are dearer still, after its pairs: what has corners in every joint takes a step as dear as ten of another effect's.
+    StripExpensiveSingles,
     /// After a search of the first part of recordings, the single effects that it does not tell from its best: the whole of them may.
     Indistinguishable,
     /// The others from where one effect stands that explains most of what the base model leaves, with another spring or damper.
@@ -81,7 +81,7 @@ impl Round {
         Self::AlongBest,
         Self::Pairs,
         Self::FromRicherFits,
-        Self::StripCorners,
+        Self::StripExpensiveSingles,
     ];
     /// Those where the best of the usual ones leaves more than noise: it may stand in a false minimum, or its partner have been sought from the wrong place.
     pub const RESTARTS: [Self; 3] = [Self::RestartedSingles, Self::BesideSingles, Self::RestartedBest];
@@ -92,7 +92,7 @@ impl Round {
             Self::Asked => "sets from short stretches",
             Self::Singles => "single effects",
             Self::ExpensiveSingles => "slow single effects",
-            Self::StripCorners => "hysteresis in all joints",
+            Self::StripExpensiveSingles => "slow single effects of a strip",
             Self::Indistinguishable => "undecided single effects",
             Self::FromBest => "second effects beside the best",
             Self::Pairs => "pairs of effects",
@@ -124,8 +124,10 @@ impl Round {
         match self {
             Self::Asked => search.asked(),
             Self::Singles => search.singles(),
-            Self::ExpensiveSingles => search.dear_singles(false),
-            Self::StripCorners => search.dear_singles(true),
+            Self::ExpensiveSingles if search.context.is_strip() => Vec::new(),
+            Self::ExpensiveSingles => search.expensive_singles(),
+            Self::StripExpensiveSingles if search.context.is_strip() => search.expensive_singles(),
+            Self::StripExpensiveSingles => Vec::new(),
             Self::Indistinguishable => search.indistinguishable(),
             Self::FromBest => search.begun_at_the_leader(),
             Self::Pairs => search.pairs(),
@@ -170,11 +172,10 @@ impl<'a> Search<'a, '_> {
         self.beside_base(self.lacking(), |effect| is_ordinary(effect) || self.promises_most(effect))
     }
 
-    /// The others: the corners of a strip, or all but them.
-    fn dear_singles(&self, corners: bool) -> Vec<Proposal<'_, 'a>> {
+    /// The others.
+    fn expensive_singles(&self) -> Vec<Proposal<'_, 'a>> {
         let misfit = self.lacking().beside(&self.fits[1..]);
-        let is_meant = |effect| laws::has_corners_in_every_joint(&self.context, effect) == corners;
-        self.beside_base(misfit, |effect| !is_ordinary(effect) && !self.promises_most(effect) && is_meant(effect))
+        self.beside_base(misfit, |effect| !is_ordinary(effect) && !self.promises_most(effect))
     }
 
     /// Whether an effect of a strip that is dear to fit promises more than every other one: the budget would end before its turn, and the others only bend to it.
@@ -226,7 +227,15 @@ impl<'a> Search<'a, '_> {
         }
         let mut of_kind: Vec<Effect> = self.effects.iter().copied().filter(|effect| is_of_kind(*effect)).collect();
         of_kind.sort_by(|a, b| self.promised(*b).total_cmp(&self.promised(*a)));
-        let beside = |effect| Proposal::Beside(Beside::of(self.base(), misfit, effect, &self.scores));
+        // a strip's fits are dear: what promises little beside a base model that leaves more than noise is not followed by itself
+        let is_followed = !self.context.is_strip() || !misfit.unexplained;
+        let most = self.scores.iter().map(|score| score.gain).fold(0.0, f64::max);
+        let beside = |effect| match self.scores.iter().find(|score| score.effect == effect) {
+            Some(score) if !is_followed && score.gain < self.context.settings.search.most_of * most => {
+                Proposal::Begun(self.base(), score.clone())
+            }
+            _ => Proposal::Beside(Beside::of(self.base(), misfit, effect, &self.scores)),
+        };
         of_kind.into_iter().map(beside).collect()
     }
 
@@ -410,18 +419,28 @@ impl<'a> Search<'a, '_> {
         more.map(Proposal::Beside).collect()
     }
 
-    /// Of the likeliest fit, every effect that would do as well in the place of one of it: it was sought from where fewer effects stand. Where far more than noise is
-    /// left a promise says little.
+    /// Of the likeliest fit every effect that would do as well in the place of one of it: it was sought from where fewer effects stand. After a search of a part of the
+    /// recordings so of the best fits with fewer coefficients, too, for it has not fitted every effect to the whole. Where far more than noise is left a promise says
+    /// little.
     fn twins(&self) -> Vec<Proposal<'_, 'a>> {
         let settings = self.context.settings;
         let Some(least) = least(&self.fits) else { return Vec::new() };
-        let likeliest = best(&self.fits, 1, |_| true, |fit| needs(fit, least, &settings.misfit));
-        let Some(fit) = likeliest.first().map(|place| &self.fits[*place]) else { return Vec::new() };
-        if leaves_more_than_noise(fit, &settings.noise) {
+        let needs = |fit: &Refit<'a>| needs(fit, least, &settings.misfit);
+        let likeliest = best(&self.fits, 1, |_| true, needs);
+        let Some(likeliest) = likeliest.first().map(|place| &self.fits[*place]) else { return Vec::new() };
+        if leaves_more_than_noise(likeliest, &settings.noise) {
             return Vec::new();
         }
-        let effects = fit.hypothesis.effects.iter();
-        effects.map(|effect| Proposal::Twins(fit, *effect, self.never_instead(fit, *effect))).collect()
+        let fewer = if self.part < 1.0 { likeliest.coefficients().saturating_sub(1) } else { 0 };
+        let mut held = best_of_each_count(&self.fits, fewer);
+        held.retain(|fit| needs(fit) < needs(likeliest) + settings.certificate.within);
+        held.push(likeliest);
+        let of = |fit: &'_ Refit<'a>| -> Vec<(Effect, Vec<Effect>)> {
+            fit.hypothesis.effects.iter().map(|effect| (*effect, self.never_instead(fit, *effect))).collect()
+        };
+        let of_each =
+            held.into_iter().flat_map(|fit| of(fit).into_iter().map(move |(effect, others)| (fit, effect, others)));
+        of_each.map(|(fit, effect, others)| Proposal::Twins(fit, effect, others)).collect()
     }
 
     /// Effects that have never been fitted in the place of one of a fit.

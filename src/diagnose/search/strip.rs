@@ -32,7 +32,8 @@ impl<'a> Search<'a, '_> {
         let mut experiment = self.context.experiment.clone();
         experiment.model.effects.distributed_flexibility = Some(stated);
         let strip = prepare(records, &experiment, settings).ok().and_then(|prepared| {
-            let prepared = kept.get_or_init(|| prepared);
+            // the search that led here has had its own
+            let prepared = kept.get_or_init(|| Prepared { budget: settings.search.budget, ..prepared });
             let taken = prepared.initial_damping();
             Self::of_base_model(prepared, &prepared.experiment, taken, settings, self.progress).ok()
         });
