@@ -11,7 +11,8 @@ use crate::error::Result;
 use crate::measure::{Measurement, Options};
 use crate::video::Timing;
 
-/// Its form.
+/// Its form, in whatever version, and in this one.
+const FORM: &str = "freeswing.angles/";
 const SCHEMA: &str = "freeswing.angles/1";
 
 /// The file, ready to be written.
@@ -33,17 +34,37 @@ pub struct Sidecar {
     pub warnings: Vec<String>,
 }
 
-/// What was said of a table when it was tracked, where its file still stands beside it.
-pub fn tracking_warnings(table: &Path) -> Vec<String> {
-    #[derive(Deserialize)]
-    struct Said {
-        schema: String,
-        warnings: Vec<String>,
+/// What the file beside a table says.
+#[derive(Debug, Deserialize)]
+pub struct Beside {
+    schema: String,
+    source: From,
+    #[serde(default)]
+    warnings: Vec<String>,
+}
+
+#[derive(Debug, Deserialize)]
+struct From {
+    file: String,
+}
+
+impl Beside {
+    /// Of a table; `None` where no such file stands beside it.
+    pub fn of(table: &Path) -> Option<Self> {
+        let text = std::fs::read_to_string(table.with_extension("json")).ok()?;
+        let beside: Self = serde_json::from_str(&text).ok()?;
+        beside.schema.starts_with(FORM).then_some(beside)
     }
-    let text = std::fs::read_to_string(table.with_extension("json")).unwrap_or_default();
-    let said = serde_json::from_str::<Said>(&text).ok().filter(|said| said.schema == SCHEMA);
-    let of_table = |warning: String| format!("{}, when it was tracked: {warning}", table.display());
-    said.map_or_else(Vec::new, |said| said.warnings.into_iter().map(of_table).collect())
+
+    /// The recording that was tracked.
+    pub fn recording(&self) -> &Path {
+        Path::new(&self.source.file)
+    }
+
+    /// What was said then.
+    pub fn warnings(&self) -> &[String] {
+        &self.warnings
+    }
 }
 
 #[derive(Debug, Serialize)]

@@ -4,10 +4,9 @@ use std::fs::{self, File};
 use std::io::{BufRead, BufReader};
 use std::path::{Path, PathBuf};
 
-use serde::Deserialize;
-
 use crate::error::{Error, Result};
 use crate::series::{AngleSeries, FEWEST_ROWS};
+use crate::sidecar::Beside;
 
 /// How recordings end. What is in them the decoder says.
 const VIDEOS: [&str; 16] = [
@@ -171,23 +170,13 @@ impl Found {
 
     /// The recording from which a table was measured, if that is among all: what stands beside the table says so.
     pub fn made_from(&self, all: &[PathBuf]) -> Option<PathBuf> {
-        #[derive(Deserialize)]
-        struct Beside {
-            schema: String,
-            source: Source,
-        }
-        #[derive(Deserialize)]
-        struct Source {
-            file: String,
-        }
         if self.kind != Kind::Table {
             return None;
         }
-        let text = fs::read_to_string(self.path().with_extension("json")).ok()?;
-        let beside: Beside = serde_json::from_str(&text).ok()?;
-        let source = Path::new(&beside.source.file).file_name()?.to_owned();
-        let is_it = |other: &&PathBuf| other.file_name() == Some(&source) && other.parent() == self.path().parent();
-        all.iter().find(is_it).filter(|_| beside.schema.starts_with("freeswing.angles/")).cloned()
+        let beside = Beside::of(self.path())?;
+        let source = beside.recording().file_name()?;
+        let is_it = |other: &&PathBuf| other.file_name() == Some(source) && other.parent() == self.path().parent();
+        all.iter().find(is_it).cloned()
     }
 }
 

@@ -55,6 +55,10 @@ fn out_and_back_px(points: &[Point], t_s: &[f64]) -> Option<(f64, f64)> {
     }
     let speed: Vec<f64> = (1..n - 1).map(|k| (u[k + 1] - u[k - 1]) / (seen[k + 1].0 - seen[k - 1].0)).collect();
     let fastest = speed.iter().fold(0.0_f64, |most, v| most.max(v.abs()));
+    // stamps that repeat tell no speed
+    if !(fastest > 0.0) || speed.iter().any(|v| !v.is_finite()) {
+        return None;
+    }
     let columns = POWERS as usize + 4;
     let row = |k: usize, column: usize| {
         let (place, speed) = (u[k + 1] / swing_px, speed[k] / fastest);
@@ -88,6 +92,20 @@ mod tests {
         };
         let points: Vec<Point> = t_s.iter().map(point).collect();
         out_and_back_px(&points, &t_s)
+    }
+
+    #[test]
+    fn stamps_that_repeat_tell_nothing() {
+        let measured = Measured { position_px: [640.0, 300.0], covariance_px2: [0.0; 3], area_px2: 100.0 };
+        let point = |k: i32| Point {
+            measured: Some(Measured { position_px: [640.0 + 9.0 * f64::from(k % 7), 300.0], ..measured }),
+            filtered: None,
+            flags: Flags::default(),
+        };
+        let points: Vec<Point> = (0..60).map(point).collect();
+        let halted_s: Vec<f64> = (0..60).map(|k| f64::from(k.min(40))).collect();
+        assert_eq!(out_and_back_px(&points, &halted_s), None);
+        assert_eq!(out_and_back_px(&points, &[1.0; 60]), None);
     }
 
     #[test]

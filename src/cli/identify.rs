@@ -9,7 +9,7 @@ use crate::experiment::Experiment;
 use crate::identify::{identify, identify_displacement};
 use crate::output::OutputFile;
 use crate::series::{AngleSeries, Measured};
-use crate::sidecar::tracking_warnings;
+use crate::sidecar::Beside;
 
 /// Find frequencies, damping and mode shapes in a table of angles, every estimator side by side.
 #[derive(Debug, clap::Args)]
@@ -56,7 +56,10 @@ impl IdentifyArgs {
         let json = self.json.as_deref().map(OutputFile::create).transpose()?;
         let (series, measured) = AngleSeries::read_motion(&self.angles)?;
         console.warnings(&series.warnings);
-        console.warnings(&tracking_warnings(&self.angles));
+        if let Some(beside) = Beside::of(&self.angles) {
+            let said = |warning: &String| format!("{}, when it was tracked: {warning}", self.angles.display());
+            console.warnings(&beside.warnings().iter().map(said).collect::<Vec<_>>());
+        }
         let series = self.stretch(series)?;
         let found = match measured {
             Measured::Angles => identify(&series, experiment.as_ref())?,

@@ -89,7 +89,7 @@ impl<'a> Problem<'a> {
             accuracy: Accuracy::default(),
             dropped_at_s: vec![f64::INFINITY; records.len()],
             beliefs: Vec::new(),
-            further_modes: model.shapes().map_or_else(Vec::new, |shapes| shapes.slower().to_vec()),
+            further_modes: model.shapes().map_or_else(Vec::new, |shapes| shapes.slower()),
             work: Work::default(),
         })
     }

@@ -181,11 +181,12 @@ impl Mode {
         let measured = format!("κ = {:.4} ± {:.4} /rad²", k.value, k.half());
         let tolerance = THEORY_TOLERANCE * expected.abs();
         let agrees = k.low - tolerance <= expected && expected <= k.high + tolerance;
+        // by which factor on the angles it would be gravity's
+        let times = |kappa: f64| (kappa / expected).max(0.0).sqrt();
         if self.constant_though_wide() || self.is_no_swing_of_its_own() {
             None
         } else if !agrees {
             // no scale of the angles makes a frequency rise with amplitude that gravity makes fall
-            let times = |kappa: f64| (kappa / expected).max(0.0).sqrt();
             let scale = if k.low > 0.0 {
                 format!(", or the true angles are about {:.2} × the stated ones", times(k.value))
             } else if k.high > 0.0 {
@@ -207,9 +208,9 @@ impl Mode {
             let how = if k.holds(expected) {
                 format!("as gravity makes it ({measured}, expected {expected:.4})")
             } else {
-                let times = (k.value / expected).max(0.0).sqrt();
                 format!(
-                    "about as gravity makes it ({measured}, expected {expected:.4}; both agree if the true angles are {times:.3} × the stated ones: are they measured from the hinge?)"
+                    "about as gravity makes it ({measured}, expected {expected:.4}; both agree if the true angles are {:.3} × the stated ones: are they measured from the hinge?)",
+                    times(k.value)
                 )
             };
             Some(format!("the frequency falls with amplitude {how}"))

@@ -31,16 +31,21 @@ pub struct Shapes {
     count: usize,
     /// Diagonal of ΦᵀMΦ.
     inertia_kg_m2: Vec<f64>,
-    /// From coordinates to the modes and layers of which the shapes are made: modes × shapes.
-    modal: DMatrix<f64>,
-    /// Of each of these, the largest angle between marks, and its circular frequency (rad/s).
-    modes: Vec<[f64; 2]>,
+    /// The modes and layers of which the shapes are made.
+    modes: Modes,
     /// Links × (angles between marks, then how much of each of the next modes).
     start: DMatrix<f64>,
-    /// Of each of the next modes of the start: the frequency of the last one for which there is an angle between marks, over its own.
-    slower: Vec<f64>,
     /// From angles to coordinates, (ΦᵀMΦ)⁻¹ΦᵀM: shapes × links.
     projection: DMatrix<f64>,
+}
+
+/// The modes, and how a strip stands when either end is turned.
+#[derive(Debug, Clone, PartialEq)]
+struct Modes {
+    /// From coordinates to these: modes × shapes.
+    of_shapes: DMatrix<f64>,
+    /// Of each the largest angle between marks, and its circular frequency (rad/s).
+    each: Vec<[f64; 2]>,
 }
 
 impl Shapes {
@@ -56,7 +61,6 @@ impl Shapes {
         let inertia = chain.inertia_kg_m2();
         let mut stiffness = hanging_stiffness(chain, gravity_m_s2, stiffness_n_m_per_rad);
         stiffness[(0, 0)] += of_hinge_n_m_per_rad;
-        let stiffness = stiffness;
         // M = LLᵀ, and L⁻¹KL⁻ᵀ has the modes' squares as eigenvalues
         let lower = inertia.clone().cholesky()?.l();
         let half = lower.solve_lower_triangular(&stiffness)?;
@@ -69,8 +73,6 @@ impl Shapes {
             whole.set_column(k, &lower.tr_solve_lower_triangular(&eigen.eigenvectors.column(*mode))?);
         }
         let start = Self::start_of(chain, &whole.columns(0, marks + FURTHER_AT_START).into_owned())?;
-        let pace = |mode: usize| eigen.eigenvalues[order[mode]].abs().sqrt();
-        let slower = (marks..marks + FURTHER_AT_START).map(|mode| pace(marks - 1) / pace(mode)).collect();
         // in step with the first mode, so that there is an answer without gravity, too
         let still = (&stiffness + inertia * eigen.eigenvalues[order[0]].abs()).cholesky()?;
         for (k, turned) in (modes..count).zip([0, n - 1]) {
@@ -84,30 +86,21 @@ impl Shapes {
         let chords = chord_slopes(chain, &vec![0.0; n]) * &whole;
         let mode =
             |k: usize| [chords.column(k).amax(), whole.column(k).dot(&(&stiffness * whole.column(k))).abs().sqrt()];
-        let modes = (0..count).map(mode).collect();
+        let each = (0..count).map(mode).collect();
         let turned = at_the_hinge(&whole);
         let (shapes, scales) = with_the_first_link(&(&whole * &turned));
-        let modal = turned * DMatrix::from_diagonal(&scales);
-        Some(Self { slower, modal, modes, ..Self::of_angles(&shapes, start, chain) })
+        let modes = Modes { of_shapes: turned * DMatrix::from_diagonal(&scales), each };
+        Some(Self::made_of(modes, &shapes, start, chain))
     }
 
-    /// Of shapes that are ready, and the angles where a motion starts.
-    fn of_angles(shapes: &DMatrix<f64>, start: DMatrix<f64>, chain: &Chain) -> Self {
+    /// Shapes that are ready, and the angles where a motion starts.
+    fn made_of(modes: Modes, shapes: &DMatrix<f64>, start: DMatrix<f64>, chain: &Chain) -> Self {
         let weighed = shapes.tr_mul(chain.inertia_kg_m2());
         let inertia_kg_m2: Vec<f64> =
             shapes.column_iter().enumerate().map(|(k, shape)| weighed.row(k).transpose().dot(&shape)).collect();
         let projection =
             DMatrix::from_fn(shapes.ncols(), shapes.nrows(), |k, link| weighed[(k, link)] / inertia_kg_m2[k]);
-        Self {
-            basis: in_lanes(shapes),
-            count: shapes.ncols(),
-            inertia_kg_m2,
-            modal: DMatrix::zeros(0, 0),
-            modes: Vec::new(),
-            start,
-            slower: Vec::new(),
-            projection,
-        }
+        Self { basis: in_lanes(shapes), count: shapes.ncols(), inertia_kg_m2, modes, start, projection }
     }
 
     /// The lowest modes combined so that each has the angle one between two marks and none between the others; then the next modes, each less what it
@@ -132,8 +125,10 @@ impl Shapes {
     }
 
     /// Of each of the next modes of the start: the frequency of the last one for which there is an angle between marks, over its own.
-    pub fn slower(&self) -> &[f64] {
-        &self.slower
+    pub fn slower(&self) -> Vec<f64> {
+        let marks = self.start.ncols() - FURTHER_AT_START;
+        let [_, last_rad_s] = self.modes.each[marks - 1];
+        self.modes.each[marks..self.start.ncols()].iter().map(|[_, own_rad_s]| last_rad_s / own_rad_s).collect()
     }
 
     fn links(&self) -> usize {
@@ -154,10 +149,11 @@ impl Shapes {
     /// frequency, or over the swing's if that is faster.
     pub fn seen_rad(&self, angle: &[f64], rate: &[f64], characteristic_rad_s: f64) -> f64 {
         let of = |(k, [seen, pace_rad_s]): (usize, &[f64; 2])| {
-            let along = |values: &[f64]| self.modal.row(k).iter().zip(values).map(|(a, b)| a * b).sum::<f64>();
+            let along =
+                |values: &[f64]| self.modes.of_shapes.row(k).iter().zip(values).map(|(a, b)| a * b).sum::<f64>();
             seen * along(angle).abs().max(along(rate).abs() / pace_rad_s.max(characteristic_rad_s))
         };
-        self.modes.iter().enumerate().map(of).fold(0.0, f64::max)
+        self.modes.each.iter().enumerate().map(of).fold(0.0, f64::max)
     }
 
     /// The links' values of coordinates. What follows the coordinates (the laws' own variables) is handed on.
@@ -318,7 +314,7 @@ mod tests {
 
     #[test]
     fn further_modes_are_faster_one_after_the_other() {
-        let slower = shapes(1e-5).slower().to_vec();
+        let slower = shapes(1e-5).slower();
         assert_eq!(slower.len(), FURTHER_AT_START);
         assert!(slower[0] < 1.0 && slower.windows(2).all(|pair| 0.0 < pair[1] && pair[1] < pair[0]), "{slower:?}");
     }

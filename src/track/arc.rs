@@ -141,8 +141,13 @@ const CENTRE_OFF: f64 = 0.03;
 impl Arc {
     /// How far a point lies from the centre, as a share of how far it may where a mark shows the hinge.
     pub fn off_centre(&self, place_px: [f64; 2]) -> f64 {
+        self.off(place_px, CENTRE_OFF * self.radius_px)
+    }
+
+    /// The same, where it may lie so much farther than its deviations and a mark's own error allow.
+    fn off(&self, place_px: [f64; 2], farther_px: f64) -> f64 {
         let part = |axis: usize| {
-            let limit = CENTRE_DEVIATIONS * self.sd_px[axis] + CENTRE_OFF_PX + CENTRE_OFF * self.radius_px;
+            let limit = CENTRE_DEVIATIONS * self.sd_px[axis] + CENTRE_OFF_PX + farther_px;
             (place_px[axis] - self.centre_px[axis]).abs() / limit
         };
         part(0).max(part(1))
@@ -175,10 +180,7 @@ impl Arc {
 
     /// Whether a point is not the centre, whatever is wrong with the picture: what only stands near it is beyond its deviations.
     pub fn excludes(&self, place_px: [f64; 2]) -> bool {
-        let is_beyond = |axis: usize| {
-            (place_px[axis] - self.centre_px[axis]).abs() > CENTRE_DEVIATIONS * self.sd_px[axis] + CENTRE_OFF_PX
-        };
-        (0..2).any(is_beyond)
+        self.off(place_px, 0.0) > 1.0
     }
 
     /// A mark there may show the hinge.

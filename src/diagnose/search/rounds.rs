@@ -124,10 +124,8 @@ impl Round {
         match self {
             Self::Asked => search.asked(),
             Self::Singles => search.singles(),
-            Self::ExpensiveSingles if search.context.is_strip() => Vec::new(),
-            Self::ExpensiveSingles => search.expensive_singles(),
-            Self::StripExpensiveSingles if search.context.is_strip() => search.expensive_singles(),
-            Self::StripExpensiveSingles => Vec::new(),
+            Self::ExpensiveSingles => search.expensive_singles(false),
+            Self::StripExpensiveSingles => search.expensive_singles(true),
             Self::Indistinguishable => search.indistinguishable(),
             Self::FromBest => search.begun_at_the_leader(),
             Self::Pairs => search.pairs(),
@@ -172,8 +170,11 @@ impl<'a> Search<'a, '_> {
         self.beside_base(self.lacking(), |effect| is_ordinary(effect) || self.promises_most(effect))
     }
 
-    /// The others.
-    fn expensive_singles(&self) -> Vec<Proposal<'_, 'a>> {
+    /// The others, where the base model is a strip, or where it is none.
+    fn expensive_singles(&self, of_strip: bool) -> Vec<Proposal<'_, 'a>> {
+        if self.context.is_strip() != of_strip {
+            return Vec::new();
+        }
         let misfit = self.lacking().beside(&self.fits[1..]);
         self.beside_base(misfit, |effect| !is_ordinary(effect) && !self.promises_most(effect))
     }
@@ -422,7 +423,7 @@ impl<'a> Search<'a, '_> {
     /// Of the likeliest fit every effect that would do as well in the place of one of it: it was sought from where fewer effects stand. After a search of a part of the
     /// recordings so of the best fits with fewer coefficients, too, for it has not fitted every effect to the whole. Where far more than noise is left a promise says
     /// little.
-    fn twins(&self) -> Vec<Proposal<'_, 'a>> {
+    fn twins<'f>(&'f self) -> Vec<Proposal<'f, 'a>> {
         let settings = self.context.settings;
         let Some(least) = least(&self.fits) else { return Vec::new() };
         let needs = |fit: &Refit<'a>| needs(fit, least, &settings.misfit);
@@ -435,12 +436,11 @@ impl<'a> Search<'a, '_> {
         let mut held = best_of_each_count(&self.fits, fewer);
         held.retain(|fit| needs(fit) < needs(likeliest) + settings.certificate.within);
         held.push(likeliest);
-        let of = |fit: &'_ Refit<'a>| -> Vec<(Effect, Vec<Effect>)> {
-            fit.hypothesis.effects.iter().map(|effect| (*effect, self.never_instead(fit, *effect))).collect()
+        let of = |fit: &'f Refit<'a>| {
+            let effects = fit.hypothesis.effects.iter();
+            effects.map(move |effect| Proposal::Twins(fit, *effect, self.never_instead(fit, *effect)))
         };
-        let of_each =
-            held.into_iter().flat_map(|fit| of(fit).into_iter().map(move |(effect, others)| (fit, effect, others)));
-        of_each.map(|(fit, effect, others)| Proposal::Twins(fit, effect, others)).collect()
+        held.into_iter().flat_map(of).collect()
     }
 
     /// Effects that have never been fitted in the place of one of a fit.
