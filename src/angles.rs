@@ -109,7 +109,7 @@ fn unwrap_turns(angles: &mut [Option<Angle>]) {
     }
 }
 
-/// The table, as `formats.md` lays it down, with the standard deviations and the filter's positions behind it.
+/// The table (its columns: `docs/outputs.md`), with the standard deviations and the filter's positions behind it.
 pub fn to_csv(tracks: &Tracks, angles: &Angles) -> String {
     let marks = tracks.marks.len();
     let links = angles.links.len();

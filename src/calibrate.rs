@@ -111,7 +111,7 @@ impl Calibration {
         if self.mirrored { [-upright[0], upright[1]] } else { upright }
     }
 
-    /// Angle of a vector of [`Calibration::vector`] from the downward vertical, positive towards +x (`physics.md`).
+    /// Angle of a vector of [`Calibration::vector`] from the downward vertical, positive towards +x.
     pub fn angle_rad([x, y]: [f64; 2]) -> f64 {
         x.atan2(-y)
     }

@@ -85,7 +85,7 @@ pub enum Error {
     Unwritable { path: PathBuf, source: std::io::Error },
 
     /// An encoder that failed.
-    #[error("{}: the picture stream cannot be encoded: {detail}", path.display())]
+    #[error("{}: the picture stream cannot be encoded: {detail}; `freeswing doctor` tests the encoders", path.display())]
     Encode { path: PathBuf, detail: String },
 
     /// A failure inside OpenCV.

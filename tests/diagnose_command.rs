@@ -493,6 +493,25 @@ fn a_recording_at_another_pace_is_refused_as_a_fit_refuses_it() {
 }
 
 #[test]
+fn angles_that_no_specimen_has_are_refused() {
+    let folder = Folder::new();
+    let angles = fs::read_to_string(folder.swing(BASE, "")).unwrap();
+    let config = folder.write("base.toml", BASE);
+    let turned = |line: &str| {
+        let mut fields: Vec<String> = line.split(',').map(str::to_owned).collect();
+        let last = fields.len() - 1;
+        if let Ok(theta_rad) = fields[last].parse::<f64>() {
+            fields[last] = (-theta_rad).to_string();
+        }
+        fields.join(",")
+    };
+    let table = folder.write("turned.csv", &angles.lines().map(turned).collect::<Vec<_>>().join("\n"));
+    let mut diagnose = freeswing("diagnose");
+    let said = contains("cannot be diagnosed").and(contains("the sign of one of the angles is turned"));
+    diagnose.arg(table).arg("--config").arg(config).assert().code(2).stdout("").stderr(said);
+}
+
+#[test]
 fn a_swing_that_goes_far_from_frame_to_frame_is_named_all_the_same() {
     let folder = Folder::new();
     // 2.4 Hz and 7.5 Hz at 30 frames per second: linearised from row to row in one piece, the motion would grow of its own

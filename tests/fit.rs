@@ -88,6 +88,35 @@ fn outliers_and_a_missing_stretch_do_no_harm() {
 }
 
 #[test]
+fn a_value_in_twenty_that_is_wrong_does_no_harm() {
+    let mut record = Case::new(2e-4, 2e-6, 1e-7).record(6);
+    // among them the last but one
+    for row in (19..record.len()).step_by(20).chain([record.len() - 2]) {
+        record.theta_rad[0][row] = record.theta_rad[0][row].map(|angle| angle + 0.2 * (row as f64).sin().signum());
+    }
+    let wrong = record.len() / 20 + 1;
+    let fit = fit(&[record], &start(), &BASE).unwrap();
+    assert!((wrong - 1..wrong + 3).contains(&fit.outliers[0].len()), "{} of {wrong}", fit.outliers[0].len());
+    assert!(Verdict::of(&fit.residuals[0], 0.8).is_reproduced());
+}
+
+#[test]
+fn noise_that_is_correlated_is_no_misfit() {
+    let case = Case { noise_rad: 0.0, ..Case::new(2e-4, 2e-6, 1e-7) };
+    let mut record = case.record(7);
+    let (mut random, fresh) = (StdRng::seed_from_u64(7), Normal::new(0.0, 1e-3).unwrap());
+    for angles in &mut record.theta_rad {
+        let mut noise = 0.0;
+        for angle in angles.iter_mut().flatten() {
+            noise = 0.4 * noise + fresh.sample(&mut random);
+            *angle += noise;
+        }
+    }
+    let fit = fit(&[record], &start(), &BASE).unwrap();
+    assert!(Verdict::of(&fit.residuals[0], 0.8).is_reproduced(), "{}", Verdict::of(&fit.residuals[0], 0.8).statement());
+}
+
+#[test]
 fn two_recordings_share_their_parameters_and_say_more_than_one() {
     let (large, mut small) = (Case::new(2e-4, 2e-6, 1e-7), Case::new(2e-4, 2e-6, 1e-7));
     small.experiment.model.release_rad = vec![0.2, -0.1];

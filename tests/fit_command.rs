@@ -190,7 +190,9 @@ fn json_on_standard_output_is_all_there_is() {
     let angles = folder.angles(SWING);
     let config = folder.path("simulated.toml");
     let output = freeswing("fit").arg(angles).arg("--config").arg(config).args(["--json", "-"]).output().unwrap();
-    serde_json::from_slice::<serde_json::Value>(&output.stdout).unwrap();
+    assert!(output.status.success());
+    let json: serde_json::Value = serde_json::from_slice(&output.stdout).unwrap();
+    assert_eq!(json["schema"], "freeswing.fit/1");
 }
 
 #[test]
@@ -274,6 +276,34 @@ fn a_joint_parameter_of_one_link_is_refused() {
         .assert()
         .code(2)
         .stderr(contains("this specimen has one link and no joint"));
+}
+
+#[test]
+fn the_name_of_an_effect_frees_all_its_parameters() {
+    let folder = Folder::new();
+    let one = "[[specimen.links]]\nlength_m = 0.2\nmass_kg = 0.1\ncom_m = 0.1\ninertia_kg_m2 = 4e-4\n[model]\nrelease_rad = [0.4]\n\
+               [model.effects]\nhinge_viscous = 1e-4\n";
+    let angles = folder.angles(&format!("{one}support_motion = {{ amplitude_m = 2e-3, frequency_hz = 0.8 }}\n"));
+    let config = folder.write("start.toml", one);
+    let json = folder.path("fit.json");
+    let mut fit = freeswing("fit");
+    fit.arg(&angles).arg("--config").arg(&config).args(["--free", "support_motion"]).arg("--json").arg(&json);
+    fit.assert().success();
+    let report: serde_json::Value = serde_json::from_str(&fs::read_to_string(json).unwrap()).unwrap();
+    let value = |id: &str| report["parameters"][id]["value"].as_f64().unwrap();
+    let [sine_m, cosine_m] = ["support_motion.sine_m", "support_motion.cosine_m"].map(value);
+    assert!((sine_m.hypot(cosine_m) - 2e-3).abs() < 1e-4 && (value("support_motion.frequency_hz") - 0.8).abs() < 0.01);
+    // of one link its centre of mass and its inertia are one number
+    let said = contains("shows only (I + mc²)/(mc)");
+    let known = folder.path("simulated.toml");
+    freeswing("fit")
+        .arg(angles)
+        .arg("--config")
+        .arg(known)
+        .args(["--free", "links.1.com_m"])
+        .assert()
+        .success()
+        .stdout(said);
 }
 
 #[test]

@@ -232,6 +232,11 @@ fn wrong_angles(cases: &mut Vec<Case>) {
         ("columns swapped", changed(&|a, b| [b, a]), &["the columns look swapped"]),
         ("θ2 from link to link", changed(&|a, b| [a, b - a]), &["from link to link"]),
         ("θ1 twice", changed(&|a, _| [a, a]), &["not reproduced"]),
+        (
+            "θ2 from the upward vertical",
+            changed(&|a, b| [a, b + std::f64::consts::PI]),
+            &["counted from the upward vertical"],
+        ),
         ("both from a line 3° off", changed(&|a, b| [a + 0.05, b + 0.05]), &["a constant offset of 5", "camera_tilt"]),
     ] {
         cases.push(Case { name: name.to_owned(), file: File::of(Kind::Two), rows, words });

@@ -262,7 +262,7 @@ fn a_simulated_strip_gives_back_its_frequencies_and_its_friction() {
         assert!((mode.frequency_hz.value / truth - 1.0).abs() < 5e-4, "{} against {truth}", mode.frequency_hz.value);
     }
     let decay = found.modes[0].envelope.as_ref().unwrap().decay.unwrap();
-    // b₀ = 2c₀/πIω of the straight strip (physics.md)
+    // b₀ = 2c₀/πIω of the straight strip
     let expected = 2.0 * 2.0e-7 / (std::f64::consts::PI * 4.808e-6 * TAU * natural[0]);
     assert!(decay.b0_rad_per_s.holds(expected) && !decay.b0_rad_per_s.holds(0.0), "{decay:?} against {expected}");
     assert!(decay.p_viscous < 1e-6);

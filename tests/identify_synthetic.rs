@@ -28,6 +28,42 @@ impl Swing {
     }
 }
 
+/// A swing at a stiffness that softens, T = K θ₀ tanh(θ/θ₀), by Runge and Kutta's method; 1.0 Hz at small amplitude.
+fn softening(release_rad: f64, duration_s: f64) -> AngleSeries {
+    let (rate_hz, fine) = (100.0, 10);
+    let acceleration = |[angle, rate]: [f64; 2]| -TAU * TAU * 0.5 * (angle / 0.5).tanh() - 0.01 * TAU * rate;
+    let slope = |state: [f64; 2]| [state[1], acceleration(state)];
+    let along = |state: [f64; 2], slope: [f64; 2], h: f64| [state[0] + h * slope[0], state[1] + h * slope[1]];
+    let mut rng = Xoshiro256PlusPlus::seed_from_u64(5);
+    let (mut state, mut angles) = ([release_rad, 0.0], Vec::new());
+    for _ in 0..(duration_s * rate_hz) as usize {
+        let noise: f64 = StandardNormal.sample(&mut rng);
+        angles.push(Some(state[0] + 5e-4 * noise));
+        for _ in 0..fine {
+            let h = 1.0 / (rate_hz * f64::from(fine));
+            let k1 = slope(state);
+            let k2 = slope(along(state, k1, 0.5 * h));
+            let k3 = slope(along(state, k2, 0.5 * h));
+            let k4 = slope(along(state, k3, h));
+            state = [0, 1].map(|i| state[i] + h / 6.0 * (k1[i] + 2.0 * k2[i] + 2.0 * k3[i] + k4[i]));
+        }
+    }
+    series((0..angles.len()).map(|k| k as f64 / rate_hz).collect(), vec![angles])
+}
+
+#[test]
+fn the_frequency_at_small_amplitude_is_as_uncertain_as_the_law_that_leads_there() {
+    let one = "[[specimen.links]]\nlength_m = 0.3\nmass_kg = 0.1\ncom_m = 0.15\ninertia_kg_m2 = 7.5e-4\n[model]\nrelease_rad = [0.8]\n";
+    let experiment = Experiment::parse(one, &PathBuf::from("one.toml")).unwrap();
+    let found = identify(&softening(0.8, 15.0), Some(&experiment)).unwrap();
+    let f = found.modes[0].frequency_hz;
+    assert!(f.low < 1.0 && f.high > 1.0 && f.half() < 0.5, "{f:?}");
+    assert!(found.modes[0].basis.contains("nonlinear stiffness"), "{}", found.modes[0].basis);
+    // seen down to small swings it is known
+    let later = identify(&softening(0.1, 30.0), Some(&experiment)).unwrap();
+    assert!((later.modes[0].frequency_hz.value - 1.0).abs() < 0.01, "{:?}", later.modes[0].frequency_hz);
+}
+
 /// A table as a camera of some resolution would give it.
 struct Table {
     swings: Vec<Swing>,

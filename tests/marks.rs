@@ -243,12 +243,12 @@ fn a_pivot_known_to_some_pixels_makes_all_angles_wrong_alike_and_that_is_said() 
     // 75 px from the pivot to the joint, on the average
     let words = said_of("[0.4, 8.0]");
     assert!(
-        words.contains("the pivot is known to ± 0.4 px (x) and ± 8.0 px (y)") && words.contains("by 10."),
+        words.contains("the standard deviation of the pivot is 0.4 px (x) and 8.0 px (y)") && words.contains("by 10."),
         "{words}"
     );
     // what was said goes with the table
     let identified = done(&bench.freeswing(&["identify", "angles.csv"]));
-    assert!(identified.contains("when it was tracked: the pivot is known to ± 0.4 px"), "{identified}");
+    assert!(identified.contains("when it was tracked: the standard deviation of the pivot is 0.4 px"), "{identified}");
     assert!(!said_of("[0.01, 0.02]").contains("the pivot is known"));
     std::fs::write(bench.path("rig.toml"), "[rig]\npivot_sd_px = [1.0, 1.0]\n").unwrap();
     assert!(refused(&bench.track(&["--config", "rig.toml"])).contains("rig.pivot_px, which is not given"));

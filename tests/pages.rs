@@ -156,7 +156,14 @@ fn the_page_on_folders_runs() {
 
 #[test]
 fn the_page_on_diagnosis_runs() {
-    run("docs/diagnosis.md");
+    let folder = run("docs/diagnosis.md");
+    let diagnosis = std::fs::read_to_string(folder.path().join("diagnosis.json")).unwrap();
+    let diagnosis: serde_json::Value = serde_json::from_str(&diagnosis).unwrap();
+    let mut named: Vec<&str> =
+        diagnosis["verdict"]["effects"].as_array().unwrap().iter().filter_map(|name| name.as_str()).collect();
+    named.sort_unstable();
+    assert_eq!(named, ["air_quadratic", "hinge_coulomb"]);
+    assert_eq!(diagnosis["verdict"]["status"], "identified");
 }
 
 #[test]

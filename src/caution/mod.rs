@@ -54,6 +54,12 @@ const SLOW_MOTION: [(f64, f64); 12] = [
     (120.0, 50.0),
     (240.0, 50.0),
 ];
+/// A specimen swings so many times as fast as a mass at the end of a thread: from 1.0 to 1.4 times (physics).
+const OVER_LEAST: f64 = 1.15;
+/// Rates are the same within this share (judgement)…
+const SAME_RATE: f64 = 0.02;
+/// … and factors within what the specimen leaves open (physics).
+const SAME_FACTOR: f64 = 0.3;
 
 /// Every caution about a measurement.
 pub fn cautions(m: &Measurement, options: &Options) -> Vec<String> {
@@ -378,7 +384,7 @@ fn camera(m: &Measurement, options: &Options) -> Vec<String> {
 /// Slow motion shows where the length is known: a pendulum of that length cannot swing so slowly.
 ///
 /// ```text
-/// f ≤ √(g / L) / 2π for a mass at the end; of rods and chains it lies within 1.0 and 1.4 of that
+/// f ≥ √(g/L)/2π: that of a mass at the end of a light thread; of rods and hanging chains 1.0 to 1.4 times that
 /// ```
 pub fn slow_motion(m: &Measurement, experiment: &Experiment) -> Option<String> {
     if experiment.rig.true_rate_hz.is_some() {
@@ -391,11 +397,11 @@ pub fn slow_motion(m: &Measurement, experiment: &Experiment) -> Option<String> {
         return None;
     }
     let least_hz = (experiment.rig.gravity_m_s2 / length_m).sqrt() / std::f64::consts::TAU;
-    let factor = least_hz * 1.15 / seen_hz;
+    let factor = least_hz * OVER_LEAST / seen_hz;
     let (true_hz, played_hz) = SLOW_MOTION
         .into_iter()
-        .filter(|(_, played)| (played / file_hz - 1.0).abs() < 0.02)
-        .find(|(taken, played)| (factor / (taken / played) - 1.0).abs() < 0.3)?;
+        .filter(|(_, played)| (played / file_hz - 1.0).abs() < SAME_RATE)
+        .find(|(taken, played)| (factor / (taken / played) - 1.0).abs() < SAME_FACTOR)?;
     Some(format!(
         "it swings at {seen_hz:.3} Hz, where {length_m:.3} m of pendulum swing at {least_hz:.2} Hz or faster: this looks like {true_hz:.0} frames per second played at {played_hz:.0}; write true_rate_hz = {true_hz:.0} in [rig]"
     ))

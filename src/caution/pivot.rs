@@ -25,7 +25,7 @@ pub(super) fn uncertain(m: &Measurement, options: &Options) -> Option<String> {
     let sd_rad = usual_sd_rad(angles)?;
     (shift_rad.max(factor * half_range_rad(angles)) > SHARED_DEVIATIONS * sd_rad).then(|| {
         format!(
-            "the pivot is known to ± {sx:.1} px (x) and ± {sy:.1} px (y), if the camera faces the swing to 2°. All angles of link 1 may be too large or too small by {:.1} % and shifted by {:.2}°, in addition to the standard deviations in the table; frequency and damping are not affected. A mark on the hinge, or a wider swing, reduces this. A camera turned aside by 10° puts the pivot 3 % of the link's length too near",
+            "the standard deviation of the pivot is {sx:.1} px (x) and {sy:.1} px (y), for a camera that faces the swing to 1.5°. All angles of link 1 may be too large or too small by {:.1} % and shifted by {:.2}°, in addition to the standard deviations in the table; frequency and damping are not affected. A mark on the hinge, or a wider swing, reduces this. A camera turned aside by 10° puts the pivot 3 % of the link's length too near",
             100.0 * factor,
             shift_rad.to_degrees()
         )

@@ -38,7 +38,7 @@ pub struct FitArgs {
     /// Write measured and simulated angles, and what is left, row by row, as CSV; `-` for standard output.
     #[arg(long, value_name = "FILE")]
     curves: Option<Target>,
-    /// Fit this parameter or effect, too, which the file does not name, as hinge_coulomb, or links.1.com_m where a length or a mass is not known to 0.1 %; may be
+    /// Also fit this parameter or effect that the file does not name, as hinge_coulomb; or links.1.com_m where the centre of mass is not known to 0.1 %. May be
     /// repeated.
     #[arg(long, value_name = "ID")]
     free: Vec<String>,
@@ -127,19 +127,24 @@ fn free_parameters(experiment: &Experiment, marks: usize, more: &[String], fix: 
                 .max_by(|a, b| a.0.total_cmp(&b.0))
                 .map_or("", |n| n.1)
         };
-        known.iter().copied().find(|p| p.id() == id).ok_or_else(|| Error::Option {
-            option: id.clone(),
-            message: format!("no such parameter; the nearest known one is `{}`", nearest()),
-        })
+        // the name of an effect stands for all its parameters
+        let is_of_effect = |p: &Parameter| p.id().split_once('.').is_some_and(|(effect, _)| effect == id);
+        let exact: Vec<Parameter> = known.iter().copied().filter(|p| p.id() == id).collect();
+        let named = if exact.is_empty() { Parameter::ALL.into_iter().filter(is_of_effect).collect() } else { exact };
+        if named.is_empty() {
+            let message = format!("no such parameter; the nearest known one is `{}`", nearest());
+            return Err(Error::Option { option: id.clone(), message });
+        }
+        Ok(named)
     };
     if let Some(both) = more.iter().find(|id| fix.contains(id)) {
         let message = format!("{both} is to be kept as well (--fix); leave one of the two out");
         return Err(Error::Option { option: "--free".to_owned(), message });
     }
-    let fix = fix.iter().map(parse).collect::<Result<Vec<_>>>()?;
+    let fix = fix.iter().map(parse).collect::<Result<Vec<_>>>()?.concat();
     let mut free = fit::base_parameters(experiment, marks);
     for id in more {
-        free.push(parse(id)?);
+        free.extend(parse(id)?);
     }
     if free.contains(&Parameter::DroppedFrames) {
         let message = "a fit does not know where frames are missing; `freeswing diagnose` finds them".to_owned();
@@ -267,8 +272,20 @@ impl Report<'_> {
             }
             false => "",
         };
-        let line = &format!("{line}{links} `freeswing diagnose` searches for missing effects.");
+        let of_one_link = if is_reproduced && self.frees_half_of_one_link() {
+            " One link shows only (I + mc²)/(mc): the centre of mass or the inertia that is free is right only if the other one in the file is."
+        } else {
+            ""
+        };
+        let line = &format!("{line}{links}{of_one_link} `freeswing diagnose` searches for missing effects.");
         text.push_str(&paragraph("  ", line));
+    }
+
+    /// Whether of the centre of mass and the inertia of a single link one is free.
+    fn frees_half_of_one_link(&self) -> bool {
+        let is_free = |id: &str| self.fitted.fit.estimates.iter().any(|own| own.parameter.id() == id);
+        let [com, inertia] = ["links.1.com_m", "links.1.inertia_kg_m2"].map(is_free);
+        self.records.iter().all(|record| record.links() == 1) && com != inertia
     }
 
     fn strong_correlations(&self) -> Vec<([&'static str; 2], f64)> {

@@ -58,7 +58,7 @@ pub struct Extent {
     /// The last stage of a run.
     #[arg(long, value_name = "STAGE", default_value = "report")]
     pub until: Stage,
-    /// No overlay.mp4, which takes about three times as long as the tracking.
+    /// No overlay.mp4, which takes up to four times as long as the tracking.
     #[arg(long)]
     pub no_overlay: bool,
 }

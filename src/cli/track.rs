@@ -40,7 +40,7 @@ pub struct TrackArgs {
     /// The recording with what was measured drawn into it: .mp4, .mov or .mkv.
     #[arg(long, value_name = "VIDEO")]
     overlay: Option<Target>,
-    /// Keep the overlay below about so many megabytes, with smaller pictures where that must be.
+    /// Limit the overlay to about this many megabytes; its pictures are made smaller if necessary.
     #[arg(long, value_name = "MB", requires = "overlay")]
     overlay_mb: Option<f64>,
     /// A folder for pictures of each step from frame to marks.

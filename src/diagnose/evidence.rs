@@ -144,8 +144,8 @@ mod tests {
             let fit = with(&records, Effect::AngleGain, (gain, 1e-4), 60.0);
             ln_evidence(&fit, Scatter::NOISE, |_| 1e6, &PriorSettings::default(), 9.0)
         };
-        assert!(with_gain(0.08).is_finite() && with_gain(-0.12).is_finite());
-        assert_eq!(with_gain(0.4), f64::NEG_INFINITY);
+        assert!(with_gain(0.08).is_finite() && with_gain(-0.11).is_finite());
+        assert_eq!(with_gain(-0.16), f64::NEG_INFINITY);
     }
 
     #[test]

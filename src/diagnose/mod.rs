@@ -11,12 +11,13 @@
 //! | 7 | what was not fitted is predicted | [`heldout`] |
 //! | 8 | what the names leave is learnt, as a law that no table holds | [`learnt`], [`grammar`] |
 //! | 9 | the base model is judged, and what could have been seen; the verdict: the answer, its class, what would decide | [`adequacy`], [`verdict`] |
-//! | 10 | place, time, amplitude and phase are found, and all of it told | [`locate`], [`torque`], [`energy`], [`findings`], [`statements`], [`report`], [`answer`], [`law_report`], [`quantity`] |
+//! | 10 | place, time, amplitude and phase are found, and all of it told | [`locate`], [`torque`], [`energy`], [`findings`], [`altered`], [`statements`], [`report`], [`answer`], [`law_report`], [`quantity`] |
 //!
 //! The table of effects is [`effect`], every threshold stands in [`settings`], and [`plan`] asks the same before an experiment. A file imports only from files that
 //! stand before it: [`settings`], [`effect`], [`hypothesis`] and [`context`] import nothing of what follows.
 
 pub mod adequacy;
+pub mod altered;
 pub mod answer;
 pub mod bagging;
 pub mod base;

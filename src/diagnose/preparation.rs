@@ -11,7 +11,7 @@ use crate::fit::record::refuse_empty;
 use crate::fit::search::{End, best_robust_fit, observed_starts};
 use crate::fit::shooting::STATE_WINDOW_RAD;
 use crate::fit::whitening::{Colour, RecordNoise};
-use crate::fit::{Problem, Record, Seen, check_frequency};
+use crate::fit::{Problem, Record, Seen, check_angles, check_frequency};
 use crate::model::{Parameter, Work};
 use crate::progress::Silent;
 use crate::series::FEWEST_ROWS;
@@ -95,17 +95,33 @@ impl Prepared {
 /// those that the recordings' modes say.
 ///
 /// # Errors
-/// [`crate::error::Error::Table`] for a recording that swings at another pace than the specimen can; [`crate::error::Error::Simulation`] where the specimen
+/// [`crate::error::Error::Table`] for a recording that swings at another pace than the specimen can, or in angles that it cannot; [`crate::error::Error::Simulation`] where the specimen
 /// cannot swing, or no motion near any start follows the recordings.
 pub fn prepare(records: &[Record], experiment: &Experiment, settings: &Settings) -> Result<Prepared> {
+    let budget = settings.search.budget_of(experiment.model.effects.distributed_flexibility.is_some());
+    prepare_within(budget, records, experiment, settings)
+}
+
+/// The same for a search that may cost so much.
+///
+/// # Errors
+/// As [`prepare`].
+pub fn prepare_within(
+    budget: u64,
+    records: &[Record],
+    experiment: &Experiment,
+    settings: &Settings,
+) -> Result<Prepared> {
     refuse_empty(records)?;
     for record in records {
-        Seen::of(record).map_or(Ok(()), |seen| check_frequency(record, &seen, experiment))?;
+        if let Some(seen) = Seen::of(record) {
+            check_frequency(record, &seen, experiment)?;
+            check_angles(record, &seen, experiment)?;
+        }
     }
     let marks = records.first().map_or(0, Record::links);
     let base = stated(experiment, marks, DampingAssumption::AsStated);
     let noise_rad: Vec<Vec<f64>> = records.iter().map(noise_rad).collect();
-    let budget = settings.search.budget_of(experiment.model.effects.distributed_flexibility.is_some());
     let part = affordable_part(records, experiment, &base, (&noise_rad, budget), &settings.search)?;
     let most_work = (settings.search.shares.prepared * budget as f64) as u64;
     let early = if part < 1.0 { first_part(records, part) } else { records.to_vec() };

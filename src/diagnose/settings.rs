@@ -156,9 +156,6 @@ pub struct SearchSettings {
     pub fewest_pairs: usize,
     /// A pair that promises more than this many times the least χ² is not fitted (cost).
     pub promising: f64,
-    /// Of the largest error of the measurement that is possible, the part up to which one is usual, and what it explains is explained (statistics: two standard deviations
-    /// of three).
-    pub usual_error: f64,
     /// An effect that leaves less than this part of the base model's χ² leads the others (training bank)…
     pub leader_leaves: f64,
     /// … elsewhere, where a parameter of the base model differs by more than this part (training bank).
@@ -263,7 +260,7 @@ pub struct PriorSettings {
     pub not_compared: f64,
     /// A support in step with the swing is with these odds what it seems to be (training bank: four times out of five).
     pub support_in_step: f64,
-    /// Odds of a name that gains no more than the error of another name's law, of a support that gains little, and of an encoder's error beside which more than noise is left: their free numbers
+    /// Odds of a name that gains no more than the error of another name's law, of a support that gains little, and of an error of a sensor or a view, or a support in step with the swing, beside which more than noise is left: their free numbers
     /// complete any law that is only nearly right (training bank, of supports only).
     pub within_law_error: f64,
     /// That little, in standard deviations (training bank).
@@ -406,7 +403,6 @@ impl Default for SearchSettings {
             most_pairs: 20,
             fewest_pairs: 6,
             promising: 3.0,
-            usual_error: 2.0 / 3.0,
             leader_leaves: 0.5,
             elsewhere: 0.3,
             frequency_match_residual: 0.1,

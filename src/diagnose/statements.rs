@@ -2,6 +2,7 @@
 
 use std::fmt::Write;
 
+use super::altered;
 use super::effect::{Effect, Phase, Place};
 use super::findings::Findings;
 use super::grammar::Term;
@@ -37,7 +38,7 @@ impl Findings<'_> {
             }
             // names that leave no more than noise, and one of them for which another law does better
             Status::Unknown if verdict.probability > verdict.unknown => format!(
-                "Something is missing that is not in the table of effects ({sure}): effects of the table leave little more than noise, but with a law of no table in the place of one of them the recording is described better{}.",
+                "Something is missing that is not in the table of effects ({sure}): effects of the table leave little more than noise, but a law outside the table, in the place of one of them, describes the recording better{}.",
                 self.nearest()
             ),
             Status::Unknown => format!(
@@ -73,7 +74,7 @@ impl Findings<'_> {
                 }
             }
         };
-        statement + &self.law() + &reservation
+        statement + &self.law() + &reservation + &altered::statement(self.named(), &self.context.beliefs)
     }
 
     /// The names, what explains most first.

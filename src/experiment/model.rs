@@ -86,9 +86,9 @@ pub struct Effects {
     pub time_base: Option<f64>,
     /// Frames missing at one instant (s).
     pub dropped_frames: Option<f64>,
-    /// Common offset of both angles (rad).
+    /// Common offset of all angles (rad).
     pub camera_tilt: Option<f64>,
-    /// Common gain of both angles (1).
+    /// Common gain of all angles (1).
     pub angle_gain: Option<f64>,
     /// A camera that looks askew.
     pub camera_oblique: Option<ObliqueView>,

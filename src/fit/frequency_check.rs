@@ -6,6 +6,8 @@ use super::start_values::{slow_mode_hz, undamped};
 use super::{Record, Seen};
 use crate::error::{Error, Result};
 use crate::experiment::Experiment;
+use crate::model::modes::Mode;
+use crate::statistics::median;
 
 /// Below this share the air that swings along, a joint or a clock may be the reason: it is said beside them (judgement).
 const LARGE: f64 = 0.15;
@@ -25,8 +27,12 @@ const LENGTH_UNITS: [(f64, &str); 4] =
 const TIME_UNITS: [(f64, &str); 3] = [(1e6, "microseconds"), (1e3, "milliseconds"), (1.0 / 60.0, "minutes")];
 /// Frames per second of a slow-motion film, over those it plays at (judgement: what cameras usually offer).
 const SLOW_MOTIONS: [f64; 5] = [2.0, 4.0, 8.0, 16.0, 32.0];
-/// Angles of which one measured part in this of its own is the same as the model's (judgement).
+/// An angle whose median is nearer to 180° than this, and that is never as near to zero, swings about 180° (judgement).
+const UPWARD: f64 = 0.5;
+/// Ratios of amplitudes that differ by less than this share are the same (judgement).
 const SHAPE: f64 = 0.1;
+/// Angles swing together, or against each other, within this phase (rad; judgement).
+const IN_PHASE: f64 = 0.3;
 
 /// The frequencies of the slow mode, seen and modelled.
 #[derive(Debug, Clone, PartialEq)]
@@ -106,7 +112,7 @@ impl Pace {
         } else if let Some(frames) = SLOW_MOTIONS.iter().find(|frames| near(ratio, 1.0 / **frames)) {
             text += &format!(" (slow motion, played {frames} times slower?)");
         } else if let Some(frames) = SLOW_MOTIONS.iter().find(|frames| near(ratio, **frames)) {
-            text += &format!(" (every {frames}th frame kept, or a time lapse?)");
+            text += &format!(" (only one frame in {frames} kept, or a time lapse?)");
         }
         text +=
             &format!("; or gravity is {} m/s², not {}", digits(self.gravity_m_s2 * ratio * ratio), self.gravity_m_s2);
@@ -121,8 +127,15 @@ impl Pace {
 /// Before a fit: a recording whose pace no motion of the model comes near cannot be fitted.
 ///
 /// # Errors
-/// [`Error::Table`] with the factor, where nothing in the recording swings within a factor of five of the specimen.
+/// [`Error::Table`] with the factor, where nothing in the recording swings within a factor of five of the specimen; where angles are counted from the upward vertical.
 pub fn check_frequency(record: &Record, seen: &Seen, experiment: &Experiment) -> Result<()> {
+    if let Some(link) = (0..record.links()).find(|link| is_upward(record, *link)) {
+        let message = format!(
+            "cannot be fitted. θ{} swings about 180°: it is counted from the upward vertical, and freeswing wants angles from the downward one; subtract π",
+            link + 1
+        );
+        return Err(Error::Table { path: record.path.clone(), line: None, message });
+    }
     let Some(pace) = Pace::of(seen, experiment) else { return Ok(()) };
     let is_near = |hz: f64| (hz / pace.model_hz).ln().abs() < HOPELESS.ln();
     if pace.beyond_small || is_near(pace.seen_hz) || seen.peaks_hz.iter().any(|hz| is_near(*hz)) {
@@ -132,44 +145,68 @@ pub fn check_frequency(record: &Record, seen: &Seen, experiment: &Experiment) ->
     Err(Error::Table { path: record.path.clone(), line: None, message: message.trim_end_matches('.').to_owned() })
 }
 
+/// Whether an angle swings about 180°, never reaching the downward vertical.
+fn is_upward(record: &Record, link: usize) -> bool {
+    let mut sizes: Vec<f64> = record.theta_rad[link].iter().flatten().map(|angle| angle.abs()).collect();
+    let least = sizes.iter().copied().fold(f64::INFINITY, f64::min);
+    median(&mut sizes).is_some_and(|middle| (middle - PI).abs() < UPWARD && least > UPWARD)
+}
+
+/// Before a diagnosis: angles that no specimen as described can have in its slow mode, which would be taken for missing effects.
+///
+/// # Errors
+/// [`Error::Table`] where a sign is turned, columns are exchanged or angles are from one link to the next.
+pub fn check_angles(record: &Record, seen: &Seen, experiment: &Experiment) -> Result<()> {
+    let is_slow_mode = Pace::of(seen, experiment).is_some_and(|pace| (pace.ratio() - 1.0).abs() < NEAR);
+    let contradiction =
+        undamped(experiment).filter(|_| is_slow_mode).and_then(|modes| order(seen, modes.first()?, experiment));
+    contradiction.map_or(Ok(()), |found| {
+        let message = format!("cannot be diagnosed. {found} Mend the table, or the order of the links in the file");
+        Err(Error::Table { path: record.path.clone(), line: None, message })
+    })
+}
+
 /// What the angles of the slow mode say: degrees, a turned sign, columns that are swapped, angles from one link to the next.
 fn shape(seen: &Seen, experiment: &Experiment) -> Option<String> {
     let model = undamped(experiment)?;
-    let model = model.first()?;
-    degrees(seen, model.frequency_hz).or_else(|| {
-        let first = model.shape.first()?;
-        let modelled: Vec<f64> =
-            model.shape.iter().map(|c| c.amplitude / first.amplitude * (c.phase_rad - first.phase_rad).cos()).collect();
-        if experiment.model.effects.distributed_flexibility.is_some() || modelled.len() != seen.slow.shape.len() {
+    let slow = model.first()?;
+    degrees(seen, slow.frequency_hz).or_else(|| order(seen, slow, experiment))
+}
+
+/// A turned sign, columns that are swapped, angles from one link to the next.
+fn order(seen: &Seen, slow: &Mode, experiment: &Experiment) -> Option<String> {
+    let first = slow.shape.first()?;
+    let modelled: Vec<f64> =
+        slow.shape.iter().map(|c| c.amplitude / first.amplitude * (c.phase_rad - first.phase_rad).cos()).collect();
+    if experiment.model.effects.distributed_flexibility.is_some() || modelled.len() != seen.slow.shape.len() {
+        return None;
+    }
+    if seen.slow.amplitude_rad > FRAC_PI_2 {
+        return None;
+    }
+    (1..modelled.len()).find_map(|link| {
+        let (measured, ratio) = (seen.slow.shape[link], modelled[link]);
+        let (upper, lower) = (link, link + 1);
+        let near = |value: f64| (value / ratio - 1.0).abs() < SHAPE;
+        let size = measured.norm();
+        let against = (PI - measured.arg().abs()).abs() < IN_PHASE;
+        let together = measured.arg().abs() < IN_PHASE;
+        if against && ratio > 0.0 {
+            return Some(format!(
+                "In the slow mode θ1 and θ{lower} swing against each other, but the specimen as described swings together: the sign of one of the angles is turned."
+            ));
+        }
+        if !together || near(size) || modelled.len() > 2 {
             return None;
         }
-        if seen.slow.amplitude_rad > FRAC_PI_2 {
-            return None;
+        if near(1.0 / size) {
+            return Some(format!(
+                "In the slow mode θ{lower} is {size:.2} times θ{upper}, where the described specimen has {ratio:.2} times: the columns look swapped."
+            ));
         }
-        (1..modelled.len()).find_map(|link| {
-            let (measured, ratio) = (seen.slow.shape[link], modelled[link]);
-            let (upper, lower) = (link, link + 1);
-            let near = |value: f64| (value / ratio - 1.0).abs() < SHAPE;
-            let size = measured.norm();
-            let against = (PI - measured.arg().abs()).abs() < 0.3;
-            let together = measured.arg().abs() < 0.3;
-            if against && ratio > 0.0 {
-                return Some(format!(
-                    "In the slow mode θ1 and θ{lower} swing against each other, of the specimen together: the sign of one of the angles is turned."
-                ));
-            }
-            if !together || near(size) || modelled.len() > 2 {
-                return None;
-            }
-            if near(1.0 / size) {
-                return Some(format!(
-                    "In the slow mode θ{lower} is {size:.2} times θ{upper}, of the specimen {ratio:.2} times: the columns look swapped."
-                ));
-            }
-            near(1.0 + size).then(|| format!(
-                "In the slow mode θ{lower} is {size:.2} times θ{upper}, of the specimen {ratio:.2} times: θ{lower} looks like the angle from link to link; freeswing wants it from the vertical."
-            ))
-        })
+        near(1.0 + size).then(|| format!(
+            "In the slow mode θ{lower} is {size:.2} times θ{upper}, where the described specimen has {ratio:.2} times: θ{lower} looks like the angle from link to link; freeswing wants it from the vertical."
+        ))
     })
 }
 

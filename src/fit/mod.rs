@@ -29,6 +29,7 @@ pub mod descent;
 pub mod frequency_check;
 pub mod interval;
 pub mod noise;
+mod noise_beside_swing;
 pub mod observed_modes;
 pub mod predict;
 pub mod predictability;
@@ -50,7 +51,7 @@ use crate::statistics::median;
 
 pub use base::base_parameters;
 pub use descent::{Descent, Ending};
-pub use frequency_check::{Pace, check_frequency};
+pub use frequency_check::{Pace, check_angles, check_frequency};
 pub use interval::Estimate;
 pub use observed_modes::Seen;
 pub use predict::Prediction;
@@ -61,6 +62,10 @@ pub use verdict::Verdict;
 
 /// Residuals beyond this many standard deviations of their neighbours are outliers.
 const OUTLIER: f64 = 6.0;
+/// Scatter of a distance from what the values to one side say, over that from the middle of both sides (statistics: of normal noise).
+const SCATTER_AT_ENDS: f64 = 1.4;
+/// Where a larger part of the values are, that is how the noise is (judgement).
+const MOST_OUTLIERS: f64 = 0.1;
 
 /// A fitted model.
 #[derive(Debug, Clone)]
@@ -212,7 +217,7 @@ pub fn fit_watched(
 
 /// The recordings without values that stand out from their neighbours: whose residual is further from the median of three on each side
 /// than six robust standard deviations of that distance, here and in the recording as a whole. A misfit of the model is smooth in time and
-/// moves neighbours together. Where more than one value in fifty stands out, the noise is not normal, and none is left out.
+/// moves neighbours together. Where more than one value in ten stands out, that is how the noise is, and none is left out.
 pub(crate) fn without_outliers(problem: &Problem<'_>, x: &[f64]) -> Result<(Vec<Record>, Vec<Vec<Outlier>>)> {
     let mut kept = problem.records.to_vec();
     let mut outliers = vec![Vec::new(); kept.len()];
@@ -235,7 +240,7 @@ pub(crate) fn without_outliers(problem: &Problem<'_>, x: &[f64]) -> Result<(Vec<
 
 /// Rows whose residual stands out; the farthest first, as it moves its neighbours' medians.
 fn outlier_rows(mut own: Vec<(usize, f64)>) -> Vec<usize> {
-    let most = own.len() / 50;
+    let most = (MOST_OUTLIERS * own.len() as f64) as usize;
     let sizes: Vec<f64> = (0..own.len()).map(|i| apart(&own, i).abs()).collect();
     let scale = |sizes: &[f64]| 1.4826 * median(&mut sizes.to_vec()).unwrap_or(0.0);
     let everywhere = scale(&sizes);
@@ -254,14 +259,29 @@ fn outlier_rows(mut own: Vec<(usize, f64)>) -> Vec<usize> {
     }
 }
 
-/// How far a residual is from the median of the three before and the three after it; zero at the ends.
+/// How far a residual is from the median of the three before and the three after it; at the ends from the line through the medians of the three next to it and of the three
+/// beyond, over how much more that scatters; zero of so few.
 fn apart(own: &[(usize, f64)], i: usize) -> f64 {
-    if i < 3 || i + 3 >= own.len() {
-        return 0.0;
+    let median_of = |places: [usize; 3]| {
+        let mut few = places.map(|place| own[place].1);
+        few.sort_by(f64::total_cmp);
+        few[1]
+    };
+    let beyond = |next: [usize; 3], further: [usize; 3]| {
+        let (next, further) = (median_of(next), median_of(further));
+        (own[i].1 - next - (next - further) * 2.0 / 3.0) / SCATTER_AT_ENDS
+    };
+    if own.len() < 9 {
+        0.0
+    } else if i < 3 {
+        beyond([1, 2, 3].map(|k| i + k), [4, 5, 6].map(|k| i + k))
+    } else if i + 3 >= own.len() {
+        beyond([1, 2, 3].map(|k| i - k), [4, 5, 6].map(|k| i - k))
+    } else {
+        let mut near = [own[i - 3].1, own[i - 2].1, own[i - 1].1, own[i + 1].1, own[i + 2].1, own[i + 3].1];
+        near.sort_by(f64::total_cmp);
+        own[i].1 - 0.5 * (near[2] + near[3])
     }
-    let mut near = [own[i - 3].1, own[i - 2].1, own[i - 1].1, own[i + 1].1, own[i + 2].1, own[i + 3].1];
-    near.sort_by(f64::total_cmp);
-    own[i].1 - 0.5 * (near[2] + near[3])
 }
 
 fn residuals(problem: &Problem<'_>, x: &[f64], noise_rad: &[Vec<f64>]) -> Result<Vec<Residuals>> {

@@ -6,7 +6,7 @@ use super::shooting::{self, STATE_WINDOW_RAD, ShootingResult};
 use super::{Problem, Record, start_values, transformed};
 use crate::error::{Error, Result};
 use crate::experiment::{Experiment, Hysteresis, SupportMotion};
-use crate::model::Parameter;
+use crate::model::{Parameter, Work};
 use crate::progress::Progress;
 use crate::series::FEWEST_ROWS;
 
@@ -40,6 +40,10 @@ struct Search<'a, 's> {
     records: &'a [Record],
     free: &'s [Parameter],
     noise_rad: &'s [Vec<f64>],
+    /// What all of them have cost.
+    work: &'s Work,
+    /// What they may.
+    most_work: u64,
 }
 
 /// Where a descent ended.
@@ -55,10 +59,12 @@ pub struct End<'a> {
     pub begun: Experiment,
     /// Whether the descent from those values ended there, too.
     agreed: bool,
+    /// What it has cost.
+    cost: u64,
 }
 
-/// The best of the descents from the file's values, from those of the recordings' modes where these leave more than noise, and from those of a hysteresis. After so much
-/// work no other beginning is tried.
+/// The best of the descents from the file's values, from those of the recordings' modes where these leave more than noise, and from those of a hysteresis. No descent is begun
+/// that would lead beyond so much work.
 ///
 /// # Errors
 /// [`Error::Simulation`] where the specimen cannot swing, or no motion near any beginning follows the recordings.
@@ -70,17 +76,14 @@ pub fn best_robust_fit<'a>(
     progress: &dyn Progress,
 ) -> Result<End<'a>> {
     refuse_empty(records)?;
-    let search = Search { records, free, noise_rad };
-    let mut spent = 0;
+    let work = Work::default();
+    let search = Search { records, free, noise_rad, work: &work, most_work };
     let order = start_values::start_experiments(records, experiment, free);
     let (mut best, mut failed): (Option<End<'a>>, Option<Error>) = (None, None);
     for begun in &order {
-        if spent < most_work && search.may_find_more(best.as_ref()) {
+        if search.may_find_more(best.as_ref()) {
             match search.from(begun) {
-                Ok(end) => {
-                    spent += end.as_ref().map_or(0, |end| end.problem.work.done());
-                    best = better(best, end);
-                }
+                Ok(end) => best = better(best, end),
                 Err(error) => failed = failed.or(Some(error)),
             }
         }
@@ -96,7 +99,7 @@ pub fn best_robust_fit<'a>(
             best = better(best, Some(end));
         }
     }
-    if spent < most_work && search.may_find_more(best.as_ref()) {
+    if search.may_find_more(best.as_ref()) {
         let continued = best.as_ref().and_then(|end| search.continued(end));
         best = better(best, continued);
     }
@@ -129,7 +132,8 @@ pub fn descend(problem: &Problem<'_>, descent: &Descent, x: Vec<f64>) -> Option<
 
 impl<'a> Search<'a, '_> {
     fn from(&self, experiment: &Experiment) -> Result<Option<End<'a>>> {
-        let mut problem = Problem::new(self.records, experiment, self.free)?;
+        let before = self.work.done();
+        let mut problem = self.problem(experiment)?;
         // without parameters nothing but the starts is sought, which the recording shows
         let shot = if self.free.is_empty() {
             ShootingResult { x: observed_starts(&problem)?, noise: problem.noise.clone(), residuals: Vec::new() }
@@ -150,18 +154,29 @@ impl<'a> Search<'a, '_> {
             // a stop has a false minimum at every turn: no end is worse than where it could have begun
             end.cost > POOR_FIT * end.residuals() as f64 || problem.cost(&stated) < end.cost
         };
-        let again = !self.free.is_empty() && from_stretches.as_ref().is_none_or(is_astray);
+        let may_again = !self.free.is_empty() && self.allows(self.work.done() - before);
+        let again = may_again && from_stretches.as_ref().is_none_or(is_astray);
         let from_stated = if again { descend(&problem, &robust, stated) } else { None };
         let ends: Vec<Outcome> = [from_stretches, from_stated].into_iter().flatten().collect();
         let agreed = matches!(&ends[..], [one, other] if (one.cost - other.cost).abs() < BETTER * one.cost);
         let best = ends.into_iter().min_by(|a, b| a.cost.total_cmp(&b.cost));
         Ok(best.map(|outcome| {
             let (problem, outcome) = transformed::update_strip_modes(problem, &robust, outcome);
-            End { problem, outcome, shot, begun: experiment.clone(), agreed }
+            let cost = self.work.done() - before;
+            End { problem, outcome, shot, begun: experiment.clone(), agreed, cost }
         }))
     }
 
-    /// Whether another beginning may lead further: more is left than noise, and not because the model has no lower minimum, where two descents have met.
+    fn problem(&self, experiment: &Experiment) -> Result<Problem<'a>> {
+        Ok(Problem { work: self.work.clone(), ..Problem::new(self.records, experiment, self.free)? })
+    }
+
+    /// Whether as much work again as something has cost is allowed.
+    fn allows(&self, cost: u64) -> bool {
+        self.work.done().saturating_add(cost) <= self.most_work
+    }
+
+    /// Whether another beginning may lead further, and may be tried: more is left than noise, and not because the model has no lower minimum, where two descents have met.
     fn may_find_more(&self, end: Option<&End<'_>>) -> bool {
         let square = |r: &f64| r.abs().min(BOUND).powi(2);
         let mean = |values: &[f64]| values.iter().map(square).sum::<f64>() / values.len().max(1) as f64;
@@ -172,7 +187,7 @@ impl<'a> Search<'a, '_> {
                 mean(values) > LEFT || values.chunks_exact(IN_A_ROW).any(|few| mean(few) > LEFT_ANYWHERE)
             })
         };
-        end.is_none_or(|end| !end.agreed && of_recordings(&end.outcome))
+        end.is_none_or(|end| !end.agreed && self.allows(end.cost) && of_recordings(&end.outcome))
     }
 
     /// The experiment with a hysteresis in place of a part of its spring: of several the one that follows the beginning of the recordings best.
@@ -237,7 +252,7 @@ impl<'a> Search<'a, '_> {
         for frequency_hz in strongest_hz(&end) {
             let mut tried = end.begun.clone();
             tried.model.effects.support_motion = Some(SupportMotion { amplitude_m: 0.0, frequency_hz, phase_rad: 0.0 });
-            let mut problem = Problem::new(self.records, &tried, self.free)?;
+            let mut problem = self.problem(&tried)?;
             problem.noise.clone_from(&end.problem.noise);
             problem.accuracy = end.problem.accuracy;
             let mut x = problem.start_values()?;
@@ -248,7 +263,7 @@ impl<'a> Search<'a, '_> {
             let robust = Descent { damping: 1e-8, ..Descent::robust(30, 0.03) };
             let outcome = descend(&problem, &robust, x.clone());
             let shot = ShootingResult { x, ..end.shot.clone() };
-            ends.extend(outcome.map(|outcome| End { problem, outcome, shot, begun: tried, agreed: false }));
+            ends.extend(outcome.map(|outcome| End { problem, outcome, shot, begun: tried, agreed: false, cost: 0 }));
         }
         Ok(ends)
     }

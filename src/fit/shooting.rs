@@ -80,7 +80,6 @@ pub fn multiple_shooting(problem: &mut Problem<'_>) -> Result<ShootingResult> {
     let stretches = stretches(problem, PERIODS * std::f64::consts::TAU / characteristic_rad_s);
     let marks = problem.marks();
     let mut x = problem.start_values()?;
-    // wide enough to even out the noise, short enough for a cubic to follow the second mode
     let reach_s = STATE_WINDOW_RAD / characteristic_rad_s;
     let mut left: Vec<Vec<Vec<f64>>> = vec![vec![Vec::new(); marks]; problem.records.len()];
     for stretch in &stretches {
@@ -196,8 +195,13 @@ fn blocks(
     characteristic_rad_s: f64,
 ) -> Option<Vec<Block>> {
     let of = |index: usize| of_stretch(problem, stretches, index, x, seam, characteristic_rad_s);
-    let of_stretches: Option<Vec<_>> = (0..stretches.len()).into_par_iter().map(of).collect();
-    let seams_beside = of_stretches?.into_iter().flat_map(|(own, seam)| std::iter::once(own).chain(seam));
+    // all are asked, also where one gives nothing, so that the work done does not depend on which thread comes first
+    let of_stretches: Vec<_> = (0..stretches.len()).into_par_iter().map(of).collect();
+    let seams_beside = of_stretches
+        .into_iter()
+        .collect::<Option<Vec<_>>>()?
+        .into_iter()
+        .flat_map(|(own, seam)| std::iter::once(own).chain(seam));
     Some(problem.belief_block(x).into_iter().chain(seams_beside).collect())
 }
 

@@ -1,5 +1,6 @@
 //! Does the model reproduce the recording? The question the paper asks by eye (its Fig. 19), answered with numbers.
 
+use super::noise_beside_swing::noise_beside_swing;
 use super::{Ending, Fit, Residuals};
 use crate::model::Parameter;
 
@@ -154,13 +155,15 @@ impl Verdict {
         let (first_s, last_s) = stamps.fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), t| (a.min(t), b.max(t)));
         let count = (((last_s - first_s) / window_s).floor() as usize).max(1);
         let length_s = (last_s - first_s) / count as f64;
+        let of_link = residuals.values.iter().zip(&residuals.noise_rad);
+        let noise_rad: Vec<f64> = of_link.map(|(values, own)| noise_beside_swing(values, *own, length_s)).collect();
         let windows: Vec<Window> = (0..count)
             .map(|k| {
                 let (from_s, until_s) = (first_s + k as f64 * length_s, first_s + (k + 1) as f64 * length_s);
                 let link = |link: usize| {
                     let inside = |r: &&super::Residual| r.t_s >= from_s && (r.t_s < until_s || k + 1 == count);
                     let values: Vec<super::Residual> = residuals.values[link].iter().filter(inside).copied().collect();
-                    judge(&values, residuals.noise_rad[link], CHANCE / (count * links) as f64)
+                    judge(&values, noise_rad[link], CHANCE / (count * links) as f64)
                 };
                 Window { from_s, until_s, links: (0..links).map(link).collect() }
             })

@@ -91,7 +91,9 @@ impl Response {
         let strip = &setup.strip;
         let mesh = Mesh::of(strip, Mesh::ELEMENTS);
         let rest = Rest::of(strip, &mesh, &Free)?;
-        let unstable = || Error::Simulation { detail: "the strip's rest is not stable".into() };
+        let unstable = || Error::Simulation {
+            detail: "the strip's rest is not stable; check its mass, stiffness, curl_per_m and rig.support".into(),
+        };
         let vibration = rest.vibration().filter(|v| v.squares_rad2_s2[0] > 0.0).ok_or_else(unstable)?;
         let beam = setup.beam(power_w, distance_m);
         let (_, lit) = Lit::rest(strip, &mesh, beam, setup.film, Parts::ALL)?;

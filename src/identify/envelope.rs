@@ -11,7 +11,7 @@
 //! ```text
 //! dφ/dt = 2πf₀ (1 − κA² − κ'A'²)              κ = 1/16 for a rigid pendulum; A' belongs to the other mode
 //! d ln A/dt = −σ₀ (1 + λA² + λ'A'²)           a linear damper on a swing of finite size
-//! dA/dt = −(b₀ + b₁A + b₂A²)                  friction, viscous, quadratic (physics.md)
+//! dA/dt = −(b₀ + b₁A + b₂A²)                  friction, viscous, quadratic
 //! ```
 //! The first two give f₀ and ξ₀ at small amplitude. Where the windows are too few or too much alike to tell how amplitude acts, it is bounded by what
 //! hung bodies do: κ = 0.03 ± 0.03 for the slowest mode, 0.4 ± 0.5 for faster ones, κ' = 0 ± 0.1, λ = 0 ± 0.15 and 0 ± 0.5, λ' = 0 ± 0.3 /rad² (one standard deviation)

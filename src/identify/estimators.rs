@@ -250,6 +250,9 @@ impl Estimators {
 /// How much less exactly than that at the record's own amplitudes the frequency at small amplitude may be known, to be told in its place.
 const WIDEST_LAW: f64 = 5.0;
 
+/// Below the last amplitude seen the frequency may change so many times as much as the square of the amplitude makes it (judgement: its next power may do as much).
+const UNKNOWN_LAW: f64 = 2.0;
+
 /// How far from the frequency of its nearest step, and how wide, relative to it, f₀ may be: a pendulum released at 145° has 0.5 f₀.
 const FARTHEST_LAW: f64 = 0.5;
 
@@ -343,6 +346,20 @@ impl Choice {
             frequency_hz: relatively_blurred(self.frequency_hz, Bounds::OTHER.kappa[1] * slowest_rad * third_rad),
             damping_ratio: self.damping_ratio.blurred(exchanged),
             basis: format!("{}; widened: what swings three times as fast exchanges energy with it", self.basis),
+            ..self
+        }
+    }
+
+    /// At small amplitude, where a stiffness whose law nobody knows changes the frequency: κ of the amplitudes seen tells little of that below the last of them.
+    pub fn widened_for_unknown_law(self, law: &FrequencyLaw, last_rad: f64) -> Self {
+        if !self.at_small_amplitude {
+            return self;
+        }
+        let change = UNKNOWN_LAW * law.kappa_per_rad2.value.abs() * last_rad * last_rad * law.f0_hz.value;
+        let [low, high] = [-change, change].map(|change| self.frequency_hz.value + change);
+        Self {
+            frequency_hz: self.frequency_hz.widened_to_cover(low.max(0.0), high),
+            basis: format!("{}; widened: a nonlinear stiffness is at work, and no smaller swing was seen", self.basis),
             ..self
         }
     }

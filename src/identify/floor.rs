@@ -6,9 +6,7 @@ use serde::Serialize;
 use super::estimate::Estimate;
 use crate::experiment::Specimen;
 use crate::model::chain::Chain;
-
-/// First zero of the Bessel function J₀.
-const BESSEL_ZERO: f64 = 2.404_825_557_695_773;
+use crate::model::modes::{limp_frequency_hz, rigid_frequency_hz};
 
 /// How near the frequency of a weight on a thread one must lie for that to hang there: a length to the weight's middle that is stated to some per cent, a swing of 30°.
 const LIKE_A_WEIGHT: f64 = 0.03;
@@ -54,7 +52,8 @@ impl Floor {
     pub fn of(specimen: &Specimen, chain: &Chain, gravity_m_s2: f64, frequency_hz: Estimate) -> Self {
         let length_m: f64 = chain.links().iter().map(|l| l.length_m).sum();
         let (body, floor_hz, rigid_hz) = if specimen.links.is_empty() {
-            ("the limp strip", limp_strip_hz(length_m, gravity_m_s2), Some(rigid_strip_hz(length_m, gravity_m_s2)))
+            let rigid_hz = rigid_frequency_hz(length_m, gravity_m_s2);
+            ("the limp strip", limp_frequency_hz(0, length_m, gravity_m_s2), Some(rigid_hz))
         } else {
             ("the given links with free joints", lowest_chain_hz(chain, gravity_m_s2), None)
         };
@@ -89,16 +88,6 @@ impl Floor {
         };
         Self { body, floor_hz, rigid_hz, below, remedy, statement }
     }
-}
-
-/// A hanging chain of uniform mass.
-pub fn limp_strip_hz(length_m: f64, gravity_m_s2: f64) -> f64 {
-    BESSEL_ZERO / (2.0 * std::f64::consts::TAU) * (gravity_m_s2 / length_m).sqrt()
-}
-
-/// A uniform rod hung at its end.
-pub fn rigid_strip_hz(length_m: f64, gravity_m_s2: f64) -> f64 {
-    (1.5 * gravity_m_s2 / length_m).sqrt() / std::f64::consts::TAU
 }
 
 /// The slowest mode of a chain whose joints are free.
@@ -147,8 +136,8 @@ mod tests {
 
     #[test]
     fn the_strips_have_the_frequencies_of_the_handbook() {
-        assert!((limp_strip_hz(0.2, 9.81) - 1.3403).abs() < 5e-5);
-        assert!((rigid_strip_hz(0.2, G) - 1.3649).abs() < 5e-5);
+        assert!((limp_frequency_hz(0, 0.2, 9.81) - 1.3403).abs() < 5e-5);
+        assert!((rigid_frequency_hz(0.2, G) - 1.3649).abs() < 5e-5);
         let rods = Chain::of(&Specimen::default()).unwrap();
         assert!((lowest_chain_hz(&rods, 9.81) - 1.3489).abs() < 5e-5);
     }
@@ -159,7 +148,7 @@ mod tests {
         let chain = Chain::of(&rod).unwrap();
         let shape = [Complex::new(1.0, 0.0)];
         let kappa = |hz: f64| amplitude_dependence(&chain, G, hz, &shape);
-        let own_hz = rigid_strip_hz(0.6, G);
+        let own_hz = rigid_frequency_hz(0.6, G);
         assert!((kappa(own_hz) - 1.0 / 16.0).abs() < 1e-3);
         // the weight hangs lower than the rod's middle, and swings more slowly
         assert_eq!(kappa(0.82 * own_hz), 1.0 / 16.0);
@@ -171,7 +160,7 @@ mod tests {
     fn many_links_approach_the_limp_strip() {
         let strip = Specimen { link_lengths_m: vec![0.01; 20], ..Specimen::default() };
         let many = lowest_chain_hz(&Chain::of(&strip).unwrap(), G);
-        assert!((many / limp_strip_hz(0.2, G) - 1.0).abs() < 1e-3, "{many}");
+        assert!((many / limp_frequency_hz(0, 0.2, G) - 1.0).abs() < 1e-3, "{many}");
     }
 
     #[test]
@@ -181,8 +170,8 @@ mod tests {
         let low = Floor::of(&strip, &chain, G, Estimate::new(0.5156, 0.001, 100.0));
         let remedy = low.remedy.unwrap();
         assert!(low.below && (remedy.time - 0.5156 / 1.3400).abs() < 1e-4);
-        assert!((limp_strip_hz(0.2 * remedy.length, G) - 0.5156).abs() < 1e-9);
-        assert!((limp_strip_hz(0.2, G * remedy.gravity) - 0.5156).abs() < 1e-9);
+        assert!((limp_frequency_hz(0, 0.2 * remedy.length, G) - 0.5156).abs() < 1e-9);
+        assert!((limp_frequency_hz(0, 0.2, G * remedy.gravity) - 0.5156).abs() < 1e-9);
         let sound = Floor::of(&strip, &chain, G, Estimate::new(1.3400, 0.001, 100.0));
         assert!(!sound.below && sound.remedy.is_none());
     }

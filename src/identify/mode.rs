@@ -11,6 +11,7 @@ use super::estimate::{Estimate, probability};
 use super::estimators::{Estimator, Estimators, LARGEST_HARMONIC, Whole, is_on_third_harmonic};
 use super::floor::amplitude_dependence;
 use super::modulated::Modulated;
+use super::pendulum::SCALE;
 use super::windows::Windows;
 use crate::model::chain::Chain;
 use crate::series::Measured;
@@ -24,6 +25,17 @@ const FASTEST_SWING_HZ: f64 = 15.8;
 const LOCKED: f64 = 0.06;
 /// The third harmonic of a swing is at most this many times that of a chain without resonance (judgement).
 const RESONANCE: f64 = 2.0;
+
+/// How a frequency goes with amplitude, of one oscillation over the record where that describes it, else through the windows.
+fn frequency_law(modulated: Option<&Modulated>, envelope: Option<&Envelope>) -> Option<FrequencyLaw> {
+    modulated.map(|own| own.frequency).or_else(|| envelope.and_then(|own| own.frequency))
+}
+
+/// Whether neither gravity nor a linear spring beside it, which leaves κ gravity's share of the stiffness, makes a frequency go with amplitude so.
+fn is_beyond_springs(law: &FrequencyLaw, expected_kappa: f64) -> bool {
+    let (kappa, tolerance) = (law.kappa_per_rad2, THEORY_TOLERANCE * expected_kappa.abs());
+    kappa.low > expected_kappa + tolerance || kappa.high < -tolerance
+}
 
 /// One link's part in a mode.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
@@ -104,22 +116,31 @@ impl Mode {
             .choose(whole, envelope.as_ref(), damping_trend, &amplitudes_rad, mode)
             .widened_for_harmonic(whole.fit, mode)
             .widened_for_resonance(whole, mode);
+        let expected_kappa_per_rad2 = match whole.measured {
+            Measured::Angles => expected_kappa(&shape, choice.frequency_hz.value, chain, gravity_m_s2),
+            // nobody knows what angle it is of
+            Measured::Displacement => None,
+        };
+        let last_rad = whole.fit.last_amplitude_rad(mode, duration_s);
+        let law = frequency_law(whole.modulated, envelope.as_ref());
+        let choice = match law.zip(expected_kappa_per_rad2) {
+            Some((law, expected)) if is_beyond_springs(&law, expected) => {
+                choice.widened_for_unknown_law(&law, last_rad)
+            }
+            _ => choice,
+        };
         let raw = estimators.raw;
         Self {
             number: mode + 1,
             rms_rad: whole.fit.strength(mode, duration_s).sqrt(),
             damping_trend,
-            expected_kappa_per_rad2: match whole.measured {
-                Measured::Angles => expected_kappa(&shape, choice.frequency_hz.value, chain, gravity_m_s2),
-                // nobody knows what angle it is of
-                Measured::Displacement => None,
-            },
+            expected_kappa_per_rad2,
             measured: whole.measured,
             frequency_hz: choice.frequency_hz,
             frequency_at_amplitude_rad: choice.frequency_at_rad,
             damping: Damping::of(choice.damping_ratio, &raw[1], duration_s),
             basis: choice.basis,
-            seen_down_to_rad: choice.at_small_amplitude.then(|| whole.fit.last_amplitude_rad(mode, duration_s)),
+            seen_down_to_rad: choice.at_small_amplitude.then_some(last_rad),
             may_be_harmonic: may_be_harmonic(whole, mode),
             shape,
             residual_excess: estimators.residual_excess,
@@ -153,6 +174,9 @@ impl Mode {
     /// The frequency at small amplitude; where the data do not tell how it depends on amplitude, with this κ.
     pub fn small_amplitude_hz(&self, kappa_per_rad2: f64) -> Estimate {
         match self.frequency_law() {
+            Some(law) if self.expected_kappa_per_rad2.is_some_and(|own| is_beyond_springs(&law, own)) => {
+                self.frequency_hz
+            }
             Some(law) => law.f0_hz,
             None => {
                 let amplitude_rad = self.amplitude_rad();
@@ -170,8 +194,7 @@ impl Mode {
 
     /// How its frequency goes with amplitude, where the data tell it.
     pub(super) fn frequency_law(&self) -> Option<FrequencyLaw> {
-        let of_windows = || self.envelope.as_ref().and_then(|e| e.frequency);
-        self.modulated.as_ref().map(|own| own.frequency).or_else(of_windows)
+        frequency_law(self.modulated.as_ref(), self.envelope.as_ref())
     }
 
     /// κ against that of gravity alone.
@@ -205,8 +228,12 @@ impl Mode {
             };
             Some(format!("f = f₀(1 − κA²) has {measured}, gravity alone makes {expected:.4}: {cause}{scale}"))
         } else if !k.holds(0.0) && k.half() < 0.5 * expected.abs() {
-            let how = if k.holds(expected) {
+            // a little more or less is in the scale of any angle; of a chain further modes change κ, too
+            let is_usual_scale = times(k.high) > 1.0 - SCALE && times(k.low) < 1.0 + SCALE;
+            let how = if k.holds(expected) || is_usual_scale {
                 format!("as gravity makes it ({measured}, expected {expected:.4})")
+            } else if self.shape.len() > 1 {
+                format!("about as gravity makes it ({measured}, expected {expected:.4} of this mode alone)")
             } else {
                 format!(
                     "about as gravity makes it ({measured}, expected {expected:.4}; both agree if the true angles are {:.3} × the stated ones: are they measured from the hinge?)",

@@ -12,7 +12,7 @@ use nalgebra::DMatrix;
 use super::envelope::PENDULUM;
 
 /// Standard deviation of the scale of an angle (judgement): of an arc's centre from a few degrees of swing, or of a camera turned aside by ten degrees.
-const SCALE: f64 = 0.02;
+pub const SCALE: f64 = 0.02;
 
 /// Mean and standard deviation of k by gravity alone. It goes with the square of the angle.
 pub fn by_gravity(amplitude_rad: f64) -> [f64; 2] {

@@ -100,7 +100,8 @@ impl Smoothed {
         let settled = self.settled();
         let turned_s = settled.checked_sub(1).map(|k| self.t_s[k]);
         let resting_rad = median(&mut self.theta_rad.get(settled..).unwrap_or_default().to_vec());
-        let wide_s = resting_rad.filter(|_| chain).and_then(|resting_rad| {
+        // what has turned over comes down from the top, where its frequency changes from swing to swing
+        let wide_s = resting_rad.filter(|_| chain || turned_s.is_some()).and_then(|resting_rad| {
             let beyond = self.theta_rad[settled..].iter().rposition(|a| (a - resting_rad).abs() > FRAC_PI_2);
             beyond.map(|k| self.t_s[settled + k])
         });
@@ -134,9 +135,10 @@ mod tests {
     #[test]
     fn a_link_that_turns_over_is_named_with_the_time_that_ends_it() {
         let found = Tumbling::of(&signal(&[&whirl_then_swing])).unwrap();
-        // a full turn before 30.5 rad
-        assert!(found.turned_until_s.is_some() && (7.9..8.4).contains(&found.last_s), "{found:?}");
-        assert!(found.swings_from_s.unwrap() > found.last_s && found.statement.contains("--from 8."), "{found:?}");
+        // a full turn before 30.5 rad, and beyond 90° from 30 rad
+        assert!((7.9..8.4).contains(&found.turned_until_s.unwrap()), "{found:?}");
+        assert!((9.4..9.6).contains(&found.last_s), "{found:?}");
+        assert!(found.swings_from_s.unwrap() > found.last_s && found.statement.contains("--from 9.4"), "{found:?}");
     }
 
     #[test]

@@ -131,6 +131,9 @@ impl WarmFilm {
 
     /// The values that are the film's typical ones, in words; nothing where all are stated.
     pub fn assumed(heat: &Heat) -> Vec<&'static str> {
+        // of a film that keeps its modulus there is no value to take
+        let softens = heat.film.is_some_and(|film| Typical::of(film).modulus_change_per_k != 0.0);
+        let modulus = softens.then_some(("modulus_change_per_k", heat.modulus_change_per_k));
         let keys = [
             ("heat_capacity_j_kg_k", heat.heat_capacity_j_kg_k),
             ("conductivity_w_m_k", heat.conductivity_w_m_k),
@@ -138,7 +141,7 @@ impl WarmFilm {
             ("emissivity_front", heat.emissivity_front),
             ("emissivity_back", heat.emissivity_back),
         ];
-        keys.into_iter().filter(|(_, value)| value.is_none()).map(|(key, _)| key).collect()
+        keys.into_iter().chain(modulus).filter(|(_, value)| value.is_none()).map(|(key, _)| key).collect()
     }
 
     /// e of a face (W/m²).

@@ -162,7 +162,10 @@ impl<'a> Run<'a> {
         while !(self.place.t_s >= until_s) {
             self.steps += 1;
             if self.steps > self.accuracy.most_steps {
-                let detail = format!("more than {} steps up to t = {:.4} s", self.accuracy.most_steps, self.place.t_s);
+                let detail = format!(
+                    "more than {} steps up to t = {:.4} s; shorten the recording, or lower the largest coefficient of [model]",
+                    self.accuracy.most_steps, self.place.t_s
+                );
                 return Err(Error::Simulation { detail });
             }
             if let Some(step) = self.advance(until_s)? {

@@ -110,9 +110,9 @@ pub enum Parameter {
     ViewShear,
     /// Of the error of an encoder.
     Encoder(EncoderShape),
-    /// θ₂ is sampled later than θ₁.
+    /// All angles but θ₁ are sampled later than that.
     DifferentialLag,
-    /// Offset of θ₂ over that of θ₁.
+    /// Offset of all angles but θ₁.
     DifferentialZero,
     /// Of a law that the file states.
     Law(LawCoefficient),

@@ -66,19 +66,6 @@ impl View {
         let (sin, cos) = theta_rad.sin_cos();
         [(1.0 + self.stretch) * sin, cos + self.shear * sin]
     }
-
-    /// The angle between the line of sight and the perpendicular to the plane of the swing, if it were that and nothing else: of the plane's two principal
-    /// scales in the picture one is cos of it times the other,
-    ///
-    /// ```text
-    /// cos α + 1/cos α = ((1 + s)² + b² + 1)/(1 + s)
-    /// ```
-    pub fn askew_rad(&self) -> f64 {
-        let determinant = (1.0 + self.stretch).max(1e-9);
-        let sum = (determinant * determinant + self.shear * self.shear + 1.0) / determinant;
-        let half = (0.5 * sum).max(1.0);
-        (half - (half * half - 1.0).sqrt()).acos()
-    }
 }
 
 #[cfg(test)]
@@ -134,7 +121,5 @@ mod tests {
             let seen = along(right).atan2(along(below));
             assert!((view.angle_rad(theta) - seen).abs() < 1e-12, "{theta}");
         }
-        assert!((view.askew_rad().cos() - aside.cos() * down.cos()).abs() < 1e-12);
-        assert_eq!(View::default().askew_rad(), 0.0);
     }
 }

@@ -26,8 +26,8 @@ const STRETCHES: usize = 2;
 const EVEN: f64 = 0.1;
 /// Differences beyond this many robust standard deviations are outliers'.
 const APART: f64 = 6.0;
-/// Where more than this part stands apart, that is how the noise is.
-const MOST_APART: f64 = 0.1;
+/// Where more than this part stands apart, that is how the noise is: one value in ten, which is in three second differences.
+const MOST_APART: f64 = 0.3;
 /// An exact table still has the digits it was written with.
 pub const LEAST_RAD: f64 = 1e-9;
 /// An angle is in steps where it has so many rows for every value that occurs…

@@ -33,9 +33,9 @@ pub enum Effect {
     CameraOblique,
     /// An encoder off its axis, or askew on it.
     EncoderError,
-    /// θ₂ is sampled later than θ₁.
+    /// All angles but θ₁ are sampled later than that.
     DifferentialLag,
-    /// An offset of θ₂ that θ₁ does not have.
+    /// An offset of all angles but θ₁.
     DifferentialZero,
     /// Viscous friction of the hinge.
     HingeViscous,

@@ -4,7 +4,6 @@
 //! likelier than another: the size ρ is the root of the sum of their squares, and the direction any, of an area 8π² ρ⁴/3.
 
 use super::super::effect::Effect;
-use super::super::misfit::chi2_noise_limit;
 use super::super::refit::Refit;
 use super::super::settings::{PriorSettings, Settings};
 use super::{Coefficients, FARTHEST, Law};
@@ -37,8 +36,7 @@ impl Law for EncoderError {
 
     /// Its five free numbers complete any law that is only nearly right: where more than noise is left, something else is at work, and may be all.
     fn odds(&self, fit: &Refit<'_>, _others: &[&Refit<'_>], settings: &Settings) -> f64 {
-        let is_all = fit.chi2 < chi2_noise_limit(fit.values(), &settings.misfit);
-        if is_all { 1.0 } else { settings.prior.within_law_error }
+        super::odds_of_what_completes_a_law(fit, settings)
     }
 
     fn is_possible(&self, fit: &Refit<'_>, prior: &PriorSettings) -> bool {

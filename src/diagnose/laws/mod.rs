@@ -23,7 +23,7 @@ use rayon::prelude::*;
 
 use super::context::FitContext;
 use super::effect::Effect;
-use super::misfit::Misfit;
+use super::misfit::{Misfit, leaves_only_noise};
 use super::refit::Refit;
 use super::screen::{Score, Screen};
 use super::settings::{PriorSettings, Settings};
@@ -44,8 +44,9 @@ pub struct FitRequest<'q, 'a> {
     pub misfit: Misfit,
 }
 
-/// Standard deviations of what a sensor or a set-up errs beyond which it is none of its errors (statistics): a torque that changes the frequency with the amplitude looks like one.
-const FARTHEST: f64 = 3.0;
+/// Standard deviations of what a sensor or a set-up errs beyond which it is none of its errors (statistics): a torque that changes the frequency with the amplitude looks
+/// like one, and so do two links that are a bending strip (a gain of 0.16 and of 0.18).
+const FARTHEST: f64 = 2.0;
 
 /// Value and standard deviation of each coefficient of a fit.
 pub type Coefficients<'c> = dyn Fn(Parameter) -> (f64, f64) + 'c;
@@ -104,6 +105,11 @@ pub trait Law: Sync {
     fn odds(&self, _fit: &Refit<'_>, _others: &[&Refit<'_>], _settings: &Settings) -> f64 {
         1.0
     }
+}
+
+/// The odds of an error whose free numbers complete any law that is only nearly right: small where more than noise is left beside it.
+fn odds_of_what_completes_a_law(fit: &Refit<'_>, settings: &Settings) -> f64 {
+    if leaves_only_noise(fit, &settings.misfit) { 1.0 } else { settings.prior.within_law_error }
 }
 
 /// The law of an effect.

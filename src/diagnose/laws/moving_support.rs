@@ -70,7 +70,7 @@ impl Law for MovingSupport {
         (std::f64::consts::TAU * amplitude_m.abs()).ln() + settings.frequencies.ln()
     }
 
-    /// In step with the swing it can be what it seems to be, or stand for a torque that is not known.
+    /// In step with the swing it can be what it seems to be, or stand for a torque that is not known; beside that it leaves more than noise.
     fn odds(&self, fit: &Refit<'_>, others: &[&Refit<'_>], settings: &Settings) -> f64 {
         let Some(hz) = fit.value(Parameter::SupportFrequency) else { return 1.0 };
         let prior = &settings.prior;
@@ -82,7 +82,11 @@ impl Law for MovingSupport {
         }
         let Some(base) = fit_of(&Hypothesis::default()) else { return 1.0 };
         let powers = chord_powers(base);
-        let synchronous = if is_in_step(&powers, hz) { prior.support_in_step } else { 1.0 };
+        let synchronous = if is_in_step(&powers, hz) {
+            prior.support_in_step.min(super::odds_of_what_completes_a_law(fit, settings))
+        } else {
+            1.0
+        };
         synchronous * chance_of_multiple(&powers, hz).map_or(1.0, |chance| chance / (1.0 + chance))
     }
 }

@@ -5,9 +5,12 @@
 
 use super::super::effect::Effect;
 use super::super::refit::Refit;
-use super::super::settings::PriorSettings;
+use super::super::settings::{PriorSettings, Settings};
 use super::{Coefficients, FARTHEST, Law};
 use crate::model::Parameter;
+
+/// Of the larger of a gain and a stretch the part up to which their sum is next to none (judgement: chance does that once in ten times).
+const UNDONE: f64 = 0.25;
 
 /// A camera that looks askew.
 pub struct ObliqueView;
@@ -39,10 +42,22 @@ impl Law for ObliqueView {
         let size = |parameter| fit.value(parameter).unwrap_or(0.0);
         size(Parameter::ViewStretch).hypot(size(Parameter::ViewShear)) < FARTHEST * prior.view
     }
+
+    fn odds(&self, fit: &Refit<'_>, _others: &[&Refit<'_>], settings: &Settings) -> f64 {
+        super::odds_of_what_completes_a_law(fit, settings)
+    }
 }
 
 impl Law for WrongScale {
     fn is_possible(&self, fit: &Refit<'_>, prior: &PriorSettings) -> bool {
         fit.value(Parameter::AngleGain).is_none_or(|gain| gain.abs() < FARTHEST * prior.view)
+    }
+
+    /// A gain and a stretch that undo each other leave only what they do to large angles, which a torque does, too.
+    fn odds(&self, fit: &Refit<'_>, _others: &[&Refit<'_>], settings: &Settings) -> f64 {
+        let [gain, stretch] = [Parameter::AngleGain, Parameter::ViewStretch].map(|p| fit.value(p).unwrap_or(0.0));
+        let undone = (gain + stretch).abs() < UNDONE * gain.abs().max(stretch.abs());
+        let alone = super::odds_of_what_completes_a_law(fit, settings);
+        if undone { alone.min(settings.prior.within_law_error) } else { alone }
     }
 }

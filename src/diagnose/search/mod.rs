@@ -44,7 +44,7 @@ use super::misfit::{Misfit, leaves_more_than_noise};
 use super::preparation::Prepared;
 use super::refit::{Refit, best, least, least_chi2, merged};
 use super::screen::{Score, Screen};
-use super::settings::{PriorSettings, Settings};
+use super::settings::Settings;
 use crate::error::Result;
 use crate::experiment::Experiment;
 use crate::progress::Progress;
@@ -424,16 +424,10 @@ impl<'a, 'p> Search<'a, 'p> {
         Misfit::of(&self.context, self.base(), &self.scores)
     }
 
-    /// How much the best fit lacks, of those that need no unusual error of the measurement: a gain of 0.18 makes two links of a bending strip, and is none that anybody
-    /// sets up.
+    /// How much the best fit lacks, of those that need no unusual error of the measurement.
     fn misfit(&self) -> Option<Misfit> {
-        let Settings { prior, search, .. } = self.context.settings;
-        let usual = PriorSettings {
-            view: search.usual_error * prior.view,
-            encoder_rad: search.usual_error * prior.encoder_rad,
-            ..prior.clone()
-        };
-        let foremost = best(&self.fits, 1, |fit| is_possible(fit, &usual), |fit| fit.chi2);
+        let prior = &self.context.settings.prior;
+        let foremost = best(&self.fits, 1, |fit| is_possible(fit, prior), |fit| fit.chi2);
         foremost.first().map(|i| Misfit::of(&self.context, &self.fits[*i], &[]))
     }
 }

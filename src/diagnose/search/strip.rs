@@ -11,7 +11,7 @@ use rayon::prelude::*;
 use super::super::effect::{BendingStrip, Effect, bending_n_m2};
 use super::super::hypothesis::Hypothesis;
 use super::super::laws::bending;
-use super::super::preparation::{Prepared, prepare};
+use super::super::preparation::{Prepared, prepare_within};
 use super::super::refit::{Refit, least};
 use super::Search;
 use super::proposal::Proposal;
@@ -31,9 +31,10 @@ impl<'a> Search<'a, '_> {
         let settings = self.context.settings;
         let mut experiment = self.context.experiment.clone();
         experiment.model.effects.distributed_flexibility = Some(stated);
-        let strip = prepare(records, &experiment, settings).ok().and_then(|prepared| {
-            // the search that led here has had its own
-            let prepared = kept.get_or_init(|| Prepared { budget: settings.search.budget, ..prepared });
+        // with what the search that led here has left
+        let budget = settings.search.budget.saturating_sub(self.context.work.done());
+        let strip = prepare_within(budget, records, &experiment, settings).ok().and_then(|prepared| {
+            let prepared = kept.get_or_init(|| prepared);
             let taken = prepared.initial_damping();
             Self::of_base_model(prepared, &prepared.experiment, taken, settings, self.progress).ok()
         });
@@ -42,6 +43,8 @@ impl<'a> Search<'a, '_> {
             self.stopped_early = false;
             self.end();
         }
+        // beside what explains little elsewhere, a strip whose base model takes all the work is not searched
+        let strip = strip.filter(|strip| is_found || strip.context.work.done() < budget);
         let rival_residual = least(&self.fits).filter(|_| !is_found).map(Refit::relative_residual);
         strip.map(|strip| Self { rival_residual, ..strip })
     }

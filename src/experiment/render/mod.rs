@@ -69,7 +69,7 @@ pub struct Render {
     pub noise: Noise,
     /// Radial distortion.
     pub lens: Option<Lens>,
-    /// Roll of the camera: the scene turns anticlockwise about the hinge, adding to both angles.
+    /// Roll of the camera: the scene turns anticlockwise about the hinge, adding to all angles.
     pub tilt_rad: f64,
     /// Rolling shutter: time from a row to the next below; the stamp is that of the middle row.
     pub row_time_s: f64,

@@ -10,7 +10,7 @@
 //! | [`outside`] | `side_force`, `support_motion`, nodal forces |
 //!
 //! `distributed_flexibility` is a chain of more links, see [`Chain::of`](super::Chain::of). Camera effects (`time_base`, `dropped_frames`,
-//! `camera_tilt`, `angle_gain`, `camera_oblique`, `differential_lag`, `differential_zero`) change the observation, not the motion.
+//! `camera_tilt`, `angle_gain`, `camera_oblique`, `encoder_error`, `differential_lag`, `differential_zero`) change the observation, not the motion.
 
 pub mod air;
 pub mod bearing;

@@ -41,8 +41,9 @@ impl<'a> Motion<'a> {
     /// [`Error::Simulation`] where the rest is not stable.
     pub fn of(rest: &'a Rest, load: &'a dyn Load, modes: usize, damping_ratio: f64) -> Result<Self> {
         let vibration = rest.vibration().filter(|v| v.squares_rad2_s2.first().is_some_and(|square| *square > -1e-9));
-        let vibration =
-            vibration.ok_or_else(|| Error::Simulation { detail: "the strip's rest is not stable".into() })?;
+        let vibration = vibration.ok_or_else(|| Error::Simulation {
+            detail: "the strip's rest is not stable; check its mass, stiffness, curl_per_m and rig.support".into(),
+        })?;
         let modes = modes.min(vibration.shapes.ncols());
         let shapes = vibration.shapes.columns(0, modes).into_owned();
         let omega = DVector::from_fn(modes, |k, _| vibration.squares_rad2_s2[k].max(0.0).sqrt());
@@ -146,7 +147,9 @@ impl<'a> Motion<'a> {
             force -= &self.at_support * (stiffness_n_m_per_rad * (angle - strip.support_angle_rad));
         }
         force -= self.damping_per_s.component_mul(rates);
-        let lost = || Error::Simulation { detail: "the strip's motion cannot be followed".into() };
+        let lost = || Error::Simulation {
+            detail: "the strip's motion cannot be followed; lower the load or the release".into(),
+        };
         mass.cholesky().map(|factor| factor.solve(&force)).filter(|a| a.iter().all(|v| v.is_finite())).ok_or_else(lost)
     }
 
