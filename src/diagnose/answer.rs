@@ -6,7 +6,8 @@ use super::findings::Findings;
 use super::latent::LatentForce;
 use super::law_report::LearntLaw;
 use super::misfit::is_beyond_noise;
-use super::posterior::{Candidate, left_of_excess};
+use super::misfit::left_of_excess;
+use super::posterior::Candidate;
 use super::refit::Refit;
 use super::report::{
     Answer, Baseline, CandidateReport, Diagnosis, Drawn, FitQuality, HoldoutResult, Limits, Location,

@@ -52,6 +52,7 @@ pub fn context<'a>(
         identified_strip: None,
         laws: Vec::new(),
         work,
+        most_work: u64::MAX,
     })
 }
 
@@ -82,18 +83,13 @@ pub fn fitted<'a>(context: &FitContext<'a>, prepared: &Prepared) -> Result<Refit
     let mut starts = vec![context.begun.clone(), ended];
     if prepared.part < 1.0 {
         // whole recordings are dear: only from the one that leaves less
-        starts = least_start(context, prepared, starts)?;
+        let problem = context.problem(&nothing, &prepared.noise)?;
+        let costs: Vec<f64> = starts.iter().map(|x| problem.cost(x)).collect();
+        starts.swap_remove(usize::from(costs[0] < costs[1]));
     }
     let begun: Vec<Refit<'a>> = starts.into_par_iter().with_max_len(1).filter_map(from).collect();
     let first = context.best_gone_on(begun, steps.most_steps - steps.few_steps, |fit| !is_astray(context, fit));
     with_its_noise(context, from_weaker_dampers(context, first.ok_or_else(refused)?)).ok_or_else(refused)
-}
-
-/// Of some starts of the base model the one that leaves least.
-fn least_start(context: &FitContext<'_>, prepared: &Prepared, starts: Vec<Vec<f64>>) -> Result<Vec<Vec<f64>>> {
-    let problem = context.problem(&Hypothesis::default(), &prepared.noise)?;
-    let costed = starts.into_iter().map(|x| (problem.cost(&x), x));
-    Ok(costed.min_by(|a, b| a.0.total_cmp(&b.0)).into_iter().map(|(_, x)| x).collect())
 }
 
 /// The same near another fit of it, with another number of rods.

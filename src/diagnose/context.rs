@@ -43,6 +43,8 @@ pub struct FitContext<'a> {
     pub laws: Vec<Law>,
     /// What the fits have cost.
     pub work: Work,
+    /// What a descent may cost, where what is left of a budget allows no more.
+    pub most_work: u64,
 }
 
 impl<'a> FitContext<'a> {

@@ -120,7 +120,7 @@ impl<'a> FitContext<'a> {
     /// Fits a hypothesis from the start values of the experiment, by multiple shooting first: for a base model whose motion is out of step.
     /// It ends after its first steps unless they lead below a multiple of what is left without, by `beside`.
     pub fn refit_by_shooting(&self, hypothesis: &Hypothesis, start: &Start, beside: &Refit<'_>) -> Option<Refit<'a>> {
-        let mut problem = self.problem_near(hypothesis, beside).ok()?;
+        let mut problem = self.of_descent(self.problem_near(hypothesis, beside).ok()?);
         let noise = problem.noise.clone();
         for (parameter, value) in start {
             set(&mut problem.experiment, *parameter, *value);
@@ -161,7 +161,8 @@ impl<'a> FitContext<'a> {
         (near, start): (&Refit<'_>, &Start),
         state: impl Fn(usize, usize) -> Vec<f64>,
     ) -> Option<Refit<'a>> {
-        let (mut problem, x) = self.start(hypothesis, near, start)?;
+        let (problem, x) = self.start(hypothesis, near, start)?;
+        let mut problem = self.of_descent(problem);
         let (noise, accuracy) = (problem.noise.clone(), problem.accuracy);
         let parameters = &x[..problem.free.len()];
         let x = shooting_along(&mut problem, parameters, state).ok()?.x;
@@ -247,8 +248,15 @@ impl<'a> FitContext<'a> {
         problem: Problem<'a>,
         x: Vec<f64>,
     ) -> Option<Refit<'a>> {
+        let problem = self.of_descent(problem);
         let (problem, outcome) = transformed::descend_updating_modes(problem, &descent, x)?;
+        let problem = Problem { work: self.work.clone(), ..problem };
         Some(outcome).filter(|outcome| outcome.cost.is_finite()).map(|end| Refit::of(hypothesis.clone(), problem, end))
+    }
+
+    /// A problem whose descent ends where it has done the work that one may do.
+    fn of_descent(&self, problem: Problem<'a>) -> Problem<'a> {
+        Problem { work: self.work.of_descent(self.most_work), ..problem }
     }
 
     /// A fit whose motions start as short stretches show them to, whatever it makes of them.

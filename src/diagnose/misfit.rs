@@ -77,6 +77,12 @@ pub fn leaves_only_noise(fit: &Refit<'_>, settings: &MisfitSettings) -> bool {
     fit.chi2 < chi2_noise_limit(fit.values(), settings)
 }
 
+/// The part of what the base model leaves beyond the noise that a fit leaves, too.
+pub fn left_of_excess(fit: &Refit<'_>, base: &Refit<'_>) -> f64 {
+    let beyond = |fit: &Refit<'_>| (fit.chi2 - fit.values() as f64).max(0.0);
+    beyond(fit) / beyond(base).max(1.0)
+}
+
 /// χ² over the variance that the best fit leaves, plus a penalty for each effect.
 pub fn needs(fit: &Refit<'_>, best: &Refit<'_>, settings: &MisfitSettings) -> f64 {
     fit.chi2 / best.variance_ratio() + settings.counts * fit.hypothesis.effects.len() as f64

@@ -47,6 +47,7 @@ pub fn planned(experiment: &Experiment, plan: &Plan) -> Result<Vec<Detectable>> 
         identified_strip: None,
         laws: Vec::new(),
         work: Work::default(),
+        most_work: u64::MAX,
     };
     let nothing = Hypothesis::default();
     let problem = context.problem(&nothing, &[RecordNoise::white(vec![plan.noise_rad; marks])])?;

@@ -8,7 +8,7 @@ use super::hypothesis::Compared;
 use super::latent::{LatentConfig, LatentForce};
 use super::latent_forces::unknowns;
 use super::laws::law_of;
-use super::misfit::{chi2_noise_limit, leaves_more_than_noise, needs};
+use super::misfit::{chi2_noise_limit, leaves_more_than_noise, left_of_excess, needs};
 use super::refit::{self, Refit};
 use super::rounding::rounded;
 use super::settings::Settings;
@@ -192,12 +192,6 @@ impl RemainderMixture<'_, '_> {
         let together = ((scatter.of_all - 1.0) / (scatter.of_values - 1.0).max(1e-9)).max(1.0);
         bagging::bagged_posterior(self.fits, &ln_weight, (scatter.of_values, together))
     }
-}
-
-/// The part of what the base model leaves beyond the noise that a fit leaves, too.
-pub fn left_of_excess(fit: &Refit<'_>, base: &Refit<'_>) -> f64 {
-    let beyond = |fit: &Refit<'_>| (fit.chi2 - fit.values() as f64).max(0.0);
-    beyond(fit) / beyond(base).max(1.0)
 }
 
 /// The rivals of the likeliest fit that are not certified, and leave so little more that a better fit of theirs might count. One that leaves only noise stands in

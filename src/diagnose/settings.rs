@@ -260,8 +260,8 @@ pub struct PriorSettings {
     pub not_compared: f64,
     /// A support in step with the swing is with these odds what it seems to be (training bank: four times out of five).
     pub support_in_step: f64,
-    /// Odds of a name that gains no more than the error of another name's law, of a support that gains little, and of an error of a sensor or a view, or a support in step with the swing, beside which more than noise is left: their free numbers
-    /// complete any law that is only nearly right (training bank, of supports only).
+    /// Odds of a name that gains no more than the error of another name's law, and of a support that gains little; and beside what leaves more than noise, of an error of a
+    /// sensor or of a view, and of a support in step with the swing: their free numbers complete any law that is only nearly right (training bank, of supports only).
     pub within_law_error: f64,
     /// That little, in standard deviations (training bank).
     pub slight: f64,

@@ -3,7 +3,8 @@
 use super::effect::Effect;
 use super::heldout::HeldOut;
 use super::learnt::Learnt;
-use super::posterior::{Candidate, Posterior, left_of_excess};
+use super::misfit::left_of_excess;
+use super::posterior::{Candidate, Posterior};
 use super::settings::Settings;
 
 /// What the recordings say.

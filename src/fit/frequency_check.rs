@@ -193,7 +193,7 @@ fn order(seen: &Seen, slow: &Mode, experiment: &Experiment) -> Option<String> {
         let together = measured.arg().abs() < IN_PHASE;
         if against && ratio > 0.0 {
             return Some(format!(
-                "In the slow mode θ1 and θ{lower} swing against each other, but the specimen as described swings together: the sign of one of the angles is turned."
+                "In the slow mode θ1 and θ{lower} swing against each other, and in the specimen as described together: the sign of one of the angles is turned."
             ));
         }
         if !together || near(size) || modelled.len() > 2 {

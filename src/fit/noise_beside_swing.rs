@@ -47,7 +47,7 @@ pub fn noise_beside_swing(values: &[Residual], of_neighbours_rad: f64, swing_s: 
         return of_neighbours_rad;
     }
     let beside_rad = (median(&mut powers).unwrap_or(0.0) / LN_2).sqrt();
-    beside_rad.clamp(of_neighbours_rad, MOST * of_neighbours_rad)
+    beside_rad.max(of_neighbours_rad).min(MOST * of_neighbours_rad)
 }
 
 #[cfg(test)]

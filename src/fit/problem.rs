@@ -229,8 +229,9 @@ impl<'a> Problem<'a> {
         predict(&model, &request)
     }
 
-    /// The residuals of all recordings, each as one motion from its first row, then of the beliefs; `None` where one cannot be integrated.
+    /// The residuals of all recordings, each as one motion from its first row, then of the beliefs; `None` where one cannot be integrated, or the descent that asks has done the work that it may.
     pub fn blocks(&self, x: &[f64]) -> Option<Vec<Block>> {
+        (!self.work.is_spent()).then_some(())?;
         let of = |record: usize| {
             let prediction = self.predict(record, x, true).ok()?;
             let start = self.start_of(record);

@@ -195,6 +195,7 @@ fn blocks(
     characteristic_rad_s: f64,
 ) -> Option<Vec<Block>> {
     let of = |index: usize| of_stretch(problem, stretches, index, x, seam, characteristic_rad_s);
+    (!problem.work.is_spent()).then_some(())?;
     // all are asked, also where one gives nothing, so that the work done does not depend on which thread comes first
     let of_stretches: Vec<_> = (0..stretches.len()).into_par_iter().map(of).collect();
     let seams_beside = of_stretches

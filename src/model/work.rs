@@ -17,7 +17,11 @@ const A_DIRECTION: f64 = 0.04;
 
 /// The work done on some problem, shared by all that comes of it. A bound on it ends a search at the same place on every machine, as no clock would.
 #[derive(Debug, Clone, Default)]
-pub struct Work(Arc<AtomicU64>);
+pub struct Work {
+    done: Arc<AtomicU64>,
+    /// Of one descent within it, and the most that it may do.
+    own: Option<(Arc<AtomicU64>, u64)>,
+}
 
 impl Work {
     /// What a step costs, of so many rates of links and laws, sought by so many along coordinates (fewer where a strip is a sum of shapes), without laws.
@@ -28,11 +32,42 @@ impl Work {
     /// Adds an integration's steps of such a cost each, with derivatives in so many directions.
     pub fn add(&self, steps: usize, each: u64, directions: usize) {
         let derivatives = if directions > 0 { WITH_DERIVATIVES + A_DIRECTION * directions as f64 } else { 1.0 };
-        self.0.fetch_add((steps as f64 * each as f64 * derivatives) as u64, Ordering::Relaxed);
+        let done = (steps as f64 * each as f64 * derivatives) as u64;
+        let counts = std::iter::once(&self.done).chain(self.own.as_ref().map(|(own, _)| own));
+        counts.for_each(|count| _ = count.fetch_add(done, Ordering::Relaxed));
     }
 
     /// The work done so far.
     pub fn done(&self) -> u64 {
-        self.0.load(Ordering::Relaxed)
+        self.done.load(Ordering::Relaxed)
+    }
+
+    /// The same count for one descent, which may do so much. What others do meanwhile does not end it.
+    #[must_use]
+    pub fn of_descent(&self, most: u64) -> Self {
+        Self { done: self.done.clone(), own: Some((Arc::default(), most)) }
+    }
+
+    /// Whether a descent has done what it may.
+    pub fn is_spent(&self) -> bool {
+        self.own.as_ref().is_some_and(|(own, most)| own.load(Ordering::Relaxed) >= *most)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_descent_has_its_own_end_and_counts_for_all() {
+        let whole = Work::default();
+        let (one, other) = (whole.of_descent(1000), whole.of_descent(1000));
+        one.add(10, 60, 0);
+        assert!(!one.is_spent() && whole.done() == 600);
+        other.add(10, 60, 0);
+        // what the other has done does not end it
+        assert!(!one.is_spent() && one.done() == 1200);
+        one.add(10, 60, 0);
+        assert!(one.is_spent() && !other.is_spent() && !whole.is_spent());
     }
 }

@@ -4,6 +4,7 @@
 //! likelier than another: the size ρ is the root of the sum of their squares, and the direction any, of an area 8π² ρ⁴/3.
 
 use super::super::effect::Effect;
+use super::super::misfit::leaves_only_noise;
 use super::super::refit::Refit;
 use super::super::settings::{PriorSettings, Settings};
 use super::{Coefficients, FARTHEST, Law};
@@ -36,7 +37,7 @@ impl Law for EncoderError {
 
     /// Its five free numbers complete any law that is only nearly right: where more than noise is left, something else is at work, and may be all.
     fn odds(&self, fit: &Refit<'_>, _others: &[&Refit<'_>], settings: &Settings) -> f64 {
-        super::odds_of_what_completes_a_law(fit, settings)
+        if leaves_only_noise(fit, &settings.misfit) { 1.0 } else { settings.prior.within_law_error }
     }
 
     fn is_possible(&self, fit: &Refit<'_>, prior: &PriorSettings) -> bool {

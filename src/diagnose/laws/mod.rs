@@ -23,7 +23,7 @@ use rayon::prelude::*;
 
 use super::context::FitContext;
 use super::effect::Effect;
-use super::misfit::{Misfit, leaves_only_noise};
+use super::misfit::{Misfit, leaves_only_noise, left_of_excess};
 use super::refit::Refit;
 use super::screen::{Score, Screen};
 use super::settings::{PriorSettings, Settings};
@@ -107,9 +107,13 @@ pub trait Law: Sync {
     }
 }
 
-/// The odds of an error whose free numbers complete any law that is only nearly right: small where more than noise is left beside it.
-fn odds_of_what_completes_a_law(fit: &Refit<'_>, settings: &Settings) -> f64 {
-    if leaves_only_noise(fit, &settings.misfit) { 1.0 } else { settings.prior.within_law_error }
+/// The odds of an error whose free numbers complete any law that is only nearly right: small where a fit among others leaves more than noise, and more of what the base model
+/// leaves than laws of the table do where all are right.
+fn odds_of_what_completes_a_law(fit: &Refit<'_>, others: &[&Refit<'_>], settings: &Settings) -> f64 {
+    let base = others.iter().find(|other| other.hypothesis.effects.is_empty());
+    let leaves_little = |base: &&Refit<'_>| left_of_excess(fit, base) < settings.prior.imitated_down_to;
+    let is_all = leaves_only_noise(fit, &settings.misfit) || base.is_none_or(leaves_little);
+    if is_all { 1.0 } else { settings.prior.within_law_error }
 }
 
 /// The law of an effect.

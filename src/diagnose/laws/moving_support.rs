@@ -83,7 +83,7 @@ impl Law for MovingSupport {
         let Some(base) = fit_of(&Hypothesis::default()) else { return 1.0 };
         let powers = chord_powers(base);
         let synchronous = if is_in_step(&powers, hz) {
-            prior.support_in_step.min(super::odds_of_what_completes_a_law(fit, settings))
+            prior.support_in_step.min(super::odds_of_what_completes_a_law(fit, others, settings))
         } else {
             1.0
         };

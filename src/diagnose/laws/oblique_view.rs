@@ -43,8 +43,8 @@ impl Law for ObliqueView {
         size(Parameter::ViewStretch).hypot(size(Parameter::ViewShear)) < FARTHEST * prior.view
     }
 
-    fn odds(&self, fit: &Refit<'_>, _others: &[&Refit<'_>], settings: &Settings) -> f64 {
-        super::odds_of_what_completes_a_law(fit, settings)
+    fn odds(&self, fit: &Refit<'_>, others: &[&Refit<'_>], settings: &Settings) -> f64 {
+        super::odds_of_what_completes_a_law(fit, others, settings)
     }
 }
 
@@ -54,10 +54,10 @@ impl Law for WrongScale {
     }
 
     /// A gain and a stretch that undo each other leave only what they do to large angles, which a torque does, too.
-    fn odds(&self, fit: &Refit<'_>, _others: &[&Refit<'_>], settings: &Settings) -> f64 {
+    fn odds(&self, fit: &Refit<'_>, others: &[&Refit<'_>], settings: &Settings) -> f64 {
         let [gain, stretch] = [Parameter::AngleGain, Parameter::ViewStretch].map(|p| fit.value(p).unwrap_or(0.0));
         let undone = (gain + stretch).abs() < UNDONE * gain.abs().max(stretch.abs());
-        let alone = super::odds_of_what_completes_a_law(fit, settings);
+        let alone = super::odds_of_what_completes_a_law(fit, others, settings);
         if undone { alone.min(settings.prior.within_law_error) } else { alone }
     }
 }

@@ -362,7 +362,9 @@ impl<'a, 'p> Search<'a, 'p> {
             if self.is_spent() {
                 break;
             }
-            found.extend(self.fitted(some));
+            let most_work = self.budget.of_descent(some.len(), self.context.work.done());
+            let context = FitContext { most_work, ..self.context.clone() };
+            found.extend(self.fitted(&context, some));
             proposed += some.len();
         }
         let exchanged = proposal::exchanged(&proposals[..proposed]);
@@ -400,9 +402,9 @@ impl<'a, 'p> Search<'a, 'p> {
         self.budget.is_spent(self.context.work.done())
     }
 
-    fn fitted(&self, proposals: &[Proposal<'_, 'a>]) -> Vec<Refit<'a>> {
+    fn fitted(&self, context: &FitContext<'a>, proposals: &[Proposal<'_, 'a>]) -> Vec<Refit<'a>> {
         let of = |proposal: &Proposal<'_, 'a>| {
-            let fits = proposal.fitted(&self.context);
+            let fits = proposal.fitted(context);
             self.progress.advance(1);
             fits
         };

@@ -34,6 +34,9 @@ impl<'a> Search<'a, '_> {
         // with what the search that led here has left
         let budget = settings.search.budget.saturating_sub(self.context.work.done());
         let strip = prepare_within(budget, records, &experiment, settings).ok().and_then(|prepared| {
+            // the whole takes as much for each row as the part that was prepared; one search is complete, and the other would not begin
+            let of_base = (prepared.work.done() as f64 / prepared.part) as u64;
+            (self.stopped_early || of_base < budget).then_some(())?;
             let prepared = kept.get_or_init(|| prepared);
             let taken = prepared.initial_damping();
             Self::of_base_model(prepared, &prepared.experiment, taken, settings, self.progress).ok()
@@ -43,8 +46,6 @@ impl<'a> Search<'a, '_> {
             self.stopped_early = false;
             self.end();
         }
-        // beside what explains little elsewhere, a strip whose base model takes all the work is not searched
-        let strip = strip.filter(|strip| is_found || strip.context.work.done() < budget);
         let rival_residual = least(&self.fits).filter(|_| !is_found).map(Refit::relative_residual);
         strip.map(|strip| Self { rival_residual, ..strip })
     }
@@ -73,7 +74,7 @@ impl<'a> Search<'a, '_> {
     pub(super) fn try_bending(&mut self) {
         let is_tried = self.fits.iter().any(|fit| fit.hypothesis.has(Effect::DistributedFlexibility));
         if !is_tried && self.may_bend() {
-            let found = self.fitted(&[Proposal::ByShooting(bending::alone(), self.base())]);
+            let found = self.fitted(&self.context, &[Proposal::ByShooting(bending::alone(), self.base())]);
             self.keep(found);
         }
         self.bends();
