@@ -8,3 +8,20 @@ pub fn number(value: f64, digits: usize) -> String {
     }
     format!("{value:.*}", (digits as i32 - 1 - magnitude).max(0) as usize)
 }
+
+/// A number with so many decimals, without a sign where all its digits are zero.
+pub fn fixed(value: f64, decimals: usize) -> String {
+    let text = format!("{value:.decimals$}");
+    let is_zero = !text.contains(|c: char| ('1'..='9').contains(&c));
+    if is_zero { text.trim_start_matches('-').to_owned() } else { text }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_rounds_to_zero_has_no_sign() {
+        assert_eq!([fixed(-0.0004, 3), fixed(-0.0006, 3), fixed(2.0, 0)], ["0.000", "-0.001", "2"]);
+    }
+}

@@ -7,6 +7,7 @@ use serde_json::{Value, json};
 
 use super::table::{Table, number, paragraph};
 use super::{Console, Target};
+use crate::digits::fixed;
 use crate::error::{Error, Result};
 use crate::experiment::Experiment;
 use crate::fit::{self, Fit, Pace, Record, Seen, Verdict};
@@ -306,10 +307,10 @@ impl Report<'_> {
         let record = &self.records[index];
         let _ = writeln!(
             text,
-            "\n{}: {} rows, {:.3} s to {:.3} s",
+            "\n{}: {} rows, {} s to {:.3} s",
             record.path.display(),
             record.len(),
-            record.t_s[0],
+            fixed(record.t_s[0], 3),
             record.t_s[record.len() - 1]
         );
         let mut table = Table::new(["", "noise mrad", "left by the fit", "by the file's values"]);

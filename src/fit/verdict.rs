@@ -2,6 +2,7 @@
 
 use super::noise_beside_swing::noise_beside_swing;
 use super::{Ending, Fit, Residuals};
+use crate::digits::fixed;
 use crate::model::Parameter;
 
 /// A window whose mean square exceeds the noise's by chance less often than this, all windows taken together, is a misfit (statistics: 0.1 %).
@@ -237,7 +238,8 @@ impl Verdict {
             )
         });
         format!(
-            "not reproduced: from {from_s:.2} s on, at an amplitude of {amplitude_rad:.3} rad, θ{} differs by {:.2} mrad rms; {:.0} % of the windows from there on exceed the noise.{drift}{little}{offset}",
+            "not reproduced: from {} s on, at an amplitude of {amplitude_rad:.3} rad, θ{} differs by {:.2} mrad rms; {:.0} % of the windows from there on exceed the noise.{drift}{little}{offset}",
+            fixed(from_s, 2),
             link + 1,
             1e3 * rms_rad,
             1e2 * share,

@@ -10,6 +10,7 @@ use serde::Serialize;
 use super::signal::Signal;
 use super::sinusoids::SinusoidFit;
 use super::windows::{WINDOW_BEATS, window_fit};
+use crate::digits::fixed;
 use crate::series::Measured;
 use crate::statistics::median;
 
@@ -158,8 +159,9 @@ impl AbruptChange {
     pub fn statement(&self, measured: Measured) -> String {
         let [before, after] = [self.before_rad, self.after_rad].map(|rad| measured.show(rad, 1));
         format!(
-            "the swing changes at once at t = {:.2} s (amplitude from {before} to {after}, {:+.2} cycles): a touch, or missing frames",
-            self.t_s, self.ahead_cycles
+            "the swing changes at once at t = {:.2} s (amplitude from {before} to {after}, {} cycles ahead): a touch, or missing frames",
+            self.t_s,
+            fixed(self.ahead_cycles, 2)
         )
     }
 }
