@@ -125,7 +125,8 @@ impl Mode {
         let law = frequency_law(whole.modulated, envelope.as_ref());
         let choice = match law.zip(expected_kappa_per_rad2) {
             Some((law, expected)) if is_beyond_springs(&law, expected) => {
-                choice.widened_for_unknown_law(&law, last_rad)
+                let last_step = envelope.as_ref().and_then(|own| own.steps.last());
+                choice.widened_for_unknown_law(&law, last_step.map_or(last_rad, |step| step.amplitude_rad))
             }
             _ => choice,
         };
