@@ -46,8 +46,10 @@ pub struct Pace {
     length_m: f64,
     links: usize,
     gravity_m_s2: f64,
-    /// What the angles themselves say.
-    pub shape: Option<String>,
+    /// Where the angles look like degrees, in words.
+    degrees: Option<String>,
+    /// Where the slow mode's angles have a turned sign, stand in the wrong columns, or are from one link to the next.
+    order: Option<String>,
     /// The angles reach beyond 90°: the frequency of a small swing says nothing about the specimen.
     beyond_small: bool,
 }
@@ -57,6 +59,8 @@ impl Pace {
     pub fn of(seen: &Seen, experiment: &Experiment) -> Option<Self> {
         let [low_hz, high_hz] = slow_mode_hz(experiment)?;
         let seen_hz = seen.slow.frequency_hz;
+        let modes = undamped(experiment);
+        let slow = modes.as_ref().and_then(|modes| modes.first());
         Some(Self {
             seen_hz,
             model_hz: seen_hz.clamp(low_hz, high_hz),
@@ -64,7 +68,8 @@ impl Pace {
             length_m: experiment.specimen.lengths_m().iter().sum(),
             links: experiment.specimen.lengths_m().len(),
             gravity_m_s2: experiment.rig.gravity_m_s2,
-            shape: shape(seen, experiment),
+            degrees: slow.and_then(|slow| degrees(seen, slow.frequency_hz)),
+            order: slow.and_then(|slow| order(seen, slow, experiment)),
             beyond_small: seen.slow.amplitude_rad > FRAC_PI_2,
         })
     }
@@ -82,7 +87,7 @@ impl Pace {
     /// What differs and what would explain it; `None` where nothing does.
     pub fn statement(&self) -> Option<String> {
         let pace = self.differs().then(|| self.explained());
-        let parts: Vec<String> = pace.into_iter().chain(self.shape.clone()).collect();
+        let parts: Vec<String> = pace.into_iter().chain(self.degrees.clone().or_else(|| self.order.clone())).collect();
         (!parts.is_empty()).then(|| parts.join(" "))
     }
 
@@ -157,20 +162,11 @@ fn is_upward(record: &Record, link: usize) -> bool {
 /// # Errors
 /// [`Error::Table`] where a sign is turned, columns are exchanged or angles are from one link to the next.
 pub fn check_angles(record: &Record, seen: &Seen, experiment: &Experiment) -> Result<()> {
-    let is_slow_mode = Pace::of(seen, experiment).is_some_and(|pace| (pace.ratio() - 1.0).abs() < NEAR);
-    let contradiction =
-        undamped(experiment).filter(|_| is_slow_mode).and_then(|modes| order(seen, modes.first()?, experiment));
-    contradiction.map_or(Ok(()), |found| {
+    let in_slow_mode = Pace::of(seen, experiment).filter(|pace| (pace.ratio() - 1.0).abs() < NEAR);
+    in_slow_mode.and_then(|pace| pace.order).map_or(Ok(()), |found| {
         let message = format!("cannot be diagnosed. {found} Mend the table, or the order of the links in the file");
         Err(Error::Table { path: record.path.clone(), line: None, message })
     })
-}
-
-/// What the angles of the slow mode say: degrees, a turned sign, columns that are swapped, angles from one link to the next.
-fn shape(seen: &Seen, experiment: &Experiment) -> Option<String> {
-    let model = undamped(experiment)?;
-    let slow = model.first()?;
-    degrees(seen, slow.frequency_hz).or_else(|| order(seen, slow, experiment))
 }
 
 /// A turned sign, columns that are swapped, angles from one link to the next.
