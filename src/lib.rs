@@ -17,7 +17,7 @@
 //! | identify | [`identify`] | angles → frequencies, damping and their intervals, without the motion |
 //! | fit | [`fit`] | angles and model → parameters, residuals, verdict |
 //! | diagnose | [`diagnose`] | angles and model → what the model lacks, how probable, and the proof |
-//! | X | the published tables, recomputed |
+//! | paper | [`paper`] | the published numbers → the published tables, recomputed |
 //! | report | [`report`] | what a run left in a folder → one page, figures |
 //! | export | [`export`] | angles.csv → the file of another program |
 //! | batch | [`batch`] | a folder of recordings → a folder of results, and their summary |

@@ -259,7 +259,8 @@ impl Sidecar {
                 "reading stopped at {:.3} s: {error}; the file is cut off or damaged there",
                 m.timing.last_s
             ));
-        } else if m.stream.stated_frames.is_some_and(|n| n > m.decoded.packets) {
+        // where a file states no count it is that of an even rate
+        } else if m.stream.stated_frames.is_some_and(|n| n > m.decoded.packets) && !m.timing.varies() {
             warnings.push(format!(
                 "the file states {} frames and holds {}; it ends early",
                 m.stream.stated_frames.unwrap_or(0),

@@ -1,6 +1,13 @@
-//! Medians: what is usual, whatever the few exceptions are.
+//! Medians: what is usual, whatever the few exceptions are; and what a p-value is worth.
 
 use std::ops::{Add, Div};
+
+/// The largest probability with which a result of this p-value is no chance, chance being as likely as not before it was seen: 1/(1 + B), B = −e p ln p (T. Sellke,
+/// M. J. Bayarri, J. O. Berger, Calibration of p values for testing precise null hypotheses, The American Statistician 55, 2001).
+pub fn no_chance(p_value: f64) -> f64 {
+    let p_value = p_value.clamp(f64::MIN_POSITIVE, std::f64::consts::E.recip());
+    1.0 / (1.0 - std::f64::consts::E * p_value * p_value.ln())
+}
 
 /// The middle of the values, of an even number the mean of the two in the middle; `None` of none. The values end up
 /// in another order.

@@ -78,9 +78,16 @@ impl Errors {
     }
 }
 
+/// Share of the positions of marks in plain view that must be measured.
+const LEAST_SEEN: f64 = 0.995;
+
 /// Position errors along one axis over the marks that swing.
 fn positions(case: &Case, m: &Measurement, axis: usize) -> Errors {
     let mut errors = Errors::default();
+    // a tracker that gives up where it is hard would be exact elsewhere
+    let all: usize = m.tracks.marks.iter().skip(1).map(Vec::len).sum();
+    let seen = m.tracks.marks.iter().skip(1).flatten().filter(|point| point.measured.is_some()).count();
+    assert!(seen as f64 >= LEAST_SEEN * all as f64, "{seen} of {all} positions");
     for (mark, track) in m.tracks.marks.iter().enumerate().skip(1) {
         for (frame, point) in track.iter().enumerate() {
             let (Some(measured), truth) = (point.measured, case.truth.truth(frame)) else { continue };
@@ -95,6 +102,9 @@ fn positions(case: &Case, m: &Measurement, axis: usize) -> Errors {
 
 fn angles(case: &Case, angles: &Angles) -> Errors {
     let mut errors = Errors::default();
+    let all: usize = angles.links.iter().map(Vec::len).sum();
+    let seen = angles.links.iter().flatten().flatten().count();
+    assert!(seen as f64 >= LEAST_SEEN * all as f64, "{seen} of {all} angles");
     for (link, track) in angles.links.iter().enumerate() {
         for (frame, angle) in track.iter().enumerate() {
             let Some(angle) = angle else { continue };

@@ -4,7 +4,8 @@
 //! `cargo test` takes two short ones; `make accuracy` all of them, and prints the figures.
 
 use std::collections::HashMap;
-use std::path::Path;
+use std::hash::{Hash, Hasher};
+use std::path::{Path, PathBuf};
 use std::process::Command;
 
 use freeswing::look::{Finding, look};
@@ -50,8 +51,12 @@ fn python() -> &'static str {
 /// A program of `fixtures/foreign`.
 fn script(name: &str) -> Command {
     let mut command = Command::new(python());
-    command.arg(Path::new(env!("CARGO_MANIFEST_DIR")).join("fixtures/foreign").join(name));
+    command.arg(script_path(name));
     command
+}
+
+fn script_path(name: &str) -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("fixtures/foreign").join(name)
 }
 
 /// Renders variants of the bank into a folder.
@@ -171,7 +176,10 @@ fn marks_in_a_strangers_picture_are_measured_to_the_limit_of_the_codec() {
 #[test]
 #[ignore = "many minutes; run by `make accuracy`"]
 fn every_foreign_rendering_is_measured_within_its_limits() {
-    let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join("foreign");
+    // pictures of another renderer are no longer these
+    let mut hash = std::hash::DefaultHasher::new();
+    std::fs::read(script_path("render.py")).unwrap().hash(&mut hash);
+    let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join(format!("foreign-{:016x}", hash.finish()));
     std::fs::create_dir_all(&folder).unwrap();
     let mut beyond = Vec::new();
     for name in variants() {

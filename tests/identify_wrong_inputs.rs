@@ -87,7 +87,7 @@ fn units() -> Vec<(&'static str, String, Wanted)> {
     vec![
         ("degrees in columns named rad", s.with(same, |_, _, a| a.to_degrees()), Refuses("looks like degrees")),
         ("degrees of a swing of 6°", s.with(same, |_, _, a| 0.25 * a.to_degrees()), Refuses("looks like degrees")),
-        ("degrees of a swing of 2°", s.with(same, |_, _, a| 0.1 * a.to_degrees()), Doubts("are these degrees")),
+        ("degrees of a swing of 2°", s.with(same, |_, _, a| 0.1 * a.to_degrees()), Doubts("if these are degrees")),
         (
             "one angle in degrees of a swing of 1°",
             s.first(same, |t, _| 1.1 * (-0.03 * t).exp() * (8.5 * t).cos() + 1e-3 * noise((1e4 * t) as usize)),

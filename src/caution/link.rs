@@ -39,7 +39,8 @@ fn spans(m: &Measurement, options: &Options, link: usize, first: usize) -> Vec<[
 /// A link keeps its length; where it changes with the angle alone, the plane of the swing is turned.
 pub(super) fn link_length(m: &Measurement, options: &Options, link: usize, first: usize) -> Option<String> {
     let spans = spans(m, options, link, first);
-    if spans.len() < FEWEST_FRAMES {
+    // a calibrated lens is taken out of the angles, not of these positions, whose distances it changes
+    if spans.len() < FEWEST_FRAMES || options.rig.lens_calibration.is_some() {
         return None;
     }
     let mut lengths: Vec<f64> = spans.iter().map(|s| s[0].hypot(s[1])).collect();

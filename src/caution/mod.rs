@@ -6,7 +6,7 @@ use crate::hand_hold::{caught_of, released_of};
 use crate::measure::{Measurement, Options, Steadying};
 use crate::statistics::median;
 use crate::track::chain_detection::{LEAST_TURN, MOST_MARKS};
-use crate::track::{Point, UnusedObject};
+use crate::track::{Flags, Point, UnusedObject};
 
 mod gap;
 mod link;
@@ -95,7 +95,7 @@ fn repeats(m: &Measurement) -> Option<String> {
     (share > LEAST_REPEATED).then(|| {
         format!(
             "about one picture in {:.0} repeats the one before: a converter has changed the frame rate, and the stamps are not those of the motion; measure the film as it came from the camera, or take the repeats out with `ffmpeg -vf mpdecimate`",
-            share.recip()
+            share.recip().max(2.0)
         )
     })
 }
@@ -313,7 +313,9 @@ fn blur(m: &Measurement, mark: usize) -> Option<String> {
             continue;
         };
         let step_s = t_s[i + 1] - t_s[i - 1];
-        if step_s > 0.0 && !points[i].flags.contains(crate::track::Flags::CUT) {
+        // a mark in plain view: what a hand covers is small while it is held
+        let is_plain = ![Flags::CUT, Flags::PARTIAL, Flags::MERGED].iter().any(|flag| points[i].flags.contains(*flag));
+        if step_s > 0.0 && is_plain {
             let path_px = (c.position_px[0] - a.position_px[0]).hypot(c.position_px[1] - a.position_px[1]);
             rows.push([path_px / step_s, f64::from(b.area_px2)]);
         }
@@ -420,7 +422,7 @@ fn crossing_rate_hz(m: &Measurement) -> Option<f64> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::track::{Flags, Measured};
+    use crate::track::Measured;
 
     /// Points of a swing of 100 px, one for each instant.
     fn swing(hz: f64, t_s: impl Iterator<Item = f64>) -> Vec<Point> {

@@ -25,7 +25,8 @@ Examples:
 Free are the joint's spring and damper, every effect named in [model.effects] (its value is the start), and of one link the hinge's
 viscous damper. A joint whose k_eq_n_m_per_rad is 0 has no spring. Several recordings share all parameters but not their release.
 The fit begins with the file's values and with those that the recording's own frequencies and decay say. \"Reproduced\" means: the residual
-is no more than the noise, which is taken from the table alone, and at least nine tenths of the variance are explained.")]
+is no more than the noise, which is taken from the table alone, and at least nine tenths of the variance are explained; docs/outputs.md
+has the conditions one by one.")]
 pub struct FitArgs {
     /// Tables of angles of one specimen; `-` is standard input.
     #[arg(required = true, value_name = "ANGLES")]
@@ -225,11 +226,11 @@ impl Report<'_> {
         text.push_str(&table.text());
         for estimate in &self.fitted.fit.estimates {
             if !estimate.is_determined() {
-                let (id, high) = (estimate.parameter.id(), number(estimate.high, 3));
-                let line = format!(
-                    "{id} is not significantly different from zero: at most {high} {}",
-                    estimate.parameter.unit()
-                );
+                let (id, unit) = (estimate.parameter.id(), estimate.parameter.unit());
+                let [low, high] = [estimate.low, estimate.high].map(|end| number(end, 3));
+                let within =
+                    if estimate.low < 0.0 { format!("between {low} and {high}") } else { format!("at most {high}") };
+                let line = format!("{id} is not significantly different from zero: {within} {unit}");
                 text.push_str(&paragraph("  ", &line));
             }
         }

@@ -236,7 +236,12 @@ impl RunArgs {
         match self.recordings.as_slice() {
             [one] if !is_table(one) => Recording::open(one, &StillTimes::Beside).map(drop),
             tables => {
-                let read = |table: &PathBuf| AngleSeries::read(table);
+                // a displacement is identified, and no more
+                let is_identified = self.extent.until == Stage::Identify;
+                let read = |table: &PathBuf| match is_identified {
+                    true => AngleSeries::read_motion(table).map(|(series, _)| series),
+                    false => AngleSeries::read(table),
+                };
                 super::refuse_twice(&tables.iter().map(read).collect::<Result<Vec<_>>>()?)
             }
         }

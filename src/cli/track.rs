@@ -133,19 +133,18 @@ enum Steady {
 }
 
 pub(super) fn rectangle(text: &str) -> std::result::Result<[f64; 4], String> {
-    let numbers: Vec<f64> = text.split(',').filter_map(|n| n.trim().parse().ok()).collect();
-    match numbers[..] {
-        [x, y, width, height] if numbers.iter().all(|v| v.is_finite()) => Ok([x, y, width, height]),
-        _ => Err("give four numbers as X,Y,W,H".to_owned()),
-    }
+    numbers(text).ok_or_else(|| "give four numbers as X,Y,W,H".to_owned())
 }
 
 fn point(text: &str) -> std::result::Result<[f64; 2], String> {
-    let numbers: Vec<f64> = text.split(',').filter_map(|n| n.trim().parse().ok()).collect();
-    match numbers[..] {
-        [x, y] if x.is_finite() && y.is_finite() => Ok([x, y]),
-        _ => Err("give two numbers as X,Y".to_owned()),
-    }
+    numbers(text).ok_or_else(|| "give two numbers as X,Y".to_owned())
+}
+
+/// So many finite numbers between commas, and nothing else.
+fn numbers<const N: usize>(text: &str) -> Option<[f64; N]> {
+    let numbers: Option<Vec<f64>> =
+        text.split(',').map(|n| n.trim().parse().ok().filter(|n: &f64| n.is_finite())).collect();
+    numbers?.try_into().ok()
 }
 
 impl TrackArgs {

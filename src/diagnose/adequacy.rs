@@ -24,7 +24,7 @@ use crate::model::Parameter;
 use crate::progress::Progress;
 
 /// Replicates of the residuals (cost).
-const REPLICATES: usize = 500;
+const REPLICATES: usize = 2000;
 /// What they are compared by: so many numbers, see above.
 const STATISTICS: usize = 4;
 /// Values of a window (judgement).
@@ -139,17 +139,14 @@ fn replicate(context: &FitContext<'_>, null: &Refit<'_>, seed: u64) -> Option<DV
     measured.refit(&null.hypothesis, null, &[])?.linearised().map(|(residual, _)| residual)
 }
 
-/// The share of replicates whose least rank is as small as the recording's.
+/// The share of the recording and its replicates whose least rank among all of them is as small as the recording's.
 fn ranked(own: &[f64; STATISTICS], replicates: &[[f64; STATISTICS]]) -> f64 {
-    let count = replicates.len() as f64;
-    let rank = |of: &[f64; STATISTICS]| {
-        (0..own.len())
-            .map(|s| (1.0 + replicates.iter().filter(|r| r[s] >= of[s]).count() as f64) / (count + 1.0))
-            .fold(1.0, f64::min)
+    let all: Vec<&[f64; STATISTICS]> = std::iter::once(own).chain(replicates).collect();
+    let rank = |of: &&[f64; STATISTICS]| {
+        (0..STATISTICS).map(|s| all.iter().filter(|other| other[s] >= of[s]).count()).min().unwrap_or(all.len())
     };
-    let mine = rank(own);
-    let ranks: Vec<f64> = replicates.par_iter().map(rank).collect();
-    (1.0 + ranks.iter().filter(|r| **r <= mine).count() as f64) / (count + 1.0)
+    let ranks: Vec<usize> = all.par_iter().map(rank).collect();
+    ranks.iter().filter(|rank| **rank <= ranks[0]).count() as f64 / all.len() as f64
 }
 
 /// The smallest detectable amount of each effect, and what it would be confused with.

@@ -88,7 +88,7 @@ impl Baseline {
             noise_share_correlated: noise.colour.iter().map(|colour| colour.share).collect(),
             noise_correlation_across: noise.across.strongest(),
             adequate: findings.verdict.status == Status::Adequate,
-            p_value: findings.adequacy.p_value.unwrap_or(0.0),
+            p_value: findings.adequacy.p_value,
         }
     }
 }

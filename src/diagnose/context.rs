@@ -70,7 +70,7 @@ impl<'a> FitContext<'a> {
         let mut problem = Problem::new(self.records, &experiment, &free)?;
         problem.work = self.work.clone();
         problem.noise = noise.to_vec();
-        problem.beliefs = beliefs;
+        problem.beliefs.extend(beliefs);
         if free.contains(&Parameter::BendingStiffness) && !self.is_strip() && self.identified_strip.is_none() {
             // no more is free at its start than in the rods it is compared with
             problem.further_modes.clear();

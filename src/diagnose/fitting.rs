@@ -312,6 +312,16 @@ fn set(experiment: &mut Experiment, parameter: Parameter, value: f64) {
                 law.frequency_hz = value;
             }
         }
+        Parameter::SupportOwnFrequency => {
+            if let Some(stand) = &mut model.effects.support_flexibility {
+                stand.frequency_hz = value;
+            }
+        }
+        Parameter::SupportDampingRatio => {
+            if let Some(stand) = &mut model.effects.support_flexibility {
+                stand.damping_ratio = value;
+            }
+        }
         _ => {}
     }
 }

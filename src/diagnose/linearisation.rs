@@ -129,6 +129,11 @@ impl Linearisation {
         (0..fit.problem.records.len()).map(|record| Self::of(fit, record)).collect()
     }
 
+    /// Rows a second, on average.
+    pub fn mean_rate_hz(&self) -> f64 {
+        (self.t_s.len() - 1) as f64 / (self.t_s[self.t_s.len() - 1] - self.t_s[0])
+    }
+
     /// Number of numbers in a state: δθ and δrate.
     pub fn state(&self) -> usize {
         self.links + self.rates

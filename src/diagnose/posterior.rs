@@ -14,6 +14,7 @@ use super::rounding::rounded;
 use super::settings::Settings;
 use crate::fit::Record;
 use crate::fit::whitening::RecordNoise;
+use crate::statistics::no_chance;
 
 /// Probabilities below this change nothing.
 const NEGLIGIBLE: f64 = 1e-4;
@@ -323,11 +324,11 @@ impl<'a> Posterior<'a> {
         let is_more = base.hypothesis.effects.is_empty() && squares() > chi2_noise_limit(values, &settings.misfit);
         let p_value = is_more.then(|| p_value(base)).flatten();
         // what is surer that something is missing stays
-        let is_surer = |p_value: &f64| *p_value < settings.verdict.chance && 1.0 - *p_value > self.unknown;
-        if let Some(p_value) = p_value.filter(is_surer) {
+        let missing = p_value.filter(|p_value| *p_value < settings.verdict.chance).map(no_chance);
+        if let Some(missing) = missing.filter(|missing| *missing > self.unknown) {
             let named: f64 = self.candidates.iter().map(|candidate| candidate.probability).sum();
-            self.candidates.iter_mut().for_each(|candidate| candidate.probability *= p_value / named);
-            (self.unknown, self.remains) = (1.0 - p_value, 1.0 - p_value);
+            self.candidates.iter_mut().for_each(|candidate| candidate.probability *= (1.0 - missing) / named);
+            (self.unknown, self.remains) = (missing, missing);
         }
         self
     }
@@ -452,8 +453,9 @@ mod tests {
     #[test]
     fn what_chance_seldom_leaves_makes_the_unknown_surer_and_never_less_sure() {
         beside_something(0.3, |posterior| {
-            assert!((posterior.unknown - 0.998).abs() < 1e-12);
-            assert!((posterior.candidates[0].probability - 0.002).abs() < 1e-12);
+            // 1/(1 − e 0.002 ln 0.002)
+            assert!((posterior.unknown - 0.9673).abs() < 1e-4, "{}", posterior.unknown);
+            assert!((posterior.candidates[0].probability + posterior.unknown - 1.0).abs() < 1e-12);
         });
         // so sure that no number near 1 says it: nothing is divided by nothing
         beside_something(1.0, |posterior| {

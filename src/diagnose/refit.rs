@@ -114,8 +114,7 @@ impl<'a> Refit<'a> {
         let problem = &self.problem;
         let (model, camera) = problem.model(record, &self.x[..problem.free.len()]).ok()?;
         let data = &problem.records[record];
-        let (angles_rad, rates_rad_s) = problem.start(&self.x, record).split_at(problem.shapes());
-        let state = State::begun(&model.start(), angles_rad, rates_rad_s);
+        let state = State::begun(&model, problem.start(&self.x, record));
         let camera = Camera { origin_s: data.t_s[0], ..camera };
         let true_s: Vec<f64> = data.t_s.iter().map(|t| camera.true_time_s(*t, 0)).collect();
         let span_s = (true_s[0], true_s[data.len() - 1] + 1e-9);

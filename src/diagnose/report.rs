@@ -72,8 +72,8 @@ pub struct Baseline {
     pub noise_correlation_across: f64,
     /// Whether the base model is enough.
     pub adequate: bool,
-    /// How often chance alone leaves residuals as conspicuous.
-    pub p_value: f64,
+    /// How often chance alone leaves residuals as conspicuous; `None` where the motion cannot be integrated.
+    pub p_value: Option<f64>,
 }
 
 /// Where the base model differs from the recordings.

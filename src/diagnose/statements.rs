@@ -41,6 +41,11 @@ impl Findings<'_> {
                 "Something is missing that is not in the table of effects ({sure}): effects of the table leave little more than noise, but a law outside the table, in the place of one of them, describes the recording better{}.",
                 self.nearest()
             ),
+            // the table cannot be excluded by sets that were never fitted
+            Status::Unknown if !self.has_compared_pairs() => format!(
+                "Something is missing ({sure}), and the search reached its limit of computation before it found what: not every pair of effects was fitted, so that it may well be in the table of effects. Diagnose a shorter stretch (--until){}.",
+                self.nearest()
+            ),
             Status::Unknown => format!(
                 "Something is missing that is not in the table of effects ({sure}): no effect of the table, and no combination that was tried, leaves only noise{}.",
                 self.nearest()
@@ -75,6 +80,11 @@ impl Findings<'_> {
             }
         };
         statement + &self.law() + &reservation + &altered::statement(self.named(), &self.context.beliefs)
+    }
+
+    /// Whether every pair of effects that promises anything was fitted.
+    fn has_compared_pairs(&self) -> bool {
+        self.posterior.compared.of_any >= self.context.settings.search.main_effects
     }
 
     /// The names, what explains most first.
@@ -406,10 +416,15 @@ fn words_of_torque(torque: &MissingTorque, phase: Option<Phase>) -> String {
     // what is steady or goes with the position takes and gives back
     let takes = phase != Some(Phase::Position) && !torque.steady;
     if let Some(share) = torque.energy_share.filter(|_| takes) {
-        let does = if share < 0.0 { "it supplies as much as" } else { "it takes" };
         // it is estimated beside the energy lost, and nothing takes more than all of it
-        let part = if share.abs() < 1.0 { format!("{:.0} %", 1e2 * share.abs()) } else { "about all".to_owned() };
-        let _ = write!(words, "; {does} {part} of the dissipated energy");
+        let part = format!("{:.0} % of the dissipated energy", 1e2 * share.abs());
+        let does = match share {
+            ..=-1.0 => "it supplies more energy than is dissipated".to_owned(),
+            1.0.. => "it takes about all of the dissipated energy".to_owned(),
+            ..0.0 => format!("it supplies as much as {part}"),
+            _ => format!("it takes {part}"),
+        };
+        let _ = write!(words, "; {does}");
     }
     words
 }

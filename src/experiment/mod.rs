@@ -18,7 +18,7 @@ use serde::Deserialize;
 
 pub use law::{Coefficient, Law, LawPlace};
 pub use light::{Coating, Face, Film, Heat, Laser, Light};
-pub use model::{Effects, EncoderError, Hysteresis, Model, ObliqueView, SupportMotion};
+pub use model::{Effects, EncoderError, Hysteresis, Model, ObliqueView, SupportFlexibility, SupportMotion};
 pub use render::{Caption, Codec, CodecName, Distractor, Lens, Noise, Occlusion, PixelFormat, Render, Rgb, Siting};
 pub use rig::{Look, MarkColour, Rig, Sensor, Support};
 pub use specimen::{Inertia, Link, Reflectivity, Specimen};

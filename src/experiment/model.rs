@@ -28,6 +28,19 @@ pub struct SupportMotion {
     pub phase_rad: f64,
 }
 
+/// A stand that yields under the pull of what hangs on it.
+#[derive(Debug, Clone, Copy, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct SupportFlexibility {
+    /// How far a sideways force moves the pivot.
+    pub compliance_m_per_n: f64,
+    /// Frequency at which the stand swings with the specimen's mass hung on it.
+    pub frequency_hz: f64,
+    /// Its damping ratio (1).
+    #[serde(default)]
+    pub damping_ratio: f64,
+}
+
 /// A camera that looks at the plane of the swing askew: tan φ = (1 + s) sin θ / (cos θ + b sin θ).
 #[derive(Debug, Clone, Copy, Default, PartialEq, Deserialize)]
 #[serde(default, deny_unknown_fields)]
@@ -80,6 +93,8 @@ pub struct Effects {
     pub side_force: Option<f64>,
     /// Sideways motion of the pivot.
     pub support_motion: Option<SupportMotion>,
+    /// A stand that yields.
+    pub support_flexibility: Option<SupportFlexibility>,
     /// Bending stiffness EI (N·m²) of a chain of many links.
     pub distributed_flexibility: Option<f64>,
     /// True time = (1+ε) × stated time (1).
@@ -168,12 +183,15 @@ impl Effects {
             ("air_quadratic", self.air_quadratic),
             ("added_mass", self.added_mass),
             ("joint_hysteretic.torque_n_m", self.joint_hysteretic.map(|h| h.torque_n_m)),
+            ("support_flexibility.compliance_m_per_n", self.support_flexibility.map(|s| s.compliance_m_per_n)),
+            ("support_flexibility.damping_ratio", self.support_flexibility.map(|s| s.damping_ratio)),
         ] {
             checked(id, value, not_negative)?;
         }
         for (id, value) in [
             ("joint_hysteretic.yield_rad", self.joint_hysteretic.map(|h| h.yield_rad)),
             ("support_motion.frequency_hz", self.support_motion.map(|s| s.frequency_hz)),
+            ("support_flexibility.frequency_hz", self.support_flexibility.map(|s| s.frequency_hz)),
             ("distributed_flexibility", self.distributed_flexibility),
             // of a plane that is seen from its edge or from behind nothing is told
             ("camera_oblique: 1 + stretch", self.camera_oblique.map(|view| 1.0 + view.stretch)),

@@ -129,7 +129,7 @@ pub enum Sensor {
 pub struct Rig {
     /// Local gravity.
     pub gravity_m_s2: f64,
-    /// How a strip under light is held.
+    /// How the specimen is held at its upper end.
     pub support: Support,
     /// A torsion spring at a hinge.
     pub support_stiffness_n_m_per_rad: f64,

@@ -142,6 +142,11 @@ impl Specimen {
         }
     }
 
+    /// Mass of all links, or of the strip.
+    pub fn whole_mass_kg(&self) -> f64 {
+        if self.links.is_empty() { self.mass_kg } else { self.links.iter().map(|link| link.mass_kg).sum() }
+    }
+
     /// E w t³ / 12, the bending stiffness of a flat strip (N·m²), where modulus and thickness are known.
     pub fn bending_stiffness_n_m2(&self) -> Option<f64> {
         Some(self.young_modulus_pa? * self.width_m * self.thickness_m?.powi(3) / 12.0)

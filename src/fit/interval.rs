@@ -5,11 +5,10 @@ use nalgebra::{DMatrix, DVector, SymmetricEigen};
 use super::Problem;
 use super::descent::{Block, Descent, Ending, Outcome};
 use super::problem::stacked;
+use crate::identify::estimate::NORMAL_QUANTILE as Z95;
 use crate::model::Parameter;
 use crate::progress::Progress;
 
-/// 95 % of a normal distribution lie within this many standard deviations (statistics).
-const Z95: f64 = 1.959_964;
 /// χ² of one degree of freedom: 95 % lie below (statistics).
 const CHI2_95: f64 = Z95 * Z95;
 /// Lags over which residuals are tested for correlation (judgement), and their χ² at 0.1 % (statistics).

@@ -204,7 +204,7 @@ pub fn fit_watched(
     let residuals = residuals(&problem, &outcome.x, &noise_rad)?;
     Ok(Fit {
         starts: (0..kept.len()).map(|record| problem.seen_start(&outcome.x, record)).collect(),
-        estimates: uncertainty.estimates,
+        estimates: uncertainty.estimates.into_iter().map(|own| rod_count::with_error_of_rods(own, &problem)).collect(),
         correlation: uncertainty.correlation,
         undetermined: uncertainty.undetermined,
         coloured: uncertainty.coloured,

@@ -9,6 +9,7 @@ use crate::error::{Error, Result};
 use crate::model::integrate::Directions;
 use crate::model::observe::{chord_angles_rad, chord_slopes};
 use crate::model::step::StepPlace;
+use crate::model::trajectory::StartDirections;
 use crate::model::{Accuracy, Camera, ForwardModel, Parameter, State, Trajectory};
 
 /// The angles predicted for some rows, and their derivatives.
@@ -42,7 +43,7 @@ pub struct Request<'a> {
     pub record: &'a Record,
     /// Rows to predict; the motion starts at the first.
     pub rows: &'a Range<usize>,
-    /// Angles between marks at the first row (of a strip perhaps how much of its next mode), then their rates.
+    /// Angles between marks at the first row (perhaps how much of a strip's next modes, and how far a stand has yielded), then their rates.
     pub start: &'a [f64],
     /// The camera.
     pub camera: &'a Camera,
@@ -64,8 +65,6 @@ pub fn predict(model: &ForwardModel, request: &Request<'_>) -> Result<Prediction
     let Request { record, rows, start, parameters, accuracy, .. } = *request;
     let marks = record.links();
     let chain = model.chain();
-    let shapes = start.len() / 2;
-    let spread = model.start().columns(0, shapes).into_owned();
     let start_s = record.t_s[rows.start];
     let mut camera = Camera { origin_s: start_s, ..*request.camera };
     if start_s >= camera.dropped_at_s {
@@ -74,8 +73,8 @@ pub fn predict(model: &ForwardModel, request: &Request<'_>) -> Result<Prediction
     }
     let ends_s = [0, 1].map(|link| camera.true_time_s(request.until_s, link));
     let latest_s = ends_s[0].max(ends_s[1]) + 1e-9;
-    let state = State::begun(&spread, &start[..shapes], &start[shapes..]);
-    let directions = request.slopes.then(|| directions(model, parameters, &spread));
+    let state = State::begun(model, start);
+    let directions = request.slopes.then(|| directions(model, parameters, start.len()));
     let swing = Trajectory::with(model, &state, (start_s, latest_s), directions.as_ref(), accuracy)?;
     let columns = if request.slopes { parameters.len() + start.len() } else { 0 };
     let mut values = Vec::with_capacity(record.values(rows.clone()));
@@ -105,12 +104,9 @@ pub fn predict(model: &ForwardModel, request: &Request<'_>) -> Result<Prediction
     Ok(Prediction { values, slopes, end: end_of(model, &swing, request, &camera)? })
 }
 
-/// The parameters, then the angles at the start and their rates, which `spread` hands on to the links.
-fn directions(model: &ForwardModel, parameters: &[Parameter], spread: &DMatrix<f64>) -> Directions {
-    let (n, m, shapes) = (spread.nrows(), model.rates(), spread.ncols());
-    let (mut theta, mut rate) = (DMatrix::zeros(n, 2 * shapes), DMatrix::zeros(m, 2 * shapes));
-    theta.columns_mut(0, shapes).copy_from(spread);
-    rate.view_mut((0, shapes), (n, shapes)).copy_from(spread);
+/// The parameters, then so many numbers in which the motion starts.
+fn directions(model: &ForwardModel, parameters: &[Parameter], numbers: usize) -> Directions {
+    let StartDirections { theta, rate } = StartDirections::of(model, numbers);
     Directions { parameters: parameters.to_vec(), theta, rate }
 }
 

@@ -37,7 +37,7 @@ pub fn foretold(record: &Record, experiment: &Experiment) -> Option<Range<usize>
 fn lost_at(record: &Record, experiment: &Experiment, noise_rad: f64) -> Option<usize> {
     let problem = Problem::new(std::slice::from_ref(record), experiment, &[]).ok()?;
     let prediction = problem.predict(0, &observed_starts(&problem).ok()?, true).ok()?;
-    let angles = prediction.slopes.columns(0, problem.shapes());
+    let angles = prediction.slopes.columns(0, problem.marks());
     let grown = |value: usize| noise_rad * angles.row(value).iter().fold(0.0, |most: f64, slope| most.max(slope.abs()));
     let lost = (0..prediction.values.len()).filter(|value| grown(*value) > ANOTHER_RAD);
     lost.map(|value| prediction.values[value].row).min()

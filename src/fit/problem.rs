@@ -9,7 +9,7 @@ use super::predict::{Request, Value, predict};
 use super::whitening::{RecordNoise, Whitening};
 use super::{Prediction, Record};
 use crate::error::{Error, Result};
-use crate::experiment::{Experiment, Hysteresis, Law, SupportMotion};
+use crate::experiment::{Experiment, Hysteresis, Law, SupportFlexibility, SupportMotion};
 use crate::model::{Accuracy, Camera, ForwardModel, Parameter, Work};
 use crate::statistics::median;
 
@@ -17,6 +17,12 @@ use crate::statistics::median;
 /// swing, at some hertz. Of further modes they are less: one that is held bent by fingers has a mode in proportion to 1/ω².
 const FURTHER_RAD: f64 = 0.1;
 const FURTHER_RAD_S: f64 = 4.0;
+/// Standard deviation of where a stand that yields is at the first row, and of its speed over ω (m): that of a rig that somebody has just touched (judgement).
+const STAND_M: f64 = 5e-3;
+/// Frequency of a stand over that of a weight on a thread as long as the specimen, to within as much again; its damping ratio, if it is of wood or metal, and the standard deviation of that (judgement).
+const STAND_OVER_SWING: f64 = 6.0;
+const STAND_DAMPING: f64 = 0.05;
+const STAND_DAMPING_SD: f64 = 0.1;
 /// Springs of the hinge that differ by less, as a part of them and of K, hold a strip alike.
 const HELD_ALIKE: f64 = 0.1;
 
@@ -47,6 +53,8 @@ pub struct Problem<'a> {
     pub beliefs: Vec<Belief>,
     /// Shapes free at each start beyond the angles between marks, the further modes of a strip: the frequency of the last mode that the marks show, over that of each.
     pub further_modes: Vec<f64>,
+    /// Coordinates free at each start beyond shapes: of a stand that yields.
+    pub pairs: usize,
     /// What its integrations have cost.
     pub work: Work,
 }
@@ -71,6 +79,8 @@ impl<'a> Problem<'a> {
         let mut experiment = experiment.clone();
         free.iter().for_each(|parameter| switch_on(&mut experiment, *parameter));
         let model = ForwardModel::of(&experiment)?;
+        let mut beliefs = of_stand(&experiment);
+        beliefs.retain(|belief| free.contains(&belief.parameter));
         for parameter in free {
             if parameter.is_of_joint() && model.chain().count() < 2 {
                 let message = "this specimen has one link and no joint; leave it out".to_owned();
@@ -88,8 +98,9 @@ impl<'a> Problem<'a> {
             noise: records.iter().map(|r| RecordNoise::white(vec![1e-3; r.links()])).collect(),
             accuracy: Accuracy::default(),
             dropped_at_s: vec![f64::INFINITY; records.len()],
-            beliefs: Vec::new(),
+            beliefs,
             further_modes: model.shapes().map_or_else(Vec::new, |shapes| shapes.slower()),
+            pairs: model.free_pairs().len(),
             work: Work::default(),
         })
     }
@@ -104,9 +115,14 @@ impl<'a> Problem<'a> {
         self.free.len() + self.records.len() * 2 * self.shapes()
     }
 
-    /// Number of angles, and as many rates, in which each motion starts: those between marks, and further shapes.
+    /// Number of coordinates, and as many rates, in which each motion starts: the angles between marks, further shapes, and a stand's.
     pub fn shapes(&self) -> usize {
-        self.marks() + self.further_modes.len()
+        self.marks() + self.further()
+    }
+
+    /// Of these those beyond the angles between marks.
+    pub fn further(&self) -> usize {
+        self.further_modes.len() + self.pairs
     }
 
     /// Where a recording's start stands among the variables.
@@ -241,7 +257,7 @@ impl<'a> Problem<'a> {
         self.of_each_recording(of).into_iter().chain(self.known_blocks(x).map(Some)).collect()
     }
 
-    /// All that is known beforehand: of the parameters, and of how much of further shapes there may be at each start.
+    /// All that is known beforehand: of the parameters, and of how much of further shapes there may be at each start, and of a stand's own swing.
     fn known_blocks(&self, x: &[f64]) -> impl Iterator<Item = Block> {
         let (marks, shapes) = (self.marks(), self.shapes());
         let of_start = |start: usize| {
@@ -251,7 +267,22 @@ impl<'a> Problem<'a> {
             })
         };
         let further = (0..self.records.len()).flat_map(|record| of_start(self.start_of(record)));
-        self.belief_block(x).into_iter().chain(known_block(&further.collect::<Vec<_>>(), x))
+        let of_pairs = self.starts_of_pairs().map(|place| (place, 0.0, STAND_M));
+        self.belief_block(x).into_iter().chain(known_block(&further.chain(of_pairs).collect::<Vec<_>>(), x))
+    }
+
+    /// Where the start values of a stand's own swing are among the variables.
+    fn starts_of_pairs(&self) -> impl Iterator<Item = usize> {
+        let (first, shapes, pairs) = (self.marks() + self.further_modes.len(), self.shapes(), self.pairs);
+        let of_half = move |half: usize| half + first..half + first + pairs;
+        let halves =
+            (0..self.records.len()).map(|record| self.start_of(record)).flat_map(move |start| [start, start + shapes]);
+        halves.flat_map(of_half)
+    }
+
+    /// ln of how many of a stand's own swings that are believed possible the recordings tell apart, each number of it by itself, from JᵀJ of a fit.
+    pub fn ln_known_of_pairs(&self, normal: &DMatrix<f64>) -> f64 {
+        self.starts_of_pairs().map(|place| (STAND_M * normal[(place, place)].sqrt()).max(1.0).ln()).sum()
     }
 
     /// How far the parameters are from what is known of them, over its standard deviation.
@@ -372,6 +403,16 @@ pub fn stacked(blocks: &[Block], variables: usize) -> (DVector<f64>, DMatrix<f64
     (residual, slopes)
 }
 
+/// What is believed of a stand that yields: a recording that shows it hardly at all tells neither its frequency nor its damping.
+fn of_stand(experiment: &Experiment) -> Vec<Belief> {
+    let Some(stand) = experiment.model.effects.support_flexibility else { return Vec::new() };
+    let (hz, ratio) = (stand.frequency_hz, stand.damping_ratio);
+    vec![
+        Belief { parameter: Parameter::SupportOwnFrequency, value: hz, sd: hz },
+        Belief { parameter: Parameter::SupportDampingRatio, value: ratio, sd: STAND_DAMPING_SD },
+    ]
+}
+
 /// Switches a law on with a coefficient of zero, where it is off.
 pub fn switch_on(experiment: &mut Experiment, parameter: Parameter) {
     let effects = &mut experiment.model.effects;
@@ -396,6 +437,13 @@ pub fn switch_on(experiment: &mut Experiment, parameter: Parameter) {
         Parameter::SupportSine | Parameter::SupportCosine | Parameter::SupportFrequency => {
             let still = SupportMotion { amplitude_m: 0.0, frequency_hz: 1.0, phase_rad: 0.0 };
             effects.support_motion.get_or_insert(still);
+        }
+        Parameter::SupportCompliance | Parameter::SupportOwnFrequency | Parameter::SupportDampingRatio => {
+            let length_m: f64 = experiment.specimen.lengths_m().iter().sum();
+            let swing_hz = (experiment.rig.gravity_m_s2.abs() / length_m).sqrt() / std::f64::consts::TAU;
+            let frequency_hz = STAND_OVER_SWING * swing_hz;
+            let rigid = SupportFlexibility { compliance_m_per_n: 0.0, frequency_hz, damping_ratio: STAND_DAMPING };
+            effects.support_flexibility.get_or_insert(rigid);
         }
         Parameter::TimeBase => on(&mut effects.time_base),
         Parameter::DroppedFrames => on(&mut effects.dropped_frames),

@@ -5,7 +5,7 @@ use super::record::refuse_empty;
 use super::shooting::{self, STATE_WINDOW_RAD, ShootingResult};
 use super::{Problem, Record, start_values, transformed};
 use crate::error::{Error, Result};
-use crate::experiment::{Experiment, Hysteresis, SupportMotion};
+use crate::experiment::{Experiment, Hysteresis, SupportFlexibility, SupportMotion};
 use crate::model::{Parameter, Work};
 use crate::progress::Progress;
 use crate::series::FEWEST_ROWS;
@@ -29,6 +29,9 @@ pub const PARTS: [f64; 4] = [0.1, 0.2, 0.35, 0.6];
 const FINENESS: f64 = 2.0;
 const HIGHEST_HZ: f64 = 20.0;
 const PEAKS: usize = 4;
+/// Frequencies of a stand over the swing's, and its damping ratio, with which it is begun (start values).
+const STANDS: [f64; 5] = [1.5, 3.0, 5.0, 9.0, 16.0];
+const STAND_DAMPING: f64 = 0.05;
 /// Another end is better where it leaves less by this part (judgement).
 const BETTER: f64 = 1e-3;
 /// Beginnings, each of which is a stage.
@@ -96,6 +99,11 @@ pub fn best_robust_fit<'a>(
     }
     if free.contains(&Parameter::SupportFrequency) && search.may_find_more(best.as_ref()) {
         for end in search.with_support(experiment)? {
+            best = better(best, Some(end));
+        }
+    }
+    if free.contains(&Parameter::SupportCompliance) && search.may_find_more(best.as_ref()) {
+        for end in search.with_stand(experiment)? {
             best = better(best, Some(end));
         }
     }
@@ -243,23 +251,63 @@ impl<'a> Search<'a, '_> {
         let of_support = |p: &Parameter| {
             matches!(p, Parameter::SupportSine | Parameter::SupportCosine | Parameter::SupportFrequency)
         };
-        let free: Vec<Parameter> = self.free.iter().copied().filter(|p| !of_support(p)).collect();
         let mut still = experiment.clone();
         still.model.effects.support_motion = None;
+        let begun = |end: &End<'a>| {
+            let of = |frequency_hz| SupportMotion { amplitude_m: 0.0, frequency_hz, phase_rad: 0.0 };
+            let with = |hz: f64| {
+                let mut tried = end.begun.clone();
+                tried.model.effects.support_motion = Some(of(hz));
+                tried
+            };
+            Ok(strongest_hz(end).into_iter().map(with).collect())
+        };
+        self.beside(&still, of_support, begun)
+    }
+
+    /// A stand that yields, begun rigid and with several frequencies of its own, none of which a derivative tells of a rigid one.
+    fn with_stand(&self, experiment: &Experiment) -> Result<Vec<End<'a>>> {
+        let of_stand = |p: &Parameter| {
+            matches!(p, Parameter::SupportCompliance | Parameter::SupportOwnFrequency | Parameter::SupportDampingRatio)
+        };
+        let mut rigid = experiment.clone();
+        rigid.model.effects.support_flexibility = None;
+        let begun = |end: &End<'a>| {
+            let swing_hz = end.problem.model(0, &[])?.0.characteristic_rad_s() / std::f64::consts::TAU;
+            let with = |times: f64| {
+                let mut tried = end.begun.clone();
+                tried.model.effects.support_flexibility = Some(SupportFlexibility {
+                    compliance_m_per_n: 0.0,
+                    frequency_hz: times * swing_hz,
+                    damping_ratio: STAND_DAMPING,
+                });
+                tried
+            };
+            Ok(STANDS.into_iter().map(with).collect())
+        };
+        self.beside(&rigid, of_stand, begun)
+    }
+
+    /// A law beside the fit without it, begun with the values of each of several experiments.
+    fn beside(
+        &self,
+        without_it: &Experiment,
+        of_law: impl Fn(&Parameter) -> bool,
+        begun: impl Fn(&End<'a>) -> Result<Vec<Experiment>>,
+    ) -> Result<Vec<End<'a>>> {
+        let free: Vec<Parameter> = self.free.iter().copied().filter(|p| !of_law(p)).collect();
         let without = Search { free: &free, ..*self };
-        let Some(end) = without.from(&still)? else { return Ok(Vec::new()) };
+        let Some(end) = without.from(without_it)? else { return Ok(Vec::new()) };
         let mut ends = Vec::new();
-        for frequency_hz in strongest_hz(&end) {
-            let mut tried = end.begun.clone();
-            tried.model.effects.support_motion = Some(SupportMotion { amplitude_m: 0.0, frequency_hz, phase_rad: 0.0 });
+        for tried in begun(&end)? {
             let mut problem = self.problem(&tried)?;
             problem.noise.clone_from(&end.problem.noise);
             problem.accuracy = end.problem.accuracy;
             let mut x = problem.start_values()?;
-            for (value, parameter) in x.iter_mut().zip(self.free).filter(|(_, p)| !of_support(p)) {
+            for (value, parameter) in x.iter_mut().zip(self.free).filter(|(_, p)| !of_law(p)) {
                 *value = free.iter().position(|p| p == parameter).map_or(*value, |place| end.outcome.x[place]);
             }
-            x.extend_from_slice(&end.outcome.x[free.len()..]);
+            x.extend(problem.starts_from(&end.problem, &end.outcome.x));
             let robust = Descent { damping: 1e-8, ..Descent::robust(30, 0.03) };
             let outcome = descend(&problem, &robust, x.clone());
             let shot = ShootingResult { x, ..end.shot.clone() };
@@ -301,7 +349,7 @@ fn strongest_hz(end: &End<'_>) -> Vec<f64> {
 /// [`Error::Simulation`] where the specimen cannot swing.
 pub fn observed_starts(problem: &Problem<'_>) -> Result<Vec<f64>> {
     let reach_s = STATE_WINDOW_RAD / problem.model(0, &[])?.0.characteristic_rad_s();
-    let further = vec![0.0; problem.further_modes.len()];
+    let further = vec![0.0; problem.further()];
     let of = |record: &Record| {
         let near = record.state_near(0, reach_s);
         let column = |i: usize| near.iter().map(move |n| n[i]).collect::<Vec<_>>();

@@ -150,7 +150,7 @@ fn close_defects(
             let start = free + index * 2 * marks;
             for half in x[start..start + 2 * marks].chunks(marks) {
                 whole.extend_from_slice(half);
-                whole.extend(vec![0.0; problem.further_modes.len()]);
+                whole.extend(vec![0.0; problem.further()]);
             }
         }
     }

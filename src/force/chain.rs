@@ -37,7 +37,7 @@ impl LitChain {
         let spring = experiment.rig.support_stiffness_n_m_per_rad;
         if spring > 0.0 {
             let effects = &mut experiment.model.effects;
-            effects.hinge_stiffness = Some(effects.hinge_stiffness.unwrap_or(0.0) + spring);
+            effects.hinge_stiffness.get_or_insert(spring);
         }
         let model = ForwardModel::still(&experiment)?;
         let dark_rad = model.rest_rad(DVector::zeros(model.chain().count()), |_, _, _| {})?;

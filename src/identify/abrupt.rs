@@ -44,33 +44,15 @@ pub struct AbruptChange {
 }
 
 /// Every change at once of a recording with these modes, in the order of time.
+///
+/// The largest is found first. A change makes what lies beside it unusual, so that each further one is held against what is usual clear of those that are known.
 pub(super) fn changes(signal: &Signal, fit: &SinusoidFit) -> Vec<AbruptChange> {
     let Some(grid) = Grid::of(signal, fit) else { return Vec::new() };
     let stretches = grid.stretches(signal, fit);
     let differences: Vec<Difference> = grid.differences(&stretches);
-    if differences.len() < FEWEST_INSTANTS {
-        return Vec::new();
-    }
-    let usual_of = |values: &mut Vec<f64>| median(values).unwrap_or(f64::INFINITY);
-    let usually_left_rad: Vec<f64> = (0..signal.links.len())
-        .map(|link| usual_of(&mut stretches.iter().flatten().map(|own| own.left_rad[link]).collect()))
-        .collect();
-    let in_sd: Vec<f64> = differences.iter().map(|own| own.in_sd(&usually_left_rad)).collect();
-    let usual = (usual_of(&mut in_sd.clone()) / MEDIAN_LENGTH).max(1.0);
-    let largest_rad = differences.iter().map(|own| own.amplitudes_rad()[0].norm()).fold(0.0, f64::max);
-    // the length of a plane vector exceeds r standard deviations with a probability of exp(−r²/2)
-    let limit = usual * (2.0 * (differences.len() as f64 / BY_CHANCE).ln()).sqrt();
-    let is_change = |(own, in_sd): &(&Difference, &f64)| {
-        let [before, after] = own.amplitudes_rad();
-        **in_sd > limit && own.is_clean(&usually_left_rad) && (after - before).norm() > LEAST_CHANGE * largest_rad
-    };
-    let mut open: Vec<(&Difference, &f64)> = differences.iter().zip(&in_sd).filter(is_change).collect();
     let mut found: Vec<AbruptChange> = Vec::new();
-    while let Some((largest, _)) = open.iter().max_by(|a, b| a.1.total_cmp(b.1)) {
-        let at_s = largest.t_s;
-        found.push(largest.change());
-        // it lies in the stretches of its neighbours
-        open.retain(|(own, _)| (own.t_s - at_s).abs() > 1.5 * grid.apart * grid.step_s);
+    while let Some(change) = grid.largest_change(&stretches, &differences, &found) {
+        found.push(change);
     }
     found.sort_by(|a, b| a.t_s.total_cmp(&b.t_s));
     found
@@ -110,6 +92,46 @@ impl Grid {
             Stretch::of(&window_fit(&part, 0.5 * (ends_s[0] + ends_s[1]), &[&fit.poles])?, self)
         };
         (0..self.count).map(of).collect()
+    }
+
+    /// The largest change beside those that are known; `None` where no further one is told.
+    fn largest_change(
+        &self,
+        stretches: &[Option<Stretch>],
+        differences: &[Difference<'_>],
+        known: &[AbruptChange],
+    ) -> Option<AbruptChange> {
+        let reach_s = self.apart * self.step_s;
+        let is_clear = |t_s: f64, by: f64| known.iter().all(|change| (t_s - change.t_s).abs() > by * reach_s);
+        let middle_s = |k: usize| self.from_s + (k as f64 + 0.5 * self.apart) * self.step_s;
+        let clear_of = |k: &usize| is_clear(middle_s(*k), 0.5);
+        let links = stretches.iter().flatten().next().map_or(0, |own| own.left_rad.len());
+        let usual_of = |mut values: Vec<f64>| median(&mut values).unwrap_or(f64::INFINITY);
+        let left_rad = |link: usize| {
+            let clear = (0..stretches.len()).filter(clear_of).filter_map(|k| stretches[k].as_ref());
+            usual_of(clear.map(|own| own.left_rad[link]).collect())
+        };
+        let usually_left_rad: Vec<f64> = (0..links).map(left_rad).collect();
+        let clear: Vec<(&Difference, f64)> = (differences.iter().filter(|own| is_clear(own.t_s, 1.0)))
+            .map(|own| (own, own.in_sd(&usually_left_rad)))
+            .collect();
+        if clear.len() < FEWEST_INSTANTS {
+            return None;
+        }
+        let usual = (usual_of(clear.iter().map(|(_, in_sd)| *in_sd).collect()) / MEDIAN_LENGTH).max(1.0);
+        let largest_rad = clear.iter().map(|(own, _)| own.amplitudes_rad()[0].norm()).fold(0.0, f64::max);
+        // the length of a plane vector exceeds r standard deviations with a probability of exp(−r²/2)
+        let limit = usual * (2.0 * (differences.len() as f64 / BY_CHANCE).ln()).sqrt();
+        let is_change = |(own, in_sd): &&(&Difference, f64)| {
+            let [before, after] = own.amplitudes_rad();
+            // it lies in the stretches of its neighbours
+            *in_sd > limit
+                && is_clear(own.t_s, 1.5)
+                && own.is_clean(&usually_left_rad)
+                && (after - before).norm() > LEAST_CHANGE * largest_rad
+        };
+        let largest = clear.iter().filter(is_change).max_by(|a, b| a.1.total_cmp(&b.1))?;
+        Some(largest.0.change())
     }
 
     fn differences<'a>(&self, stretches: &'a [Option<Stretch>]) -> Vec<Difference<'a>> {
@@ -273,6 +295,18 @@ mod tests {
         let [change] = changes_of(&signal, &[pole])[..] else { panic!("one jump") };
         assert!((change.t_s - 30.0).abs() < 0.15 && (change.ahead_cycles - 0.09).abs() < 0.005, "{change:?}");
         assert!((change.after_rad / change.before_rad - 1.0).abs() < 0.02, "{change:?}");
+    }
+
+    #[test]
+    fn a_single_frame_that_is_missing_is_seen_beside_many() {
+        // of 20 s, four frames at 6.7 s and one at 14 s: both lie in most of the stretches
+        let pole = Pole::of(1.0, 0.004);
+        let later = |t: f64| t + if t < 6.7 { 0.0 } else { 4.0 / 30.0 } + if t < 14.0 { 0.0 } else { 1.0 / 30.0 };
+        let whole = recorded(|t| 0.28 * (-pole.decay_per_s * later(t)).exp() * (pole.omega_rad_s * later(t)).cos());
+        let found = changes_of(&whole.between(0.0, 20.0), &[pole]);
+        let [many, one] = found[..] else { panic!("{found:?}") };
+        assert!((many.t_s - 6.7).abs() < 0.2 && (one.t_s - 14.0).abs() < 0.2, "{found:?}");
+        assert!((one.ahead_cycles - 1.0 / 30.0).abs() < 0.005, "{found:?}");
     }
 
     #[test]

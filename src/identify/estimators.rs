@@ -57,7 +57,8 @@ impl Estimator {
         if (frequency_hz.is_none() && self.frequency_hz.is_some())
             || (damping_ratio.is_none() && self.damping_ratio.is_some())
         {
-            let what = if frequency_hz.is_none() { "f" } else { "ξ" };
+            let is_f = frequency_hz.is_none() && self.frequency_hz.is_some();
+            let what = if is_f { "f" } else { "ξ" };
             self.note = Some(format!("not identifiable: its interval for {what} is wider than {what} can be"));
         }
         Self { frequency_hz, damping_ratio, ..self }

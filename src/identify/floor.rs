@@ -50,8 +50,10 @@ impl Floor {
     /// given links                  lowest root of det(diag(g hᵢ) − ω² a) = 0, the joints free
     /// ```
     pub fn of(specimen: &Specimen, chain: &Chain, gravity_m_s2: f64, frequency_hz: Estimate) -> Self {
-        let length_m: f64 = chain.links().iter().map(|l| l.length_m).sum();
-        let (body, floor_hz, rigid_hz) = if specimen.links.is_empty() {
+        let is_strip = specimen.links.is_empty();
+        // a strip may go on below its last mark
+        let length_m = if is_strip { specimen.length_m } else { chain.links().iter().map(|l| l.length_m).sum() };
+        let (body, floor_hz, rigid_hz) = if is_strip {
             let rigid_hz = rigid_frequency_hz(length_m, gravity_m_s2);
             ("the limp strip", limp_frequency_hz(0, length_m, gravity_m_s2), Some(rigid_hz))
         } else {
@@ -61,15 +63,15 @@ impl Floor {
         let ratio = frequency_hz.value / floor_hz;
         let remedy = below.then(|| Remedy { time: ratio, length: ratio.powi(-2), gravity: ratio.powi(2) });
         let weight_hz = (gravity_m_s2 / length_m).sqrt() / std::f64::consts::TAU;
-        let is_weight = specimen.links.is_empty() && (frequency_hz.value / weight_hz - 1.0).abs() < LIKE_A_WEIGHT;
+        let is_weight = is_strip && (frequency_hz.value / weight_hz - 1.0).abs() < LIKE_A_WEIGHT;
         let statement = match remedy {
             Some(_) if is_weight => format!(
                 "{:.4} Hz is below the floor of {floor_hz:.4} Hz ({body}), but a weight on a thread of {length_m} m swings at {weight_hz:.4} Hz: if that is what hangs there, describe it with [[specimen.links]], its com_m from the hinge",
                 frequency_hz.value
             ),
             Some(r) => {
-                let other = if specimen.links.is_empty() {
-                    "it is no strip of even mass (weights at the joints, a rigid body that goes on below its last mark: describe these with [[specimen.links]])"
+                let other = if is_strip {
+                    "it is no strip of even mass (weights at the joints, a rigid body that goes on below its last mark: describe these with [[specimen.links]]), or it is so light that the air it moves weighs as much (fit --free added_mass)"
                 } else {
                     "a centre of mass or an inertia is"
                 };

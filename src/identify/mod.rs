@@ -87,15 +87,15 @@ pub struct Record {
     pub source: String,
     /// Rows of the table.
     pub rows: usize,
-    /// Values of each angle.
+    /// Values of each angle that are used.
     pub values: Vec<usize>,
-    /// From the first to the last.
+    /// From the first row to the last.
     pub duration_s: f64,
     /// Median step.
     pub step_s: f64,
     /// Share of steps that differ from it by more than 5 %.
     pub irregular_share: f64,
-    /// Noise of each angle, from what fits over a few cycles leave over.
+    /// Root mean square of what the modes leave of each angle, noise included; at most the noise that neighbouring values show, where a mode leaves more than noise.
     pub noise_rad: Vec<f64>,
     /// Whether the times are 0, 1, 2, … or go on so from another number.
     pub counts: bool,
@@ -127,8 +127,8 @@ pub struct Identification {
     pub rests_from_s: Option<f64>,
     /// When the swing changes at once, by a touch or by frames that are missing.
     pub abrupt_changes: Vec<AbruptChange>,
-    /// From when to when the record is identified, where the swing changes at once: the longest part between such changes.
-    pub used_s: Option<[f64; 2]>,
+    /// From when to when the record is identified: without what is held, rests or tumbles, and where the swing changes at once the longest part between such changes.
+    pub used_s: [f64; 2],
     /// What keeps it from being a swing; then there are no modes.
     pub tumbling: Option<Tumbling>,
     /// How far each link's resting angle moves over the record, no part of any mode; zero where the data do not ask for a drift.
@@ -156,17 +156,15 @@ pub struct Identification {
 /// [`crate::Error::Simulation`] when the experiment's specimen cannot swing. What the data cannot tell is no error but says so in the result.
 pub fn identify(series: &AngleSeries, experiment: Option<&Experiment>) -> Result<Identification> {
     let body = experiment.map(|e| Ok(Body { experiment: e, chain: Chain::of(&e.specimen)? })).transpose()?;
+    let whole = series;
     let (series, [held_until_s, caught_s]) = free(series);
     let (series, unsure) = sure(series, Measured::Angles);
     let series = &*series;
-    let (signal, wrapped) = Signal::of(series).unwrapped();
-    let mut found = Identification::of_record(series, &signal, Measured::Angles);
+    let signal = Signal::of(series);
+    let mut found = Identification::of_record(whole, series, &signal, Measured::Angles);
     found.notes.extend(unsure);
     found.held_until_s = held_until_s;
     found.rests_from_s = caught_s;
-    for link in wrapped {
-        found.notes.push(format!("θ{} jumps by full turns, as wrapped angles do: taken out", link + 1));
-    }
     found.tumbling = Tumbling::of(&signal);
     Ok(found.with_modes(signal, &stated_rad(series), body.as_ref()))
 }
@@ -196,11 +194,12 @@ fn sure(series: Cow<'_, AngleSeries>, measured: Measured) -> (Cow<'_, AngleSerie
 
 /// Identifies the displacement of one mark, over [`crate::series::PX_PER_RAD`].
 pub fn identify_displacement(series: &AngleSeries) -> Identification {
+    let whole = series;
     let (series, [held_until_s, rests_from_s]) = free(series);
     let (series, unsure) = sure(series, Measured::Displacement);
     let series = &*series;
     let signal = Signal::of(series);
-    let mut found = Identification::of_record(series, &signal, Measured::Displacement);
+    let mut found = Identification::of_record(whole, series, &signal, Measured::Displacement);
     found.notes.extend(unsure);
     Identification { held_until_s, rests_from_s, ..found }.with_modes(signal, &stated_rad(series), None)
 }
@@ -225,13 +224,13 @@ struct Body<'a> {
 }
 
 impl Identification {
-    /// What can be said before anything is fitted.
-    fn of_record(series: &AngleSeries, signal: &Signal, measured: Measured) -> Self {
+    /// What can be said of a whole recording, and of the series in it of which more is said, before anything is fitted.
+    fn of_record(whole: &AngleSeries, series: &AngleSeries, signal: &Signal, measured: Measured) -> Self {
         let record = Record {
             source: series.path.display().to_string(),
-            rows: series.len(),
+            rows: whole.len(),
             values: signal.links.iter().map(|l| l.t_s.len()).collect(),
-            duration_s: series.duration_s(),
+            duration_s: whole.duration_s(),
             step_s: series.step_s(),
             irregular_share: series.irregular_share(),
             noise_rad: Vec::new(),
@@ -246,7 +245,7 @@ impl Identification {
             held_until_s: None,
             rests_from_s: None,
             abrupt_changes: Vec::new(),
-            used_s: None,
+            used_s: signal.span_s,
             tumbling: None,
             drift_rad: Vec::new(),
             swing_mode: None,
@@ -272,6 +271,7 @@ impl Identification {
         match self.swing_of(signal) {
             Ok((signal, chosen)) => {
                 let (signal, chosen) = self.between_changes(signal, chosen);
+                self.used_s = signal.span_s;
                 self.add_modes(&signal, chosen, body);
             }
             Err(reason) => self.notes.push(format!("{}{reason}", summary::NOTHING)),
@@ -315,7 +315,6 @@ impl Identification {
         match of_part {
             Ok(of_part) => {
                 self.spectrum = spectrum;
-                self.used_s = Some(used_s);
                 (part, of_part)
             }
             Err(_) => (signal, chosen),
@@ -432,7 +431,7 @@ impl Identification {
         }
     }
 
-    /// The floor of a rigid pendulum, and the joint's equivalents, from the mode in which all links swing together.
+    /// The floor of the limp strip, or of given links with free joints, and the joint's equivalents, from the mode in which all links swing together.
     fn add_equivalents(&mut self, body: &Body, swing: usize) {
         let Some(swing) = self.modes.get(swing) else { return };
         let gravity_m_s2 = body.experiment.rig.gravity_m_s2;

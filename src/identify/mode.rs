@@ -172,19 +172,14 @@ impl Mode {
         self.shape.iter().all(|l| l.phase_to_first_rad.value.cos() > 0.0)
     }
 
-    /// The frequency at small amplitude; where the data do not tell how it depends on amplitude, with this κ.
+    /// The frequency at small amplitude; where the one given belongs to a larger amplitude, with this κ.
     pub fn small_amplitude_hz(&self, kappa_per_rad2: f64) -> Estimate {
-        match self.frequency_law() {
-            Some(law) if self.expected_kappa_per_rad2.is_some_and(|own| is_beyond_springs(&law, own)) => {
-                self.frequency_hz
-            }
-            Some(law) => law.f0_hz,
-            None => {
-                let amplitude_rad = self.amplitude_rad();
-                let highest = self.frequency_hz.high / (1.0 - kappa_per_rad2 * amplitude_rad * amplitude_rad).max(0.5);
-                self.frequency_hz.widened_to_cover(self.frequency_hz.low, highest)
-            }
+        if self.frequency_at_amplitude_rad.is_none() {
+            return self.frequency_hz;
         }
+        let amplitude_rad = self.amplitude_rad();
+        let highest = self.frequency_hz.high / (1.0 - kappa_per_rad2 * amplitude_rad * amplitude_rad).max(0.5);
+        self.frequency_hz.widened_to_cover(self.frequency_hz.low, highest)
     }
 
     /// What disagreement and dependence on amplitude mean, in words.

@@ -29,12 +29,6 @@ impl LinkSamples {
         (ends[1] - ends[0]).max(0.0)
     }
 
-    /// Whether the angles were wrapped: they stay within one turn, and jump across three quarters of it from one sample to the next.
-    fn is_wrapped(&self) -> bool {
-        let jump = |pair: &[f64]| (pair[1] - pair[0]).abs() > 0.75 * std::f64::consts::TAU;
-        self.range_rad() <= 1.001 * std::f64::consts::TAU && self.theta_rad.windows(2).any(jump)
-    }
-
     /// The time each sample stands for, half of that to its neighbours, in median steps: the weights that make a sum an integral. At the
     /// edge of a gap half a step at most is added.
     pub fn cells(&self, step_s: f64) -> Vec<f64> {
@@ -116,23 +110,6 @@ impl Signal {
         // rows without a value resolve nothing
         let steps = links.iter().filter_map(|l| median_step_s(&l.t_s));
         Self { step_s: steps.fold(series.step_s(), f64::max), links, span_s: ends }
-    }
-
-    /// With the jumps of angles that were wrapped to one turn taken out; which links had any.
-    #[must_use]
-    pub fn unwrapped(mut self) -> (Self, Vec<usize>) {
-        let wrapped: Vec<usize> = (0..self.links.len()).filter(|link| self.links[*link].is_wrapped()).collect();
-        for link in &wrapped {
-            let mut turns = 0.0;
-            let theta = &mut self.links[*link].theta_rad;
-            for k in 1..theta.len() {
-                // the one before is unwrapped already
-                let step = theta[k] + turns - theta[k - 1];
-                turns -= (step / std::f64::consts::TAU).round() * std::f64::consts::TAU;
-                theta[k] += turns;
-            }
-        }
-        (self, wrapped)
     }
 
     /// From the first time stamp to the last.

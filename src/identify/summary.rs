@@ -44,9 +44,14 @@ pub(super) fn summary(found: &Identification) -> String {
 fn changes(found: &Identification) -> String {
     let one = |change: &AbruptChange| change.statement(found.record.measured);
     let each: Vec<String> = found.abrupt_changes.iter().map(one).collect();
-    let used = found.used_s.map_or(String::new(), |[from_s, until_s]| {
+    let [from_s, until_s] = found.used_s;
+    // where no part is a swing of its own, all is used
+    let is_part = found.abrupt_changes.iter().all(|change| change.t_s <= from_s || change.t_s >= until_s);
+    let used = if is_part {
         format!("; only {from_s:.2} to {until_s:.2} s is used, as with `--from {from_s:.2} --until {until_s:.2}`")
-    });
+    } else {
+        String::new()
+    };
     format!("{}{used}", each.join("; "))
 }
 

@@ -53,7 +53,7 @@ impl Tumbling {
             Some(from_s) => format!("only what follows is used, as with `--from {from_s:.2}`"),
             None => "record on until every link only swings, or release it lower".to_owned(),
         };
-        let unit = if last.turned_s.is_none() { " (are these degrees, multiply by π/180)" } else { "" };
+        let unit = if last.turned_s.is_none() { " (if these are degrees, multiply by π/180)" } else { "" };
         let statement = format!("θ{link} {what}{unit}, and such a motion has no modes; {remedy}");
         Some(Self { link, turned_until_s: last.turned_s, last_s, swings_from_s, statement })
     }
@@ -161,14 +161,5 @@ mod tests {
     fn one_wrong_sample_is_no_turn() {
         let wrong = |t: f64| if (15.0..15.03).contains(&t) { 9.0 } else { 0.3 * (4.0 * t).cos() };
         assert_eq!(Tumbling::of(&signal(&[&wrong])), None);
-    }
-
-    #[test]
-    fn wrapped_angles_are_unwrapped() {
-        let wrapped = |t: f64| whirl_then_swing(t).sin().atan2(whirl_then_swing(t).cos());
-        let (unwrapped, links) = signal(&[&wrapped]).unwrapped();
-        assert_eq!(links, [0]);
-        assert!((unwrapped.links[0].range_rad() - signal(&[&whirl_then_swing]).links[0].range_rad()).abs() < 1e-9);
-        assert!(signal(&[&|t: f64| (4.0 * t).cos()]).unwrapped().1.is_empty());
     }
 }

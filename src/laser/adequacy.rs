@@ -21,6 +21,8 @@ const SLOW_PART: f64 = 0.5;
 const BAND_RATIO: usize = 3;
 /// Stretches of which the variance is compared.
 const STRETCHES: usize = 48;
+/// Of fewer values than this the median of the squares does not scatter as that of many (statistics).
+const SHORTEST_STRETCH: usize = 20;
 /// Of the median of n squares of a normal number, times n, over the square of their median: 1/(2 f(m) m)² of χ² with one degree of freedom.
 const MEDIAN_VARIANCE: f64 = 5.43;
 /// Ends of the stretches of time after an edge of the lamp, each of which may have a level of its own (s).
@@ -151,7 +153,7 @@ fn spectrum(bench: &Bench<'_>, stage: &Stage, left: &[f64]) -> Vec<Test> {
 /// Variance of the slow part that is not the same throughout. Of each stretch by the median of the squares: what rings for seconds after a knock, in modes that are
 /// not followed, is no noise.
 fn variance(left: &[f64], cell_m: f64) -> Test {
-    let length = (left.len() / STRETCHES).max(1);
+    let length = (left.len() / STRETCHES).max(SHORTEST_STRETCH);
     let usual = |part: &[f64]| {
         let mut squares: Vec<f64> = part.iter().map(|v| v * v).collect();
         crate::statistics::median(&mut squares).unwrap_or(0.0)
@@ -163,7 +165,7 @@ fn variance(left: &[f64], cell_m: f64) -> Test {
     let most = parts.iter().copied().fold(0.0, f64::max) / mean.max(f64::MIN_POSITIVE);
     Test {
         looks_for: "uneven noise",
-        p_value: chi_squared_tail(chi2, (STRETCHES - 1) as f64),
+        p_value: if parts.len() > 1 { chi_squared_tail(chi2, (parts.len() - 1) as f64) } else { 1.0 },
         at: None,
         rms_m: cell_m * (most - 1.0).max(0.0).sqrt(),
     }

@@ -149,7 +149,14 @@ impl Columns {
         };
         let t = names.iter().position(|name| is_time(name));
         let t = t.ok_or_else(|| format!("names no column of time; the columns are {list}; name it t_s or t_ms"))?;
-        let t_scale_s = if words(names[t]).any(|w| w == "ms") { 1e-3 } else { 1.0 };
+        let unit = words(names[t]).find_map(|w| TIME_UNITS.iter().find(|unit| unit.0 == w));
+        let t_scale_s = match unit {
+            None | Some((_, Some(1.0))) => 1.0,
+            Some((_, Some(scale_s))) => *scale_s,
+            Some((unit, None)) => {
+                return Err(format!("column `{}` is in {unit}; give the times in seconds or milliseconds", names[t]));
+            }
+        };
         let y = match &laser.column {
             Some(wanted) => names.iter().position(|name| name == wanted).ok_or_else(|| {
                 let near = names
@@ -206,6 +213,26 @@ impl Columns {
         })
     }
 }
+
+/// Units of time in a column's name, and how many seconds each is, of those that are read.
+const TIME_UNITS: [(&str, Option<f64>); 16] = [
+    ("s", Some(1.0)),
+    ("sec", Some(1.0)),
+    ("seconds", Some(1.0)),
+    ("ms", Some(1e-3)),
+    ("us", None),
+    ("µs", None),
+    ("μs", None),
+    ("ns", None),
+    ("min", None),
+    ("minutes", None),
+    ("h", None),
+    ("hours", None),
+    ("d", None),
+    ("days", None),
+    ("frame", None),
+    ("samples", None),
+];
 
 /// The words of a column's name.
 fn words(name: &str) -> impl Iterator<Item = String> + '_ {

@@ -11,6 +11,7 @@
 use serde::Serialize;
 
 use crate::experiment::{Experiment, Reflectivity, Support};
+use crate::identify::estimate::NORMAL_QUANTILE;
 use crate::model::light::{Beam, SPEED_OF_LIGHT_M_S, radiation_force_n};
 
 /// Steps of the integral along the strip.
@@ -67,7 +68,7 @@ pub fn figure(experiment: &Experiment, [push_m, sd_m]: [f64; 2]) -> Result<Figur
     let cos = incidence_rad.cos();
     let per_push = area_m2 / lever_m3_n * SPEED_OF_LIGHT_M_S / (flux_w_m2 * area_m2 * cos);
     let (value, sd) = (push_m.abs() * per_push, sd_m * per_push);
-    let interval = [value - 1.96 * sd, value + 1.96 * sd];
+    let interval = [value - NORMAL_QUANTILE * sd, value + NORMAL_QUANTILE * sd];
     let possible = [cos, (2.0 * cos).max(cos + 2.0 / 3.0)];
     let stated = experiment.specimen.reflectivity.map(|surface| {
         let [normal_n, along_n] = radiation_force_n(flux_w_m2, area_m2, incidence_rad, &surface);

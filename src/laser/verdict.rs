@@ -7,7 +7,8 @@ use super::fit::{Bench, Fit, Member};
 use super::forms::{Effect, Form};
 use super::search::{Candidate, inclusion, mixed_push};
 use super::solve::solve;
-use crate::identify::estimate::student_quantile;
+use crate::identify::estimate::{NORMAL_QUANTILE, student_quantile};
+use crate::statistics::no_chance;
 
 /// A set of effects is certain from this probability on.
 const CERTAIN: f64 = 0.9;
@@ -117,11 +118,12 @@ fn remainder(bench: &Bench<'_>, candidates: &[Candidate], adequacy: &Adequacy) -
     let left = adequacy.left();
     let frequency_hz = left.filter(|t| t.looks_for.contains("spectrum")).and_then(|t| t.at);
     let crept_m = crept_m(bench, best);
+    let other = inclusion(candidates, Effect::Other);
     let found_m = left.map_or(0.0, |test| test.rms_m);
     let rms_m = found_m.max(crept_m);
     let chi2 = held * (rms_m / bench.cell_m()).powi(2);
     Remainder {
-        present: (1.0 - adequacy.p_value).max(inclusion(candidates, Effect::Other)),
+        present: if adequacy.adequate { other } else { no_chance(adequacy.p_value).max(other) },
         like: if crept_m > found_m { Some("a creep with the logarithm of time") } else { left.map(|t| t.looks_for) },
         frequency_hz,
         rms_m,
@@ -196,7 +198,7 @@ fn scatter_m(cycles_m: &[[f64; 2]]) -> f64 {
     }
     let mean = cycles_m.iter().map(|c| c[0]).sum::<f64>() / count;
     let variance = cycles_m.iter().map(|c| (c[0] - mean).powi(2)).sum::<f64>() / (count - 1.0);
-    (variance / count).sqrt() * student_quantile(count - 1.0) / 1.96
+    (variance / count).sqrt() * student_quantile(count - 1.0) / NORMAL_QUANTILE
 }
 
 /// The smallest size of each effect that would be named beside what a fit holds, and what it would be confused with.

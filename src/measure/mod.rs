@@ -15,11 +15,11 @@ use crate::error::{Error, Result};
 use crate::experiment::{MarkColour, Rig};
 use crate::progress::Progress;
 use crate::rejected::Rejected;
-use crate::steady::Background;
+use crate::steady::{Background, CameraShift};
 use crate::track::{FrameBlobs, MarkSlot, TrackedObject, Tracker, Tracks};
 use crate::video::{DamageSpread, Decoded, Outcome, OwnedPicture, Recording, StillTimes, StreamInfo, Timing};
 use survey::SurveyedCamera;
-use view::{Seen, View, frame_blobs};
+use view::{Seen, View, Watch, frame_blobs};
 
 /// Whether the camera's own motion is taken out.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
@@ -131,6 +131,8 @@ pub fn measure(path: &Path, options: &Options, folder: &Path, progress: &dyn Pro
     Session::open(path, options, folder, progress)?.run(progress)
 }
 
+/// Frames in which the camera is watched where it seems to stand still (cost: each takes as long as some ten frames).
+const WATCHED: u32 = 8;
 /// Pictures that tell whether a thing makes a difference where it is, at least (judgement: of one or two chance decides).
 const FEWEST_TELLING: usize = 3;
 /// So many points around a thing are looked at, so far from its middle in its radii (judgement: what it is painted on reaches so far beyond it).
@@ -155,11 +157,15 @@ pub struct Session<'a> {
     detector: Detector,
     slots: Vec<MarkSlot>,
     background: Option<Background>,
+    /// Against what the camera is watched, as long as nothing is taken out.
+    watch: Option<Background>,
     /// The camera stands still.
     still: bool,
     /// As the pictures looked at beforehand show it.
     first_camera: Camera,
     camera: Camera,
+    /// Where the camera looked in the frames in which it was watched.
+    watched: Vec<CameraShift>,
     stamps_s: Vec<f64>,
 }
 
@@ -180,7 +186,7 @@ impl<'a> Session<'a> {
         let marks = || album.calibrate(&mut hues, options.threshold);
         let (trials, surveyed) = rayon::join(marks, || survey::camera(&pictures, options, &stream));
         let mut trials = trials?;
-        let SurveyedCamera { background, camera, still, shifts } = surveyed;
+        let SurveyedCamera { background, camera, watch, still, shifts } = surveyed;
         if options.steadying == Steadying::Always && !camera.taken_out {
             return Err(nothing_steady());
         }
@@ -203,9 +209,11 @@ impl<'a> Session<'a> {
             detector: Detector::new(Vec::new()),
             slots,
             background,
+            watch,
             still,
             first_camera: camera,
             camera,
+            watched: Vec::new(),
             stamps_s,
         };
         if !session.hues.is_empty() {
@@ -305,8 +313,27 @@ impl<'a> Session<'a> {
         let mut tracker = Tracker::new(self.slots.clone(), self.options.rig.pivot_px);
         let detector = self.detector.clone();
         let decoded = self.each_frame(&detector, progress, &mut |frame| tracker.push(frame))?;
+        if self.takes_out_what_was_watched() {
+            return self.attempt(progress);
+        }
         progress.begin("angles", None);
         self.conclude(decoded, tracker)
+    }
+
+    /// Whether the camera has moved in the frames just seen though the pictures looked at beforehand did not show it, as after a knock in the middle: from now on its motion is
+    /// taken out.
+    fn takes_out_what_was_watched(&mut self) -> bool {
+        let watched = std::mem::take(&mut self.watched);
+        let moved = |shift: &&CameraShift| {
+            shift.size_px() > survey::CAMERA_MOVES_PX && shift.size_px() > survey::SURE_SHIFT * shift.sd_px()
+        };
+        // one picture alone may have something pass before its patches
+        if watched.len() < survey::FEWEST_PICTURES || watched.iter().filter(moved).count() < 2 {
+            return false;
+        }
+        self.background = self.watch.take();
+        self.first_camera.taken_out = self.background.is_some();
+        self.first_camera.taken_out
     }
 
     /// Everything of these hues in every frame. May be called again.
@@ -322,6 +349,11 @@ impl<'a> Session<'a> {
         };
         let mut frames = Vec::new();
         self.each_frame(&detector, progress, &mut |frame| frames.push(frame))?;
+        if self.takes_out_what_was_watched() {
+            frames.clear();
+            self.rewind()?;
+            self.each_frame(&detector, progress, &mut |frame| frames.push(frame))?;
+        }
         self.camera.finish(self.stamps_s.len());
         Ok(frames)
     }
@@ -343,15 +375,21 @@ impl<'a> Session<'a> {
         sink: &mut dyn FnMut(FrameBlobs),
     ) -> Result<Decoded> {
         progress.begin("tracking", self.stream.stated_frames);
-        let view = View::of(&self.stream, self.options, &self.area, self.background.as_ref());
+        let frames_and_rate = self.stream.stated_frames.zip(self.stream.nominal_rate_hz);
+        let watch = self.watch.as_ref().zip(frames_and_rate).map(|(background, (frames, rate_hz))| {
+            let every_s = (frames as f64 / f64::from(WATCHED)).max(1.0) / rate_hz;
+            Watch { background, every_s, step_s: 1.0 / rate_hz }
+        });
+        let view = View { watch, ..View::of(&self.stream, self.options, &self.area, self.background.as_ref()) };
         let mut spread = DamageSpread::new(self.stream.delay_frames);
-        let (stamps_s, camera) = (&mut self.stamps_s, &mut self.camera);
+        let (stamps_s, camera, watched) = (&mut self.stamps_s, &mut self.camera, &mut self.watched);
         let mut take = |frame: Outcome<Seen>| {
             if frame.value.outside {
                 return;
             }
             stamps_s.push(frame.value.t_s);
             camera.note(&frame.value);
+            watched.extend(frame.value.watched);
             sink(frame_blobs(frame));
         };
         let decoded =

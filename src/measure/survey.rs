@@ -18,10 +18,10 @@ use crate::video::{Orientation, OwnedPicture, Picture, Recording, StreamInfo, WH
 /// Pictures from which hue, scale, threshold and siting are learnt.
 const SAMPLE_PICTURES: usize = 8;
 /// Shift between two pictures from which the camera is taken to move, px: ten times what a patch's error is.
-const CAMERA_MOVES_PX: f64 = 0.3;
+pub const CAMERA_MOVES_PX: f64 = 0.3;
 /// Standard deviations beyond which a shift is one, and pictures that must show it.
-const SURE_SHIFT: f64 = 5.0;
-const FEWEST_PICTURES: usize = 3;
+pub const SURE_SHIFT: f64 = 5.0;
+pub const FEWEST_PICTURES: usize = 3;
 
 /// Standard deviations of the mean by which marks that are mixed by their light must fit better (the one-standard-error rule of Breiman et al., Classification and
 /// Regression Trees, 1984).
@@ -149,6 +149,8 @@ pub struct SurveyedCamera {
     pub background: Option<Background>,
     /// How far it moves.
     pub camera: Camera,
+    /// Against what it is watched, where nothing is taken out but could be.
+    pub watch: Option<Background>,
     /// Most pictures show that it stands still.
     pub still: bool,
     /// Where it looks in every picture, where its motion is taken out.
@@ -188,10 +190,13 @@ pub fn camera(pictures: &[OwnedPicture], options: &Options, stream: &StreamInfo)
         }
     };
     background.keep_steady(&agreed);
-    let taken_out = taken_out && background.is_usable();
+    let is_usable = background.is_usable();
+    let taken_out = taken_out && is_usable;
+    let is_watched = options.steadying == Steadying::WhereNeeded && !silent && !taken_out && is_usable;
     let greatest_shift_px = if silent { 0.0 } else { greatest_px };
     let camera = Camera { greatest_shift_px, is_told: !silent, taken_out, ..Camera::default() };
     SurveyedCamera {
+        watch: is_watched.then(|| background.clone()),
         background: taken_out.then_some(background),
         camera,
         still: !silent && !taken_out && greatest_px <= CAMERA_MOVES_PX,

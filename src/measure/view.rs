@@ -15,6 +15,8 @@ pub struct Seen {
     pub outside: bool,
     pub sightings: Vec<Sighting>,
     pub camera: Option<CameraShift>,
+    /// Where the camera looks, in a frame in which it is watched.
+    pub watched: Option<CameraShift>,
 }
 
 /// From stored to displayed pixels.
@@ -26,7 +28,24 @@ pub struct View<'a> {
     pub glance: bool,
     pub area: &'a Area,
     pub background: Option<&'a Background>,
+    pub watch: Option<Watch<'a>>,
     pub span_s: [f64; 2],
+}
+
+/// A look at where the camera stands, every so often.
+#[derive(Clone, Copy)]
+pub struct Watch<'a> {
+    pub background: &'a Background,
+    /// From one look to the next, and from one frame to the next.
+    pub every_s: f64,
+    pub step_s: f64,
+}
+
+impl Watch<'_> {
+    /// Whether it is time for a look, as the stamp alone tells: frames are looked at in no order.
+    fn is_due(&self, t_s: f64) -> bool {
+        (t_s / self.every_s).floor() > ((t_s - self.step_s) / self.every_s).floor()
+    }
 }
 
 impl<'a> View<'a> {
@@ -40,6 +59,7 @@ impl<'a> View<'a> {
             glance: false,
             area,
             background,
+            watch: None,
             span_s: rig.span_s(),
         }
     }
@@ -47,9 +67,11 @@ impl<'a> View<'a> {
     /// Time stamp and blobs of a frame, as displayed, the camera's motion taken out.
     pub fn look(&self, detector: &Detector, frame: &Frame<'_>) -> Result<Outcome<Seen>> {
         let outside = !(self.span_s[0]..=self.span_s[1]).contains(&frame.t_s);
-        let mut seen = Seen { t_s: frame.t_s, outside, sightings: Vec::new(), camera: None };
+        let mut seen = Seen { t_s: frame.t_s, outside, sightings: Vec::new(), camera: None, watched: None };
         if !frame.damaged && !outside {
             seen.camera = self.background.and_then(|b| b.locate(&frame.picture));
+            let due = self.watch.filter(|watch| watch.is_due(frame.t_s));
+            seen.watched = due.and_then(|watch| watch.background.locate(&frame.picture));
             if self.background.is_none() || seen.camera.is_some() {
                 let mut blobs =
                     if self.glance { detector.glance(&frame.picture) } else { detector.detect(&frame.picture) }?;

@@ -112,6 +112,16 @@ impl ForwardModel {
         self.shapes.as_ref().map_or_else(|| links_from_chords(&self.chain), |shapes| shapes.start().clone())
     }
 
+    /// Of each law whose variables are a coordinate and its rate where they stand among the rates; both may have any value where a motion starts.
+    pub fn free_pairs(&self) -> Vec<usize> {
+        let (mut place, mut pairs) = (self.chain.count(), Vec::new());
+        for effect in &self.effects {
+            pairs.extend(effect.begins_free().then_some(place));
+            place += effect.hidden(&self.chain);
+        }
+        pairs
+    }
+
     /// Number of rates: one a link, and the laws' own variables.
     pub fn rates(&self) -> usize {
         self.chain.count() + self.hidden
@@ -167,7 +177,7 @@ impl ForwardModel {
         let of = |[torque_n_m, most_rad]: [f64; 2]| {
             if torque_n_m < most_rad * held_n_m { torque_n_m / held_n_m } else { most_rad }
         };
-        self.effects.iter().map(|effect| of(effect.of_hidden())).fold(0.0, f64::max)
+        self.effects.iter().map(|effect| of(effect.of_hidden(&self.chain))).fold(0.0, f64::max)
     }
 
     /// Sideways position of the pivot (m).

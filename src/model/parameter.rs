@@ -94,6 +94,12 @@ pub enum Parameter {
     SupportCosine,
     /// Frequency of the pivot's motion.
     SupportFrequency,
+    /// s of a stand that yields.
+    SupportCompliance,
+    /// f of that stand.
+    SupportOwnFrequency,
+    /// ζ of that stand.
+    SupportDampingRatio,
     /// Of a link, the uppermost being 0.
     Link(u8, LinkProperty),
     /// ε of the camera's clock.
@@ -139,6 +145,9 @@ impl Parameter {
             Self::SupportSine => "support_motion.sine_m",
             Self::SupportCosine => "support_motion.cosine_m",
             Self::SupportFrequency => "support_motion.frequency_hz",
+            Self::SupportCompliance => "support_flexibility.compliance_m_per_n",
+            Self::SupportOwnFrequency => "support_flexibility.frequency_hz",
+            Self::SupportDampingRatio => "support_flexibility.damping_ratio",
             Self::Link(link, LinkProperty::Inertia) => kept(&format!("links.{}.inertia_kg_m2", link + 1)),
             Self::Link(link, LinkProperty::Com) => kept(&format!("links.{}.com_m", link + 1)),
             Self::Link(link, LinkProperty::Length) => kept(&format!("links.{}.length_m", link + 1)),
@@ -176,8 +185,9 @@ impl Parameter {
             Self::SideForce => "m/s2",
             Self::SupportSine | Self::SupportCosine | Self::Link(_, LinkProperty::Com | LinkProperty::Length) => "m",
             Self::Link(_, LinkProperty::Inertia) => "kg m2",
-            Self::SupportFrequency => "Hz",
-            Self::TimeBase | Self::AngleGain | Self::ViewStretch | Self::ViewShear => "1",
+            Self::SupportFrequency | Self::SupportOwnFrequency => "Hz",
+            Self::SupportCompliance => "m/N",
+            Self::SupportDampingRatio | Self::TimeBase | Self::AngleGain | Self::ViewStretch | Self::ViewShear => "1",
             Self::DroppedFrames | Self::DifferentialLag => "s",
             Self::Law(coefficient) => coefficient.unit,
         }
@@ -205,7 +215,9 @@ impl Parameter {
 
     /// Whether its law is proportional to it, and gone at zero; a yield angle or a frequency only shapes a law.
     pub fn is_proportional(self) -> bool {
-        !matches!(self, Self::HysteresisYield | Self::SupportFrequency)
+        let shapes =
+            [Self::HysteresisYield, Self::SupportFrequency, Self::SupportOwnFrequency, Self::SupportDampingRatio];
+        !shapes.contains(&self)
     }
 
     /// Whether nature allows only values from zero upwards.
@@ -238,6 +250,9 @@ impl Parameter {
             | Self::AirQuadratic
             | Self::AddedMass
             | Self::SupportFrequency
+            | Self::SupportCompliance
+            | Self::SupportOwnFrequency
+            | Self::SupportDampingRatio
             | Self::Link(..) => true,
         }
     }
@@ -248,14 +263,14 @@ impl Parameter {
             // seen from its edge, a plane is a line
             Self::ViewStretch => -0.99,
             // a yield angle or a frequency of zero has no meaning
-            Self::HysteresisYield | Self::SupportFrequency => 1e-4,
+            Self::HysteresisYield | Self::SupportFrequency | Self::SupportOwnFrequency => 1e-4,
             other if other.is_not_negative() => 0.0,
             _ => f64::NEG_INFINITY,
         }
     }
 
     /// Every parameter but those of links and of stated laws.
-    pub const ALL: [Self; 30] = [
+    pub const ALL: [Self; 33] = [
         Self::JointStiffness,
         Self::JointDamping,
         Self::RestCurl,
@@ -273,6 +288,9 @@ impl Parameter {
         Self::SupportSine,
         Self::SupportCosine,
         Self::SupportFrequency,
+        Self::SupportCompliance,
+        Self::SupportOwnFrequency,
+        Self::SupportDampingRatio,
         Self::TimeBase,
         Self::DroppedFrames,
         Self::CameraTilt,

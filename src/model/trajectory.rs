@@ -24,13 +24,14 @@ impl State {
         Self { theta_rad: theta_rad.to_vec(), omega_rad_s: vec![0.0; theta_rad.len()], hidden: Vec::new() }
     }
 
-    /// Sums of the shapes in which a motion starts (of [`ForwardModel::start`], the first ones), and their rates.
-    pub fn begun(start: &DMatrix<f64>, angles_rad: &[f64], rates_rad_s: &[f64]) -> Self {
-        let of_links = |of_shapes: &[f64]| {
-            let sum = start.columns(0, of_shapes.len()) * DVector::from_column_slice(of_shapes);
-            sum.as_slice().to_vec()
-        };
-        Self { theta_rad: of_links(angles_rad), omega_rad_s: of_links(rates_rad_s), hidden: Vec::new() }
+    /// Of the numbers in which a motion starts, see [`StartDirections`].
+    pub fn begun(model: &ForwardModel, start: &[f64]) -> Self {
+        let directions = StartDirections::of(model, start.len());
+        let start = DVector::from_column_slice(start);
+        let theta_rad = (&directions.theta * &start).as_slice().to_vec();
+        let mut omega_rad_s = (&directions.rate * &start).as_slice().to_vec();
+        let hidden = omega_rad_s.split_off(theta_rad.len());
+        Self { theta_rad, omega_rad_s, hidden }
     }
 
     /// At rest with these angles between marks.
@@ -43,7 +44,40 @@ impl State {
             let detail = format!("{} angles for {links} links; give model.release_rad one a link", release_rad.len());
             return Err(Error::Simulation { detail });
         }
-        Ok(Self::begun(&model.start(), release_rad, &vec![0.0; links]))
+        let further = vec![0.0; model.free_pairs().len()];
+        Ok(Self::begun(model, &[release_rad, &further, &vec![0.0; links], &further].concat()))
+    }
+}
+
+/// What the numbers in which a motion starts are on the links and on the laws' own variables.
+///
+/// The first half of the numbers are angles, of [`ForwardModel::start`] the first shapes, then the coordinate of each law that begins anywhere
+/// ([`ForwardModel::free_pairs`]); the second half are their rates. All other variables of laws are zero.
+#[derive(Debug, Clone, PartialEq)]
+pub struct StartDirections {
+    /// ∂θ, n × numbers.
+    pub theta: DMatrix<f64>,
+    /// ∂rate, m × numbers.
+    pub rate: DMatrix<f64>,
+}
+
+impl StartDirections {
+    /// Of so many numbers, at least the angles between marks and their rates.
+    pub fn of(model: &ForwardModel, numbers: usize) -> Self {
+        let (n, half) = (model.chain().count(), numbers / 2);
+        let mut pairs = model.free_pairs();
+        // a start of the angles between marks alone leaves these at zero, too
+        pairs.truncate(half.saturating_sub(model.chain().groups().len()));
+        let shapes = half - pairs.len();
+        let start = model.start();
+        let (mut theta, mut rate) = (DMatrix::zeros(n, numbers), DMatrix::zeros(model.rates(), numbers));
+        theta.columns_mut(0, shapes).copy_from(&start.columns(0, shapes));
+        rate.view_mut((0, half), (n, shapes)).copy_from(&start.columns(0, shapes));
+        for (k, row) in pairs.into_iter().enumerate() {
+            rate[(row, shapes + k)] = 1.0;
+            rate[(row + 1, half + shapes + k)] = 1.0;
+        }
+        Self { theta, rate }
     }
 }
 

@@ -7,6 +7,7 @@ mod columns;
 pub mod noise;
 mod plausible;
 mod standstill;
+mod turns;
 
 use std::ops::Range;
 use std::path::{Path, PathBuf};
@@ -103,13 +104,24 @@ impl AngleSeries {
             tracked: header.iter().any(|name| name == "m1_x_px"),
             warnings: Vec::new(),
         };
-        let mut decimals = 0;
+        let (mut decimals, mut without_time) = (0, 0);
         for record in reader.records() {
             let record = record.map_err(|e| table.refuse(e.position().map(csv::Position::line), &e.to_string()))?;
             decimals = decimals.max(record.get(columns.t).map_or(0, decimals_of));
-            series.push(&Row { record: &record, header: &header, table: &table }, &columns)?;
+            let counts = series.push(&Row { record: &record, header: &header, table: &table }, &columns)?;
+            without_time += usize::from(!counts);
+        }
+        if without_time > 0 {
+            series.warnings.push(format!(
+                "{}: {without_time} frame{} with a repeated or backward time stamp: left out",
+                path.display(),
+                if without_time == 1 { "" } else { "s" }
+            ));
         }
         series.check(&table, columns.measured)?;
+        if columns.measured == Measured::Angles {
+            series.take_out_turns();
+        }
         series.keep_deviations();
         if columns.measured == Measured::Displacement {
             series.theta_rad.iter_mut().chain(&mut series.sd_rad).flatten().flatten().for_each(|px| *px /= PX_PER_RAD);
@@ -126,13 +138,17 @@ impl AngleSeries {
         Ok((series, columns.measured))
     }
 
-    fn push(&mut self, row: &Row, columns: &Columns) -> Result<()> {
+    /// Adds a row; whether it counts: a frame of a video whose stamp does not rise has no time of its own.
+    fn push(&mut self, row: &Row, columns: &Columns) -> Result<bool> {
         let (fields, named) = (row.record.len(), row.header.len());
         if fields != named {
             return Err(row.refuse(&format!("{fields} fields where the header names {named} columns")));
         }
         let t_s = row.number(columns.t)?.ok_or_else(|| row.refuse("t_s is empty; every row needs its time"))?;
         if let Some(before) = self.t_s.last().filter(|before| **before >= t_s) {
+            if self.tracked {
+                return Ok(false);
+            }
             return Err(row.refuse(&if *before == t_s {
                 format!("t_s = {t_s} stands twice; keep one row an instant")
             } else {
@@ -145,7 +161,7 @@ impl AngleSeries {
             let sd = columns.sd[link].and_then(|c| row.record[c].parse().ok());
             self.sd_rad[link].push(sd.filter(|sd: &f64| sd.is_finite()));
         }
-        Ok(())
+        Ok(true)
     }
 
     /// Keeps the standard deviations that are positive, of the columns that hold some.

@@ -42,7 +42,7 @@ const LEAST_SHIFT: f64 = SAME_AREA / (1.0 - SAME_AREA);
 /// Correlation of two paths from which on one moves with the other (judgement: half).
 const MOVES_WITH: f64 = 0.5;
 /// What a chain whose first mark swings by less than its own radius is worth less: anything else that swings comes first (judgement).
-const SLIGHT: f64 = 0.5;
+pub const SLIGHT: f64 = 0.5;
 /// Marks that are looked for at most (cost).
 pub const MOST_MARKS: usize = 12;
 /// Share of the frames in which a mark is seen, at least (judgement).

@@ -6,6 +6,7 @@
 
 use std::cmp::Ordering;
 
+use super::chain_detection::{CHANCE, SLIGHT};
 use super::steadiness::{STILL, steadiness};
 use super::tracklet::Tracklet;
 use super::{FrameBlobs, MarkSlot, Sighting};
@@ -295,13 +296,28 @@ fn score(kept: &Kept<'_>, assignment: &[Option<usize>]) -> f64 {
         [only] => only.map_or(0.0, |only| candidates[only].pivot_stretch),
         _ => 0.0,
     };
+    // and of any, one that swings by more than its own radius, and of those as good as each other the one that swings farthest
+    let alone = match places[..] {
+        [only] => alone(candidates, only),
+        _ => 0.0,
+    };
     let stretch = places.windows(2).map(|w| stretches[w[0]][w[1]]).fold(from_pivot, f64::max);
     let mean = chosen.iter().map(|c| c.ln_area).sum::<f64>() / chosen.len().max(1) as f64;
     let unlike = (chosen.iter().map(|c| (c.ln_area - mean).powi(2)).sum::<f64>() / chosen.len().max(1) as f64).sqrt();
     let swings = candidates.iter().any(|c| c.moves);
     let still = |slot: &usize| assignment[*slot].is_some_and(|i| !candidates[i].moves);
     let unfit = (0..assignment.len()).filter(still).filter(|slot| !is_hinge(kept, assignment, *slot)).count();
-    presence - 3.0 * stretch - 0.5 * unlike - if swings { UNFIT * unfit as f64 } else { 0.0 }
+    presence + alone - 3.0 * stretch - 0.5 * unlike - if swings { UNFIT * unfit as f64 } else { 0.0 }
+}
+
+/// What speaks for a mark by itself beside others of its hue.
+fn alone(candidates: &[&Candidate], only: usize) -> f64 {
+    let own = candidates[only];
+    let radius_px = (own.ln_area.exp() / std::f64::consts::PI).sqrt();
+    let of_hue = candidates.iter().filter(|other| other.hue == own.hue);
+    let farthest_px = of_hue.map(|other| other.travel_px).fold(f64::MIN_POSITIVE, f64::max);
+    let slight = if own.moves && own.travel_px <= radius_px { SLIGHT } else { 0.0 };
+    CHANCE * own.travel_px / farthest_px - slight
 }
 
 /// Half the range of a path along its longer axis, the outermost twentieths apart, and its scatter from frame to

@@ -20,8 +20,23 @@ pub(super) const ROUGH_PX: f64 = 0.2;
 /// brick and wood by 0.04 to 0.6).
 const UNSTEADY: f64 = 0.03;
 
-/// Of a path; where it was out of sight it begins anew. A path of fewer than 13 places tells nothing, and stands for steady.
+/// Nearer to the place before than this a thing that moves is in a picture that was shown twice, or turns (px).
+const REPEATED_PX: f64 = 0.05;
+
+/// The path without the places of pictures that are repeated, after which it jumps; as it is where most of it would be left out.
+fn without_repeats(path: &[Option<[f64; 2]>]) -> Vec<Option<[f64; 2]>> {
+    let is_repeated = |k: usize| match (k.checked_sub(1).and_then(|before| path[before]), path[k]) {
+        (Some(before), Some(own)) => (own[0] - before[0]).hypot(own[1] - before[1]) < REPEATED_PX,
+        _ => false,
+    };
+    let kept: Vec<_> = (0..path.len()).map(|k| path[k].filter(|_| !is_repeated(k))).collect();
+    let count = |path: &[Option<[f64; 2]>]| path.iter().flatten().count();
+    if 2 * count(&kept) > count(path) { kept } else { path.to_vec() }
+}
+
+/// Of a path; where it was out of sight it begins anew, and where a picture is repeated. A path of fewer than 13 places tells nothing, and stands for steady.
 pub(super) fn steadiness(path: &[Option<[f64; 2]>]) -> f64 {
+    let path = &*without_repeats(path);
     if path.iter().flatten().count() <= ORDER + FEWEST {
         return STILL;
     }
@@ -79,6 +94,9 @@ mod tests {
         let spot = |i: usize| 46.0 * ((0.31 * (i * i) as f64).sin() * 2.0).round();
         let texture: Vec<_> = (0..240).map(|i| place(spot(i), noise(i))).collect();
         assert!(steadiness(&texture) < 0.1);
+        // pictures that stand still for a while, and those in between left out
+        let frozen: Vec<_> = (0..240).map(|i| seen[if (90..94).contains(&i) { 90 } else { i }]).collect();
+        assert!(steadiness(&frozen) > 0.5, "{}", steadiness(&frozen));
         // a fifth of a second of a swing
         assert_eq!(steadiness(&seen[..12]), STILL);
         // two spots, each for itself at rest

@@ -14,6 +14,9 @@ const MERGED_RADII: f64 = 0.3;
 /// Frames of a speed that show how large a mark is at it, and the least difference of speeds (px a frame) that does.
 const FEWEST_OF_A_SPEED: usize = 10;
 const LEAST_SPEED_PX: f64 = 1.0;
+/// Frames between two of a speed that belong to one time (judgement: a tracker's noise), and fewest times that tell more than all frames together (statistics).
+const MOST_APART: usize = 3;
+const FEWEST_TIMES: usize = 5;
 
 /// The marks' tracks over the whole recording.
 #[derive(Debug, Clone, PartialEq)]
@@ -100,14 +103,26 @@ impl Tracks {
 /// ```text
 /// A(v) = A_s + (A_f − A_s) (v − v_s)/(v_f − v_s)      medians of the slowest third of its frames and of the fastest
 /// ```
+///
+/// Each time that it is slow counts once, however long it lasts: while a hand holds it, and covers a part of it, nothing shows how large it is where it turns.
 fn usual_area(measured: &[Option<Measured>], speeds_px: &[f64], median_px2: f64) -> impl Fn(f64) -> f64 + use<> {
-    let seen = measured.iter().zip(speeds_px).filter_map(|(m, speed)| Some([*speed, f64::from(m.as_ref()?.area_px2)]));
-    let mut rows: Vec<[f64; 2]> = seen.collect();
-    rows.sort_by(|a, b| a[0].total_cmp(&b[0]));
+    let area_px2 = |i: usize| Some(f64::from(measured[i].as_ref()?.area_px2));
+    let mut rows: Vec<usize> = (0..measured.len()).filter(|i| measured[*i].is_some()).collect();
+    rows.sort_by(|a, b| speeds_px[*a].total_cmp(&speeds_px[*b]));
+    // one time that is longer than all others together leaves the others too few
+    while let Some(longest) = longest_time(&rows[..rows.len() / 3]) {
+        rows.retain(|row| longest.binary_search(row).is_err());
+    }
     let third = rows.len() / 3;
-    let of = |rows: &[[f64; 2]]| {
-        let middle = |k: usize| median(&mut rows.iter().map(|row| row[k]).collect::<Vec<_>>()).unwrap_or(0.0);
-        [middle(0), middle(1)]
+    let of = |some: &[usize]| {
+        let mut in_time = some.to_vec();
+        in_time.sort_unstable();
+        let times = in_time.chunk_by(together);
+        let middle = |frames: &[usize]| median(&mut frames.iter().filter_map(|i| area_px2(*i)).collect::<Vec<_>>());
+        let mut each: Vec<f64> = times.filter_map(middle).collect();
+        let area_px2 = if each.len() < FEWEST_TIMES { middle(some) } else { median(&mut each) };
+        let speed_px = median(&mut some.iter().map(|i| speeds_px[*i]).collect::<Vec<_>>());
+        [speed_px.unwrap_or(0.0), area_px2.unwrap_or(0.0)]
     };
     let [[slow_px, slow_px2], [fast_px, fast_px2]] = [of(&rows[..third]), of(&rows[rows.len() - third..])];
     let tells = third >= FEWEST_OF_A_SPEED && fast_px - slow_px > LEAST_SPEED_PX;
@@ -115,6 +130,19 @@ fn usual_area(measured: &[Option<Measured>], speeds_px: &[f64], median_px2: f64)
     let at_rest = if tells { slow_px2 - slope * slow_px } else { median_px2 };
     // beyond the speeds that were seen often nothing is known
     move |speed_px| (at_rest + slope * speed_px.min(fast_px)).max(0.5 * median_px2)
+}
+
+fn together(before: &usize, after: &usize) -> bool {
+    after - before <= MOST_APART
+}
+
+/// Of some frames, in any order, those of one time that is longer than all others together and leaves enough; `None` where there is none.
+fn longest_time(frames: &[usize]) -> Option<Vec<usize>> {
+    let mut in_time = frames.to_vec();
+    in_time.sort_unstable();
+    let longest = in_time.chunk_by(together).max_by_key(|time| time.len())?;
+    let is_most = 2 * longest.len() > in_time.len() && in_time.len() > FEWEST_OF_A_SPEED;
+    is_most.then(|| longest.to_vec())
 }
 
 /// A mark that is partly hidden has its centroid off by up to the hidden share of its radius; one that has grown

@@ -136,7 +136,7 @@ impl Timing {
         if let Some(frame) = self.repeated_or_backward_frames.first() {
             let count = self.repeated_or_backward_frames.len();
             warnings.push(format!(
-                "{count} frame{} with a repeated or backward time stamp, the first is frame {frame}",
+                "{count} frame{} with a repeated or backward time stamp, the first is frame {frame}; identify, fit and diagnose leave such frames out",
                 plural(count)
             ));
         }

@@ -18,6 +18,11 @@ use table::TABLE;
 pub use set_up::{BendingStrip, SetUp, bending_n_m2};
 pub use table::{Acts, Cost, Entry, Phase, Place, Requires};
 
+/// Compliance of the softest stand (judgement: a force of ten newtons moves it by ten centimetres).
+pub const SOFTEST_M_PER_N: f64 = 0.01;
+/// A stand that the whole weight, pulling sideways, moves by less than this part of the specimen's length changes the swing by too little to be told (judgement).
+const YIELDS: f64 = 1e-3;
+
 /// An effect of the table, by the identifier it has in files.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub enum Effect {
@@ -59,13 +64,15 @@ pub enum Effect {
     SideForce,
     /// The pivot moves to and fro.
     SupportMotion,
+    /// The stand yields.
+    SupportFlexibility,
     /// The strip bends everywhere.
     DistributedFlexibility,
 }
 
 impl Effect {
     /// Every effect, in the order of the table.
-    pub const ALL: [Self; 20] = [
+    pub const ALL: [Self; 21] = [
         Self::TimeBase,
         Self::DroppedFrames,
         Self::CameraTilt,
@@ -85,6 +92,7 @@ impl Effect {
         Self::AddedMass,
         Self::SideForce,
         Self::SupportMotion,
+        Self::SupportFlexibility,
         Self::DistributedFlexibility,
     ];
 
@@ -152,6 +160,7 @@ impl Effect {
             Requires::Nothing => true,
             Requires::OneAngle => marks == 1,
             Requires::Joint => marks > 1,
+            Requires::Weight => is_heavy(experiment),
             Requires::Spring => base.iter().any(|parameter| parameter.is_spring()),
             Requires::Strip => marks > 1 && strip && base.contains(&Parameter::JointStiffness),
         };
@@ -170,6 +179,13 @@ impl Effect {
         let of_table = of_table.map(|effect| (effect.parameters()[0], effect.place()));
         std::iter::once((Parameter::JointDamping, Place::Joint)).chain(of_table).collect()
     }
+}
+
+/// Whether the softest stand would yield to the specimen's swing by a good part of its length.
+fn is_heavy(experiment: &Experiment) -> bool {
+    let specimen = &experiment.specimen;
+    let weight_n = specimen.whole_mass_kg() * experiment.rig.gravity_m_s2;
+    SOFTEST_M_PER_N * weight_n > YIELDS * specimen.lengths_m().iter().sum::<f64>()
 }
 
 impl fmt::Display for Effect {
@@ -210,6 +226,7 @@ mod tests {
             "added_mass",
             "side_force",
             "support_motion",
+            "support_flexibility",
             "distributed_flexibility",
         ];
         assert_eq!(Effect::ALL.map(Effect::id), expected);

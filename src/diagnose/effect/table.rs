@@ -98,6 +98,8 @@ pub enum Requires {
     OneAngle,
     /// A joint.
     Joint,
+    /// A specimen so heavy that a stand may yield to it.
+    Weight,
     /// A joint with a spring.
     Spring,
     /// A joint with a spring that stands for the bending of a strip.
@@ -185,7 +187,7 @@ const fn velocity(entry: Entry) -> Entry {
 }
 
 /// The table, those of the camera first: an error of measurement is not to be blamed on physics.
-pub(super) static TABLE: [Entry; 20] = {
+pub(super) static TABLE: [Entry; 21] = {
     use Acts::{Loss, Motion, Otherwise, Pace};
     use Parameter as P;
     use Place::{Air, Camera, Hinge, Joint};
@@ -276,6 +278,17 @@ pub(super) static TABLE: [Entry; 20] = {
             id: "support_motion",
             cost: Cost::EveryFrequency,
             ..entry(&[P::SupportSine, P::SupportCosine, P::SupportFrequency], Hinge, Motion, "a moving support")
+        },
+        Entry {
+            id: "support_flexibility",
+            cost: Cost::EveryFrequency,
+            needs: Requires::Weight,
+            ..entry(
+                &[P::SupportCompliance, P::SupportOwnFrequency, P::SupportDampingRatio],
+                Hinge,
+                Pace,
+                "a stand that yields",
+            )
         },
         Entry {
             cost: Cost::ManyRods,

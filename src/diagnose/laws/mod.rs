@@ -5,6 +5,7 @@
 //! | `ordinary` | a law in proportion to its coefficient |
 //! | [`missing_frames`] | at which instant frames are missing |
 //! | [`moving_support`] | at which frequency a support moves |
+//! | `flexible_support` | at which frequency a stand swings that yields |
 //! | [`hysteresis`] | where its fit starts |
 //! | `oblique_view` | a camera that looks askew, with its stretch and its shear; a sensor's scale |
 //! | `encoder` | an encoder off its axis, with its error once and twice a turn |
@@ -12,6 +13,7 @@
 
 pub mod bending;
 mod encoder;
+mod flexible_support;
 pub mod hysteresis;
 pub mod missing_frames;
 pub mod moving_support;
@@ -121,6 +123,7 @@ pub fn law_of(effect: Effect) -> &'static dyn Law {
     match effect {
         Effect::DroppedFrames => &missing_frames::MissingFrames,
         Effect::SupportMotion => &moving_support::MovingSupport,
+        Effect::SupportFlexibility => &flexible_support::FlexibleSupport,
         Effect::CameraOblique => &oblique_view::ObliqueView,
         Effect::EncoderError => &encoder::EncoderError,
         Effect::AngleGain => &oblique_view::WrongScale,

@@ -132,7 +132,7 @@ impl Effect for Hysteresis {
     }
 
     /// T_h, and the bend Δ_y at which it yields.
-    fn of_hidden(&self) -> [f64; 2] {
+    fn of_hidden(&self, _chain: &Chain) -> [f64; 2] {
         [self.torque_n_m.abs(), self.yield_rad]
     }
 

@@ -8,8 +8,9 @@
 //! | [`formula`] | those that a file states by a formula |
 //! | [`bearing`] | the load that a formula may go with |
 //! | [`outside`] | `side_force`, `support_motion`, nodal forces |
+//! | [`support`] | `support_flexibility` |
 //!
-//! `distributed_flexibility` is a chain of more links, see [`Chain::of`](super::Chain::of). Camera effects (`time_base`, `dropped_frames`,
+//! `distributed_flexibility` is a chain of more links, see [`Chain::continuous`](super::Chain::continuous). Camera effects (`time_base`, `dropped_frames`,
 //! `camera_tilt`, `angle_gain`, `camera_oblique`, `encoder_error`, `differential_lag`, `differential_zero`) change the observation, not the motion.
 
 pub mod air;
@@ -19,6 +20,7 @@ pub mod hinge;
 pub mod joint;
 pub mod load;
 pub mod outside;
+pub mod support;
 
 use super::{Chain, Motion, Parameter, Partials};
 use crate::experiment::Model;
@@ -73,8 +75,13 @@ pub trait Effect: std::fmt::Debug + Send + Sync {
     }
 
     /// The torque (N·m) of a unit of those variables, and the angle (rad) that it moves at most.
-    fn of_hidden(&self) -> [f64; 2] {
+    fn of_hidden(&self, _chain: &Chain) -> [f64; 2] {
         [0.0; 2]
+    }
+
+    /// Whether its variables are a coordinate and its rate, which may have any value where a motion starts; others start at zero.
+    fn begins_free(&self) -> bool {
+        false
     }
 
     /// What it adds to the cost of a step, where that is not next to nothing, in the unit of [`Work`](crate::model::Work).
@@ -216,6 +223,12 @@ pub fn effects_of(model: &Model, mark_length_m: f64) -> Vec<Box<dyn Effect>> {
             frequency_hz: support.frequency_hz,
         }));
     }
+    let stand = on.support_flexibility.map(|stand| support::SupportFlexibility {
+        compliance_m_per_n: stand.compliance_m_per_n,
+        frequency_hz: stand.frequency_hz,
+        damping_ratio: stand.damping_ratio,
+    });
+    effects.extend(stand.map(|stand| Box::new(stand) as Box<dyn Effect>));
     effects.extend(model.law.iter().filter_map(formula::Formula::of).map(|law| Box::new(law) as Box<dyn Effect>));
     effects
 }

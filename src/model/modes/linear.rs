@@ -19,6 +19,18 @@ pub struct Linearised {
     pub stiffness_n_m: DMatrix<f64>,
 }
 
+/// The identifier of an effect, and what switches it off.
+type SwitchOff = (&'static str, fn(&mut Effects));
+
+/// The effects that act on the motion and may have no linear part at rest.
+const MAY_LEAVE_NO_TRACE: [SwitchOff; 5] = [
+    ("hinge_coulomb", |effects| effects.hinge_coulomb = None),
+    ("air_quadratic", |effects| effects.air_quadratic = None),
+    ("joint_cubic_stiffness", |effects| effects.joint_cubic_stiffness = None),
+    ("support_motion", |effects| effects.support_motion = None),
+    ("support_flexibility", |effects| effects.support_flexibility = None),
+];
+
 impl Linearised {
     /// Linearises an experiment's chain by the forward model's own derivatives, with every effect that has a linear part.
     ///
@@ -42,12 +54,27 @@ impl Linearised {
         })
     }
 
-    /// Identifiers of the effects that are switched on but have no linear part at rest.
-    pub fn left_out(effects: &Effects) -> Vec<&'static str> {
-        [("hinge_coulomb", effects.hinge_coulomb), ("air_quadratic", effects.air_quadratic)]
-            .into_iter()
-            .filter_map(|(id, coefficient)| coefficient.map(|_| id))
-            .collect()
+    /// Of the experiment that was linearised, the effects and the stated laws that leave no trace in it: those without which it is the same.
+    ///
+    /// # Errors
+    /// As [`Linearised::of`].
+    pub fn left_out(&self, experiment: &Experiment) -> Result<Vec<String>> {
+        let mut left_out = Vec::new();
+        for (id, switch_off) in MAY_LEAVE_NO_TRACE {
+            let mut without = experiment.clone();
+            switch_off(&mut without.model.effects);
+            if without.model.effects != experiment.model.effects && Self::of(&without)? == *self {
+                left_out.push(id.to_owned());
+            }
+        }
+        for (place, law) in experiment.model.law.iter().enumerate() {
+            let mut without = experiment.clone();
+            without.model.law.remove(place);
+            if Self::of(&without)? == *self {
+                left_out.push(format!("law {:?}", law.name));
+            }
+        }
+        Ok(left_out)
     }
 }
 
@@ -90,7 +117,16 @@ mod tests {
     fn friction_and_a_moving_pivot_leave_no_trace() {
         let effects = Effects { hinge_coulomb: Some(1e-6), air_quadratic: Some(1e-3), ..Effects::default() };
         assert_eq!(linear(effects.clone()), linear(Effects::default()));
-        assert_eq!(Linearised::left_out(&effects), ["hinge_coulomb", "air_quadratic"]);
+        let left_out = |effects: Effects| {
+            let mut experiment = Experiment::default();
+            experiment.model.effects = effects;
+            Linearised::of(&experiment).unwrap().left_out(&experiment).unwrap()
+        };
+        assert_eq!(left_out(effects), ["hinge_coulomb", "air_quadratic"]);
+        // about a bent rest a cubic spring is a spring
+        let bent = Effects { joint_cubic_stiffness: Some(1e-3), rest_curl: Some(0.2), ..Effects::default() };
+        let straight = Effects { rest_curl: None, ..bent.clone() };
+        assert!(left_out(bent).is_empty() && left_out(straight) == ["joint_cubic_stiffness"]);
     }
 
     #[test]

@@ -54,7 +54,7 @@ pub struct ChainModes {
     #[serde(flatten)]
     pub modes: Modes,
     /// Effects that are switched on and have no linear part.
-    pub not_linear: Vec<&'static str>,
+    pub not_linear: Vec<String>,
 }
 
 /// Eq. 33 and 34.
@@ -98,11 +98,11 @@ impl Survey {
             floor: Floor::of(experiment)?,
             chain: ChainModes {
                 modes: Modes::of(&linear)?,
+                not_linear: linear.left_out(experiment)?,
                 rest_rad: linear.rest_rad,
                 joint_stiffness_n_m_per_rad: bending.is_none().then_some(experiment.model.k_eq_n_m_per_rad),
                 bending_stiffness_n_m2: bending,
                 joint_damping_n_m_s_per_rad: experiment.model.c_eq_n_m_s_per_rad,
-                not_linear: Linearised::left_out(&experiment.model.effects),
             },
             two_rods: RodForms::of(experiment),
             beam: BeamModes::of(&experiment.specimen, experiment.rig.gravity_m_s2),

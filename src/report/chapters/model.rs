@@ -56,7 +56,12 @@ fn parameters(fit: &Fitted) -> String {
     } else {
         ""
     };
-    table(&["parameter", "fitted, 95 %", "in the file", ""], rows) + coloured
+    let invalid = if fit.intervals_valid == Some(false) {
+        "<p class=\"note\">The model does not reproduce the recording: the intervals are not valid, and the values are the best of a wrong model.</p>\n"
+    } else {
+        ""
+    };
+    table(&["parameter", "fitted, 95 %", "in the file", ""], rows) + invalid + coloured
 }
 
 fn residuals(side: &FitSide) -> String {

@@ -11,6 +11,7 @@ pub struct Fitted {
     pub specimen: String,
     pub parameters: BTreeMap<String, FittedParameter>,
     pub coloured_residuals: bool,
+    pub intervals_valid: Option<bool>,
     pub converged: Option<bool>,
     pub recordings: Vec<FittedRecording>,
 }

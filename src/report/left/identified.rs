@@ -12,6 +12,7 @@ pub struct Identified {
     pub record: Recorded,
     pub spectrum: SpectrumFound,
     pub drift_rad: Vec<Option<f64>>,
+    pub used_s: Option<[f64; 2]>,
     pub modes: Vec<Mode>,
     pub swing_mode: Option<usize>,
     pub floor: Option<Statement>,
@@ -59,6 +60,7 @@ pub struct Statement {
 pub struct Mode {
     pub number: usize,
     pub frequency_hz: Interval,
+    pub frequency_at_amplitude_rad: Option<f64>,
     pub damping: Damping,
     pub basis: String,
     pub shape: Vec<LinkMotion>,
@@ -66,6 +68,22 @@ pub struct Mode {
     pub frequency_consistency: Option<Consistency>,
     pub damping_consistency: Option<Consistency>,
     pub envelope: Option<Envelope>,
+    pub modulated: Option<Modulated>,
+}
+
+impl Mode {
+    /// How its frequency goes with amplitude, by the method that the answer is from.
+    pub fn frequency_law(&self) -> Option<&FrequencyLaw> {
+        let modulated = self.modulated.as_ref().map(|own| &own.frequency);
+        modulated.or(self.envelope.as_ref().and_then(|own| own.frequency.as_ref()))
+    }
+}
+
+/// One oscillation through the whole record.
+#[derive(Debug, Default, Deserialize)]
+#[serde(default)]
+pub struct Modulated {
+    pub frequency: FrequencyLaw,
 }
 
 /// ξ, or why there is none.

@@ -4,8 +4,10 @@ use crate::report::left::{Interval, Mode, Step};
 use crate::report::plot::{Axis, Ink, Plot, Series, Style};
 
 pub(super) fn frequency_against_amplitude(mode: &Mode, alone: bool) -> Plot {
-    let Some(envelope) = &mode.envelope else { return Plot::default() };
-    let law = envelope.frequency.as_ref().and_then(|law| Some((law.f0_hz.value?, law.kappa_per_rad2.value?)));
+    if mode.envelope.is_none() {
+        return Plot::default();
+    }
+    let law = mode.frequency_law().and_then(|law| Some((law.f0_hz.value?, law.kappa_per_rad2.value?)));
     let mut plot = against_amplitude(mode, |step| step.frequency_hz);
     if let Some((f0_hz, kappa)) = law {
         let values = plot.at.iter().map(|a| Some(f0_hz * (1.0 - kappa * a * a))).collect();

@@ -16,6 +16,7 @@ fn method(estimator: &Estimator) -> String {
         "decrement" => "logarithmic decrement".to_owned(),
         "sinusoids" => "damped sinusoids".to_owned(),
         "envelope" => "envelope, at small amplitude".to_owned(),
+        "modulated" => "slow flow, at small amplitude".to_owned(),
         "spectrum" => "peak of the spectrum".to_owned(),
         other => other.to_owned(),
     }

@@ -11,7 +11,8 @@ pub use shapes::moving;
 use super::{Chapter, Part};
 use crate::identify::signal::Signal;
 use crate::report::html::{escaped, interval, paragraph, table, value};
-use crate::report::left::{Identified, Interval, Left};
+use crate::report::left::{Identified, Interval, Left, Mode};
+use crate::series::AngleSeries;
 use amplitude::{damping_against_amplitude, frequency_against_amplitude};
 use decay::decay;
 use estimators::{Quantity, estimators, refusals};
@@ -31,7 +32,12 @@ pub fn chapter(left: &Left) -> Chapter {
         chapter.parts.push(Part::MovingModes);
         chapter.plot(shapes(left, found));
     }
-    let signal = left.angles.as_ref().map(|angles| Signal::of(angles).unwrapped().0);
+    // of what was identified: a beginning that is held is no swing
+    let of = |angles: &AngleSeries| {
+        let signal = Signal::of(angles);
+        found.used_s.map_or_else(|| signal.clone(), |[from_s, until_s]| signal.from(from_s).until(until_s))
+    };
+    let signal = left.angles.as_ref().map(of);
     if let Some(signal) = &signal {
         chapter.plot(spectrum(found, signal));
         for mode in found.modes.iter().take(MOST_MODES) {
@@ -80,17 +86,22 @@ fn modes(found: &Identified) -> String {
             .collect();
         vec![
             mode.number.to_string(),
-            interval(&mode.frequency_hz, "Hz"),
+            frequency(mode),
             damping,
             shape.join(", "),
             phase.join(", "),
             escaped(&mode.basis),
         ]
     });
-    let headings =
-        ["mode", "frequency at small amplitude", "damping ratio ξ", "amplitude over θ1's", "phase to θ1", "from"];
-    let note = "<p class=\"note\">Behind ± stands half of the 95 % interval. A click on a number copies it with its unit.</p>\n";
+    let headings = ["mode", "frequency", "damping ratio ξ", "amplitude over θ1's", "phase to θ1", "from"];
+    let note = "<p class=\"note\">Frequencies are those at small amplitude, unless another amplitude is named. Behind ± stands half of the 95 % interval. A click on a number copies it with its unit.</p>\n";
     table(&headings, rows) + note
+}
+
+fn frequency(mode: &Mode) -> String {
+    let hz = interval(&mode.frequency_hz, "Hz");
+    mode.frequency_at_amplitude_rad
+        .map_or(hz.clone(), |at| format!("{hz} at an amplitude of {}", value(Some(at), 3, "rad")))
 }
 
 fn equivalents(found: &Identified) -> String {
