@@ -51,7 +51,7 @@ impl Laboratory {
     fn film(&self, name: &str) {
         let path = self.path(name);
         fs::create_dir_all(path.parent().unwrap()).unwrap();
-        Clip { scene: Scene::default(), frames: 90 }.write(&path);
+        Clip { frames: 90, ..Clip::default() }.write(&path);
     }
 
     fn command(&self, out: &str) -> Command {
@@ -133,7 +133,7 @@ fn every_recording_has_a_row_and_a_bad_one_says_why_as_its_command_alone_does() 
     lab.write("in/films/wrong.toml", "[rig]\npivot = [1.0, 2.0]\n");
     lab.write("in/day 0/short.csv", "t_s,theta1_rad\n0,0.1\n");
     lab.write("in/day 0/volts.csv", "time,volts\n0,1\n");
-    Clip { scene: Scene { marks: Vec::new(), ..Scene::default() }, frames: 30 }
+    Clip { scene: Scene { marks: Vec::new(), ..Scene::default() }, frames: 30, ..Clip::default() }
         .write(&lab.path("in/films/no marks.mp4"));
     let (code, told) = lab.batch("out", &[]);
     assert_eq!(code, Some(1), "{told}");
@@ -288,7 +288,7 @@ fn parts_on_several_machines_come_to_the_same_summary() {
 #[test]
 fn a_run_that_is_killed_alone_is_done_again_without_being_asked_for() {
     let lab = Laboratory::new();
-    Clip { scene: Scene::default(), frames: 900 }.write(&lab.path("in/film.mp4"));
+    Clip { frames: 900, ..Clip::default() }.write(&lab.path("in/film.mp4"));
     assert_eq!(lab.batch("undisturbed", &[]).0, Some(0));
     let batch = lab.command("out").stderr(Stdio::piped()).spawn().unwrap();
     let began = std::time::Instant::now();

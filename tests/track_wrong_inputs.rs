@@ -64,9 +64,12 @@ fn clips() -> Vec<(&'static str, Clip)> {
             "drifting",
             Clip {
                 frames: 150,
+                gop: 25,
                 scene: Scene { marks: vec![(1, RED), (2, RED)], drift_px_s: 1.5, plain_wall: true, ..Scene::default() },
             },
         ),
+        // with one key frame for all of it
+        ("knocked", Clip { frames: 240, gop: 250, scene: Scene { knocked: (4.0, 6.0), ..Scene::default() } }),
         ("stops", swing().with(Scene { uncovered_s: [0.0, 1.2], ..Scene::default() })),
         ("late", swing().with(Scene { uncovered_s: [1.2, 9.0], ..Scene::default() })),
         ("twin", swing().with(Scene { twin: true, ..Scene::default() })),
@@ -291,6 +294,12 @@ fn shaking() -> Vec<Case> {
             "shaken.mp4",
             vec!["--steady", "never"],
             Warns(&["camera moved by up to", "--steady always"]),
+        ),
+        (
+            "a camera that is knocked in the middle",
+            "knocked.mp4",
+            vec![],
+            Warns(&["camera moved by up to 6.", "taken out"]),
         ),
         (
             "a camera that drifts before a plain wall",

@@ -20,7 +20,7 @@ pub(super) const ROUGH_PX: f64 = 0.2;
 /// brick and wood by 0.04 to 0.6).
 const UNSTEADY: f64 = 0.03;
 
-/// Nearer to the place before than this a thing that moves is in a picture that was shown twice, or turns (px).
+/// Nearer to the place before than this a thing that moves is in a picture that was shown twice, or turns (px; judgement: a quarter of what a place is off that was looked at roughly).
 const REPEATED_PX: f64 = 0.05;
 
 /// The path without the places of pictures that are repeated, after which it jumps; as it is where most of it would be left out.

@@ -29,6 +29,8 @@ pub struct Scene {
     pub still: Vec<([f64; 2], f64, Rgb)>,
     pub exposure_s: f64,
     pub shake_px: f64,
+    /// From this time on the camera looks so far beside.
+    pub knocked: (f64, f64),
     /// The camera turns away, so far to the left a second.
     pub drift_px_s: f64,
     /// A wall of one grey shows no shift.
@@ -54,6 +56,7 @@ impl Default for Scene {
             still: Vec::new(),
             exposure_s: 0.002,
             shake_px: 0.0,
+            knocked: (f64::MAX, 0.0),
             drift_px_s: 0.0,
             plain_wall: false,
             uncovered_s: [0.0, f64::MAX],
@@ -82,7 +85,8 @@ impl Scene {
     fn picture(&self, frame: usize) -> Canvas {
         let t_s = frame as f64 / RATE_HZ;
         let shaken = [1.0, 0.7].map(|part| part * self.shake_px * (7.0 * t_s + part).sin());
-        let shift = moved(shaken, [self.drift_px_s * t_s, 0.0]);
+        let knocked_px = if t_s > self.knocked.0 { self.knocked.1 } else { 0.0 };
+        let shift = moved(shaken, [self.drift_px_s * t_s + knocked_px, 0.0]);
         let mut canvas = Canvas::wall(shift, if self.plain_wall { 0.0 } else { 1.0 });
         for (at, radius_px, colour) in &self.still {
             canvas.disc(moved(*at, shift), *radius_px, *colour, 1.0);
@@ -126,12 +130,14 @@ fn moved(p: [f64; 2], by: [f64; 2]) -> [f64; 2] {
 /// A scene for as many frames.
 pub struct Clip {
     pub frames: usize,
+    /// Frames from one key frame to the next.
+    pub gop: u32,
     pub scene: Scene,
 }
 
 impl Default for Clip {
     fn default() -> Self {
-        Self { frames: 75, scene: Scene::default() }
+        Self { frames: 75, gop: 25, scene: Scene::default() }
     }
 }
 
@@ -141,7 +147,7 @@ impl Clip {
     }
 
     pub fn write(&self, path: &Path) {
-        let codec = Codec { preset: "ultrafast".to_owned(), gop: 25, ..Codec::default() };
+        let codec = Codec { preset: "ultrafast".to_owned(), gop: self.gop, ..Codec::default() };
         let layout = codec.layout(SIZE[0] as u32, SIZE[1] as u32);
         let mut writer = VideoWriter::create(path, &codec, layout, RATE_HZ).unwrap();
         for frame in 0..self.frames {
