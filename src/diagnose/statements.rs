@@ -43,7 +43,7 @@ impl Findings<'_> {
             ),
             // the table cannot be excluded by sets that were never fitted
             Status::Unknown if !self.has_compared_pairs() => format!(
-                "Something is missing ({sure}), and the search reached its limit of computation before it found what: not every pair of effects was fitted, so that it may well be in the table of effects. Diagnose a shorter stretch (--until){}.",
+                "Something is missing ({sure}), and the search reached its limit of computation before it found what: not every pair of effects was fitted, so that it may well be in the table of effects{}. Diagnose a shorter stretch (--until).",
                 self.nearest()
             ),
             Status::Unknown => format!(
