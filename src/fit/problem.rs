@@ -34,7 +34,7 @@ const RUNAWAY: f64 = 5.0;
 /// A model with free parameters, and recordings of one specimen.
 ///
 /// The variables of a fit are the free parameters, then for each recording the angles between marks at its first row (of a strip also how much there is of
-/// the next mode) and their rates.
+/// the next modes, and where a stand is that yields) and their rates.
 #[derive(Debug, Clone)]
 pub struct Problem<'a> {
     /// The recordings.

@@ -2,7 +2,7 @@
 
 /// Position, rates and accelerations of all links at one instant.
 ///
-/// The rates are ω = θ̇ of the n links, followed by what a law keeps in mind between instants (the Bouc–Wen variable of each joint);
+/// The rates are ω = θ̇ of the n links, followed by what a law keeps in mind between instants (the Bouc–Wen variable of each joint, where a stand is that yields);
 /// the accelerations are their derivatives. The pivot may move sideways.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Motion {

@@ -14,7 +14,7 @@ pub struct State {
     pub theta_rad: Vec<f64>,
     /// θ̇.
     pub omega_rad_s: Vec<f64>,
-    /// What laws keep in mind (the Bouc–Wen variable of each joint); empty stands for zero.
+    /// What laws keep in mind (the Bouc–Wen variable of each joint, where a stand is that yields); empty stands for zero.
     pub hidden: Vec<f64>,
 }
 

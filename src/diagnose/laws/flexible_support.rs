@@ -17,6 +17,7 @@ use super::super::screen::{Score, Screen};
 use super::super::settings::{PriorSettings, Settings};
 use super::{Coefficients, Law};
 use crate::model::Parameter;
+use crate::model::effects::support::SupportFlexibility;
 
 /// Lowest and highest frequency, in units of the swing's, and the factor from one to the next (judgement: below, a stand is another pendulum; above, only its stiffness and
 /// damping show).
@@ -53,7 +54,7 @@ impl Law for FlexibleSupport {
         specimens_part < 1.0 && compliance_m_per_n < SOFTEST_M_PER_N
     }
 
-    /// Any frequency and any damping, and any swing of its own within what is believed of it.
+    /// Any frequency, of no likelier size than another, any damping ratio up to one, and any swing of its own within what is believed of it.
     fn ln_multiplicity(
         &self,
         fit: &Refit<'_>,
@@ -63,7 +64,6 @@ impl Law for FlexibleSupport {
     ) -> f64 {
         let (hz, sd_hz) = of(Parameter::SupportOwnFrequency);
         let (_, sd) = of(Parameter::SupportDampingRatio);
-        // a size for each, log-uniform as that of the compliance
         let of_shape = (hz * settings.sizes).max(sd_hz).ln() + sd.max(1.0).ln();
         of_shape + fit.problem.ln_known_of_pairs(&fit.normal)
     }
@@ -90,13 +90,7 @@ impl Pull {
             let theta_rad = &linearisation.rows[k].theta_rad;
             DMatrix::from_fn(theta_rad.len(), 1, |i, _| -moment(i) * theta_rad[i].cos())
         });
-        let at = |t_s: &f64| {
-            let motion = motion_at(&model, &swing, *t_s)?;
-            let of = |i: usize| {
-                moment(i) * (motion.cos[i] * motion.acceleration[i] - motion.sin[i] * motion.rate[i] * motion.rate[i])
-            };
-            Some(-(0..motion.links()).map(of).sum::<f64>())
-        };
+        let at = |t_s: &f64| Some(-SupportFlexibility::pull_n(model.chain(), &motion_at(&model, &swing, *t_s)?));
         let pull_n = true_s.iter().map(at).collect::<Option<Vec<f64>>>()?;
         Some(Self { linearisation, transitions, pull_n })
     }
@@ -112,45 +106,35 @@ impl Pull {
     }
 
     /// ẍ (m/s²) at both ends of each interval between rows: of a stand of unit compliance that begins as bent as the pull bends it, and of one that is let go a metre
-    /// away, and one that passes its rest. Between rows the pull is a line.
+    /// away, and one that passes its rest. Between rows the pull is a line F + F′τ, of which x = F + F′(τ − 2ζ/ω) is one motion; what a stand differs from it by swings freely.
     fn accelerations(&self, hz: f64, damping_ratio: f64) -> Vec<[[f64; 3]; 2]> {
         let omega = std::f64::consts::TAU * hz;
         let t_s = &self.linearisation.t_s;
-        // x, ẋ/ω, the pull and its slope
-        let matrix = |slope: f64| {
-            nalgebra::Matrix4::new(
-                0.0,
-                omega,
-                0.0,
-                0.0, //
-                -omega,
-                -2.0 * damping_ratio * omega,
-                omega,
-                0.0, //
-                0.0,
-                0.0,
-                0.0,
-                slope, //
-                0.0,
-                0.0,
-                0.0,
-                0.0,
-            )
+        let root = (1.0 - damping_ratio * damping_ratio).sqrt();
+        let swung = |[x, y]: [f64; 2], length_s: f64| {
+            let (sin, cos) = (root * omega * length_s).sin_cos();
+            let (sin, lag, decay) = (sin / root, damping_ratio * sin / root, (-damping_ratio * omega * length_s).exp());
+            [decay * ((cos + lag) * x + sin * y), decay * ((cos - lag) * y - sin * x)]
         };
-        let of = |x: &nalgebra::Vector4<f64>| omega * omega * (x[2] - x[0] - 2.0 * damping_ratio * x[1]);
-        let first_slope = (self.pull_n[1] - self.pull_n[0]) / (t_s[1] - t_s[0]);
-        let mut states = [
-            nalgebra::Vector4::new(self.pull_n[0], first_slope / omega, self.pull_n[0], 1.0),
-            nalgebra::Vector4::new(1.0, 0.0, 0.0, 0.0),
-            nalgebra::Vector4::new(0.0, 1.0, 0.0, 0.0),
-        ];
+        let accelerations = |states: &[[f64; 2]; 3], pull: f64| {
+            let of = |which: usize| {
+                let [x, y] = states[which];
+                let pull = if which == 0 { pull } else { 0.0 };
+                omega * omega * (pull - x - 2.0 * damping_ratio * y)
+            };
+            [of(0), of(1), of(2)]
+        };
+        let slope = |k: usize| (self.pull_n[k + 1] - self.pull_n[k]) / (t_s[k + 1] - t_s[k]);
+        // x and ẋ/ω
+        let mut states = [[self.pull_n[0], slope(0) / omega], [1.0, 0.0], [0.0, 1.0]];
         let step = |k: usize| {
-            let length_s = t_s[k + 1] - t_s[k];
-            let slope = (self.pull_n[k + 1] - self.pull_n[k]) / length_s;
-            let before = states.map(|state| of(&state));
-            let transition = (matrix(slope) * length_s).exp();
-            states = states.map(|state| transition * state);
-            [before, states.map(|state| of(&state))]
+            let (length_s, slope) = (t_s[k + 1] - t_s[k], slope(k));
+            let before = accelerations(&states, self.pull_n[k]);
+            let (driven, speed) = (self.pull_n[k] - 2.0 * damping_ratio * slope / omega, slope / omega);
+            let [x, y] = swung([states[0][0] - driven, states[0][1] - speed], length_s);
+            let driven = driven + slope * length_s;
+            states = [[driven + x, speed + y], swung(states[1], length_s), swung(states[2], length_s)];
+            [before, accelerations(&states, self.pull_n[k + 1])]
         };
         (0..t_s.len() - 1).map(step).collect()
     }

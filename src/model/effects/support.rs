@@ -29,7 +29,7 @@ impl SupportFlexibility {
     }
 
     /// Σ hᵢ (cos θᵢ θ̈ᵢ − sin θᵢ θ̇ᵢ²) (N): the chain's sideways inertia.
-    fn pull_n(chain: &Chain, motion: &Motion) -> f64 {
+    pub fn pull_n(chain: &Chain, motion: &Motion) -> f64 {
         let of = |i: usize| Self::pull_of_moment(motion, i) * chain.static_moment_kg_m(i);
         (0..chain.count()).map(of).sum()
     }
