@@ -23,8 +23,8 @@ use crate::fit::whitening::Whitening;
 use crate::model::Parameter;
 use crate::progress::Progress;
 
-/// Replicates of the residuals (cost).
-const REPLICATES: usize = 2000;
+/// Replicates of the residuals (cost; the most conspicuous in one of four statistics is at most four of them: rarer than one in two hundred).
+const REPLICATES: usize = 1000;
 /// What they are compared by: so many numbers, see above.
 const STATISTICS: usize = 4;
 /// Values of a window (judgement).
