@@ -75,7 +75,7 @@ pub fn angles_from_tracks(
         .map(|pair| {
             let mut angles: Vec<Option<Angle>> =
                 pair[0].iter().zip(&pair[1]).map(|(a, b)| angle(calibration, a.as_ref()?, b.as_ref()?)).collect();
-            unwrap_turns(&mut angles);
+            unwrap_turns(angles.iter_mut().flatten().map(|angle| &mut angle.theta_rad));
             angles
         })
         .collect();
@@ -97,15 +97,15 @@ fn angle(calibration: &Calibration, upper: &Measured, lower: &Measured) -> Optio
     Some(Angle { theta_rad: Calibration::angle_rad(vector), sd_rad: variance.max(0.0).sqrt() })
 }
 
-/// Removes jumps of whole turns between one measured angle and the next.
-fn unwrap_turns(angles: &mut [Option<Angle>]) {
+/// Removes jumps of whole turns between one angle and the next.
+pub(crate) fn unwrap_turns<'a>(angles_rad: impl Iterator<Item = &'a mut f64>) {
     let mut last: Option<f64> = None;
-    for angle in angles.iter_mut().flatten() {
+    for angle_rad in angles_rad {
         if let Some(last) = last {
-            let turns = ((last - angle.theta_rad) / std::f64::consts::TAU).round();
-            angle.theta_rad += turns * std::f64::consts::TAU;
+            let turns = ((last - *angle_rad) / std::f64::consts::TAU).round();
+            *angle_rad += turns * std::f64::consts::TAU;
         }
-        last = Some(angle.theta_rad);
+        last = Some(*angle_rad);
     }
 }
 
@@ -211,8 +211,8 @@ mod tests {
     #[test]
     fn full_turns_are_unwrapped_over_a_gap() {
         let a = |t| Some(Angle { theta_rad: t, sd_rad: 0.1 });
-        let mut angles = vec![a(3.0), a(-3.1), None, a(-2.9)];
-        unwrap_turns(&mut angles);
+        let mut angles = [a(3.0), a(-3.1), None, a(-2.9)];
+        unwrap_turns(angles.iter_mut().flatten().map(|angle| &mut angle.theta_rad));
         let theta: Vec<f64> = angles.iter().flatten().map(|a| a.theta_rad).collect();
         assert!((theta[1] - 3.183).abs() < 1e-3 && (theta[2] - 3.383).abs() < 1e-3, "{theta:?}");
     }

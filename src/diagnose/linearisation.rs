@@ -150,6 +150,14 @@ impl Linearisation {
         (0..self.flows.len()).map(|k| self.transition(k, &inputs(k), f64::INFINITY, 0)).collect()
     }
 
+    /// The same of one input, a sideways acceleration of the pivot (m/s²): in its frame every mass feels the opposite.
+    pub fn transitions_of_pivot(&self) -> Vec<DMatrix<f64>> {
+        self.transitions_of_inputs(|k| {
+            let theta_rad = &self.rows[k].theta_rad;
+            DMatrix::from_fn(theta_rad.len(), 1, |i, _| -self.chain.static_moment_kg_m(i) * theta_rad[i].cos())
+        })
+    }
+
     fn transition(&self, k: usize, inputs: &DMatrix<f64>, memory_s: f64, parameters: usize) -> DMatrix<f64> {
         let part_s = (self.t_s[k + 1] - self.t_s[k]) / self.flows[k].len() as f64;
         let parts =

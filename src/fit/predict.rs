@@ -10,7 +10,7 @@ use crate::model::integrate::Directions;
 use crate::model::observe::{chord_angles_rad, chord_slopes};
 use crate::model::step::StepPlace;
 use crate::model::trajectory::StartDirections;
-use crate::model::{Accuracy, Camera, ForwardModel, Parameter, State, Trajectory};
+use crate::model::{Accuracy, Camera, ForwardModel, Parameter, Trajectory};
 
 /// The angles predicted for some rows, and their derivatives.
 #[derive(Debug, Clone)]
@@ -73,8 +73,10 @@ pub fn predict(model: &ForwardModel, request: &Request<'_>) -> Result<Prediction
     }
     let ends_s = [0, 1].map(|link| camera.true_time_s(request.until_s, link));
     let latest_s = ends_s[0].max(ends_s[1]) + 1e-9;
-    let state = State::begun(model, start);
-    let directions = request.slopes.then(|| directions(model, parameters, start.len()));
+    let begun = StartDirections::of(model, start.len());
+    let state = begun.state(start);
+    let StartDirections { theta, rate } = begun;
+    let directions = request.slopes.then(|| Directions { parameters: parameters.to_vec(), theta, rate });
     let swing = Trajectory::with(model, &state, (start_s, latest_s), directions.as_ref(), accuracy)?;
     let columns = if request.slopes { parameters.len() + start.len() } else { 0 };
     let mut values = Vec::with_capacity(record.values(rows.clone()));
@@ -102,12 +104,6 @@ pub fn predict(model: &ForwardModel, request: &Request<'_>) -> Result<Prediction
     }
     let slopes = DMatrix::from_row_slice(values.len(), columns, &flat);
     Ok(Prediction { values, slopes, end: end_of(model, &swing, request, &camera)? })
-}
-
-/// The parameters, then so many numbers in which the motion starts.
-fn directions(model: &ForwardModel, parameters: &[Parameter], numbers: usize) -> Directions {
-    let StartDirections { theta, rate } = StartDirections::of(model, numbers);
-    Directions { parameters: parameters.to_vec(), theta, rate }
 }
 
 /// Angle between marks and its rate at a true time; its derivatives are added to `slopes`.

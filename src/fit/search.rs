@@ -1,11 +1,12 @@
 //! Several beginnings, the best end.
 
 use super::descent::{Descent, Outcome};
+use super::problem::switch_on;
 use super::record::refuse_empty;
 use super::shooting::{self, STATE_WINDOW_RAD, ShootingResult};
 use super::{Problem, Record, start_values, transformed};
 use crate::error::{Error, Result};
-use crate::experiment::{Experiment, Hysteresis, SupportFlexibility, SupportMotion};
+use crate::experiment::{Experiment, Hysteresis, SupportMotion};
 use crate::model::{Parameter, Work};
 use crate::progress::Progress;
 use crate::series::FEWEST_ROWS;
@@ -29,9 +30,8 @@ pub const PARTS: [f64; 4] = [0.1, 0.2, 0.35, 0.6];
 const FINENESS: f64 = 2.0;
 const HIGHEST_HZ: f64 = 20.0;
 const PEAKS: usize = 4;
-/// Frequencies of a stand over the swing's, and its damping ratio, with which it is begun (start values).
+/// Frequencies of a stand over the swing's, with which it is begun (start values).
 const STANDS: [f64; 5] = [1.5, 3.0, 5.0, 9.0, 16.0];
-const STAND_DAMPING: f64 = 0.05;
 /// Another end is better where it leaves less by this part (judgement).
 const BETTER: f64 = 1e-3;
 /// Beginnings, each of which is a stage.
@@ -276,11 +276,9 @@ impl<'a> Search<'a, '_> {
             let swing_hz = end.problem.model(0, &[])?.0.characteristic_rad_s() / std::f64::consts::TAU;
             let with = |times: f64| {
                 let mut tried = end.begun.clone();
-                tried.model.effects.support_flexibility = Some(SupportFlexibility {
-                    compliance_m_per_n: 0.0,
-                    frequency_hz: times * swing_hz,
-                    damping_ratio: STAND_DAMPING,
-                });
+                switch_on(&mut tried, Parameter::SupportCompliance);
+                let stand = tried.model.effects.support_flexibility.iter_mut();
+                stand.for_each(|stand| stand.frequency_hz = times * swing_hz);
                 tried
             };
             Ok(STANDS.into_iter().map(with).collect())

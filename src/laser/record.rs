@@ -149,9 +149,10 @@ impl Columns {
         };
         let t = names.iter().position(|name| is_time(name));
         let t = t.ok_or_else(|| format!("names no column of time; the columns are {list}; name it t_s or t_ms"))?;
-        let unit = words(names[t]).find_map(|w| TIME_UNITS.iter().find(|unit| unit.0 == w));
+        // the unit stands last
+        let unit = words(names[t]).filter_map(|w| TIME_UNITS.iter().find(|unit| unit.0 == w)).last();
         let t_scale_s = match unit {
-            None | Some((_, Some(1.0))) => 1.0,
+            None => 1.0,
             Some((_, Some(scale_s))) => *scale_s,
             Some((unit, None)) => {
                 return Err(format!("column `{}` is in {unit}; give the times in seconds or milliseconds", names[t]));

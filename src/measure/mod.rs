@@ -324,11 +324,7 @@ impl<'a> Session<'a> {
     /// taken out.
     fn takes_out_what_was_watched(&mut self) -> bool {
         let watched = std::mem::take(&mut self.watched);
-        let moved = |shift: &&CameraShift| {
-            shift.size_px() > survey::CAMERA_MOVES_PX && shift.size_px() > survey::SURE_SHIFT * shift.sd_px()
-        };
-        // one picture alone may have something pass before its patches
-        if watched.len() < survey::FEWEST_PICTURES || watched.iter().filter(moved).count() < 2 {
+        if !survey::moves(survey::greatest_px(watched.iter()), watched.len()) {
             return false;
         }
         self.background = self.watch.take();

@@ -18,10 +18,10 @@ use crate::video::{Orientation, OwnedPicture, Picture, Recording, StreamInfo, WH
 /// Pictures from which hue, scale, threshold and siting are learnt.
 const SAMPLE_PICTURES: usize = 8;
 /// Shift between two pictures from which the camera is taken to move, px: ten times what a patch's error is.
-pub const CAMERA_MOVES_PX: f64 = 0.3;
+const CAMERA_MOVES_PX: f64 = 0.3;
 /// Standard deviations beyond which a shift is one, and pictures that must show it.
-pub const SURE_SHIFT: f64 = 5.0;
-pub const FEWEST_PICTURES: usize = 3;
+const SURE_SHIFT: f64 = 5.0;
+const FEWEST_PICTURES: usize = 3;
 
 /// Standard deviations of the mean by which marks that are mixed by their light must fit better (the one-standard-error rule of Breiman et al., Classification and
 /// Regression Trees, 1984).
@@ -157,6 +157,19 @@ pub struct SurveyedCamera {
     pub shifts: Vec<CameraShift>,
 }
 
+/// The greatest shift that two pictures show: one alone may have something pass before its patches. A shift that its own patches leave open is none.
+pub fn greatest_px<'a>(shifts: impl Iterator<Item = &'a CameraShift>) -> f64 {
+    let sure = shifts.filter(|c| c.size_px() > SURE_SHIFT * c.sd_px());
+    let mut sizes_px: Vec<f64> = sure.map(CameraShift::size_px).collect();
+    sizes_px.sort_by(|a, b| b.total_cmp(a));
+    sizes_px.get(1).copied().unwrap_or(0.0)
+}
+
+/// Whether that is a camera that moves, of so many pictures.
+pub fn moves(greatest_px: f64, pictures: usize) -> bool {
+    greatest_px > CAMERA_MOVES_PX && pictures >= FEWEST_PICTURES
+}
+
 /// How far the camera moves, and against what it is taken out, where it is.
 pub fn camera(pictures: &[OwnedPicture], options: &Options, stream: &StreamInfo) -> SurveyedCamera {
     let Some((first, others)) = pictures.split_first() else { return SurveyedCamera::default() };
@@ -168,13 +181,7 @@ pub fn camera(pictures: &[OwnedPicture], options: &Options, stream: &StreamInfo)
         Some((camera, background.agreeing(&picture.view(), &camera)))
     };
     let located: Vec<_> = others.par_iter().map(locate).collect();
-    // a shift that its own patches leave open is none
-    let shifts = located.iter().flatten().map(|(camera, _)| camera);
-    let sure = shifts.filter(|c| c.size_px() > SURE_SHIFT * c.sd_px());
-    // one picture alone may have something pass before its patches
-    let mut sizes_px: Vec<f64> = sure.map(CameraShift::size_px).collect();
-    sizes_px.sort_by(|a, b| b.total_cmp(a));
-    let greatest_px = sizes_px.get(1).copied().unwrap_or(0.0);
+    let greatest_px = greatest_px(located.iter().flatten().map(|(camera, _)| camera));
     // pictures that do not show where the camera looks
     let silent = located.iter().any(Option::is_none);
     let still = CameraShift::default();
@@ -184,10 +191,7 @@ pub fn camera(pictures: &[OwnedPicture], options: &Options, stream: &StreamInfo)
         Steadying::Always => true,
         Steadying::Never => false,
         // where some picture does not show the background well, no frame is risked for it
-        Steadying::WhereNeeded => {
-            let moves = greatest_px > CAMERA_MOVES_PX && agreed.len() >= FEWEST_PICTURES;
-            !silent && (!points_px.is_empty() || moves)
-        }
+        Steadying::WhereNeeded => !silent && (!points_px.is_empty() || moves(greatest_px, agreed.len())),
     };
     background.keep_steady(&agreed);
     let is_usable = background.is_usable();

@@ -26,12 +26,7 @@ impl State {
 
     /// Of the numbers in which a motion starts, see [`StartDirections`].
     pub fn begun(model: &ForwardModel, start: &[f64]) -> Self {
-        let directions = StartDirections::of(model, start.len());
-        let start = DVector::from_column_slice(start);
-        let theta_rad = (&directions.theta * &start).as_slice().to_vec();
-        let mut omega_rad_s = (&directions.rate * &start).as_slice().to_vec();
-        let hidden = omega_rad_s.split_off(theta_rad.len());
-        Self { theta_rad, omega_rad_s, hidden }
+        StartDirections::of(model, start.len()).state(start)
     }
 
     /// At rest with these angles between marks.
@@ -78,6 +73,15 @@ impl StartDirections {
             rate[(row + 1, half + shapes + k)] = 1.0;
         }
         Self { theta, rate }
+    }
+
+    /// Where a motion starts with these numbers.
+    pub fn state(&self, start: &[f64]) -> State {
+        let start = DVector::from_column_slice(start);
+        let theta_rad = (&self.theta * &start).as_slice().to_vec();
+        let mut omega_rad_s = (&self.rate * &start).as_slice().to_vec();
+        let hidden = omega_rad_s.split_off(theta_rad.len());
+        State { theta_rad, omega_rad_s, hidden }
     }
 }
 

@@ -3,6 +3,7 @@
 use std::f64::consts::TAU;
 
 use super::AngleSeries;
+use crate::angles::unwrap_turns;
 use crate::statistics::median;
 
 /// Of a turn: a wrapped angle jumps by nearly all of it where it passes the end of its range (physics: no link turns so far from row to row that a swing is still seen).
@@ -18,14 +19,7 @@ impl AngleSeries {
             if !is_wrapped(theta) {
                 continue;
             }
-            let (mut turns_rad, mut before) = (0.0, None);
-            for angle in theta.iter_mut().flatten() {
-                // the one before is unwrapped already
-                let step = before.map_or(0.0, |before| *angle + turns_rad - before);
-                turns_rad -= (step / TAU).round() * TAU;
-                *angle += turns_rad;
-                before = Some(*angle);
-            }
+            unwrap_turns(theta.iter_mut().flatten());
             let middle_rad = median(&mut theta.iter().copied().flatten().collect::<Vec<_>>()).unwrap_or(0.0);
             let whole_rad = (middle_rad / TAU).round() * TAU;
             theta.iter_mut().flatten().for_each(|angle| *angle -= whole_rad);

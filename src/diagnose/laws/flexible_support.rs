@@ -85,11 +85,7 @@ impl Pull {
     fn of(fit: &Refit<'_>, record: usize) -> Option<Self> {
         let (model, swing, true_s) = fit.motion(record)?;
         let linearisation = Linearisation::of(fit, record)?;
-        let moment = |i: usize| linearisation.chain.static_moment_kg_m(i);
-        let transitions = linearisation.transitions_of_inputs(|k| {
-            let theta_rad = &linearisation.rows[k].theta_rad;
-            DMatrix::from_fn(theta_rad.len(), 1, |i, _| -moment(i) * theta_rad[i].cos())
-        });
+        let transitions = linearisation.transitions_of_pivot();
         let at = |t_s: &f64| Some(-SupportFlexibility::pull_n(model.chain(), &motion_at(&model, &swing, *t_s)?));
         let pull_n = true_s.iter().map(at).collect::<Option<Vec<f64>>>()?;
         Some(Self { linearisation, transitions, pull_n })

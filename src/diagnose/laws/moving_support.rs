@@ -99,10 +99,7 @@ fn scanned(screen: &Screen<'_, '_>) -> Option<Score> {
     for record in 0..records {
         let (model, _) = problem.model(record, &screen.fit.x[..problem.free.len()]).ok()?;
         let linearisation = Linearisation::of(screen.fit, record)?;
-        let transitions = linearisation.transitions_of_inputs(|k| {
-            let theta_rad = &linearisation.rows[k].theta_rad;
-            DMatrix::from_fn(theta_rad.len(), 1, |i, _| -linearisation.chain.static_moment_kg_m(i) * theta_rad[i].cos())
-        });
+        let transitions = linearisation.transitions_of_pivot();
         around.push((linearisation, transitions, model.characteristic_rad_s()));
     }
     let span_s = around.iter().map(|(a, _, _)| a.t_s[a.t_s.len() - 1] - a.t_s[0]).fold(0.0, f64::max);
